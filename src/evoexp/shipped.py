@@ -6,12 +6,12 @@ with, and makes a test fail when results change without a raised revision.
 """
 
 import functools
-import json
 import shlex
 from collections import Counter
-from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
+
+import orjson
 
 ORIGIN = "evoexp"  # of shipped options
 
@@ -74,8 +74,8 @@ class Shipped(NamedTuple):
 @functools.cache
 def shipped() -> tuple[Shipped, ...]:
     """Return the table."""
-    text = resources.files("evoexp").joinpath("assets/shipped.json").read_text(encoding="utf-8")
-    return tuple(Shipped(**row) for row in json.loads(text))
+    content = (Path(__file__).parent / "assets/shipped.json").read_bytes()
+    return tuple(Shipped(**row) for row in orjson.loads(content))
 
 
 def find(prefix: str) -> list[Shipped]:

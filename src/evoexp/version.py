@@ -1,8 +1,21 @@
-"""The version of evoexp, and when this process began to load it."""
+"""The version of evoexp, when this process began to load it, and versions of other libraries."""
 
+import functools
 import time
 
 __version__ = "0.1.0"
 
 LOADED_FROM = time.time()
 """[s] No module of evoexp was read before, but this one and the package itself."""
+
+
+@functools.cache
+def version_of(distribution: str) -> str:
+    """Return the version of an installed distribution; looking it up takes a millisecond.
+
+    Raises:
+        PackageNotFoundError: If it is not installed.
+    """
+    from importlib import metadata  # which takes longer than the rest of this module
+
+    return metadata.version(distribution)

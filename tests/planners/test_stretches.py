@@ -103,7 +103,7 @@ def test_a_stretch_is_as_long_as_the_caches_allow() -> None:
 def test_costs_that_take_much_memory_are_recorded_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
     given = condition("experiment=rana_planar ga.num_generations=40")
     expected = masked_log(run_replicate(given, 0).content)
-    monkeypatch.setattr(gathering, "ENOUGH", 9_000)
+    monkeypatch.setattr(gathering, "ENOUGH", 4_000)
     planner, problem = given.prepare()
     stretches = list(planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0))
     assert len(stretches) > 2

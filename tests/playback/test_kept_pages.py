@@ -1,6 +1,5 @@
 """Pages that are kept: found as long as nothing changes that they follow from."""
 
-import importlib.metadata
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -51,7 +50,7 @@ CHANGES: dict[str, Callable[[Studio, pytest.MonkeyPatch], object]] = {
     "a title": lambda studio, _: setattr(studio, "title", "another"),
     "a speed": lambda studio, _: setattr(studio, "asked", "another"),
     "code": lambda _, patch: patch.setattr(kept_pages, "installed_code", lambda: b"other"),
-    "a library": lambda _, patch: patch.setattr(importlib.metadata, "version", lambda _: "9.9"),
+    "a library": lambda _, patch: patch.setattr(kept_pages, "version_of", lambda _: "9.9"),
     "package data": lambda studio, patch: patch.setattr(kept_pages, "_ASSETS", studio.log.parent),
     "a log that is gone": lambda studio, _: studio.log.unlink(),
 }

@@ -10,7 +10,6 @@ expansion is not kept where more than this decides: URDF files with their meshes
 
 import contextlib
 import hashlib
-import importlib.metadata
 import json
 import os
 import re
@@ -32,6 +31,7 @@ from evoexp.numeric.kept_files import cache_root
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 from evoexp.store.kept_facts import add_files, installed_code
+from evoexp.version import version_of
 
 NUM_KEPT = 200  # [-] expansions, the newest ones
 _NAME = re.compile(r"\w+")  # of an option; a file has a dot or a slash
@@ -92,7 +92,7 @@ def _path(overrides: Sequence[str], *others: Any) -> Path | None:
     """Return the file that an expansion is kept in; None where it may not be kept."""
     if any(MARK in word for word in overrides):
         return None
-    versions = [importlib.metadata.version(name) for name in _COMPOSERS]
+    versions = [*map(version_of, _COMPOSERS)]
     asked = [list(overrides), others, [each.origin for each in folders()], versions]
     digest = hashlib.sha256(json.dumps([*asked, pydantic.VERSION]).encode())
     digest.update(installed_code())

@@ -16,12 +16,11 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
-from evoexp.version import LOADED_FROM
+from evoexp.version import LOADED_FROM, version_of
 
 GRAIN_S = 0.02  # [s] that a file's time may be behind the clock
 
@@ -50,7 +49,7 @@ class Source(NamedTuple):
 @functools.cache
 def compilers() -> tuple[str, ...]:
     """Return the versions of what compiles kernels, without loading any of it."""
-    return metadata.version("numba"), metadata.version("llvmlite"), sys.version
+    return version_of("numba"), version_of("llvmlite"), sys.version
 
 
 @functools.cache

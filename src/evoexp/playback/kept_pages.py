@@ -6,7 +6,6 @@ and versions of libraries. It is kept under the hash of all of these.
 
 import contextlib
 import hashlib
-import importlib.metadata
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -16,6 +15,7 @@ from typing import NamedTuple
 from evoexp.input_files import read_bounded
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.store.kept_facts import file_stamps, installed_code
+from evoexp.version import version_of
 
 MOST = 64  # pages that are kept; those drawn longest ago are removed
 _DRAWERS = ("numpy", "numba", "scipy", "pin", "coal")
@@ -58,7 +58,7 @@ def kept_page(
 
 def _place(logs: Sequence[tuple[Path, str]], asked: str) -> Path:
     """Return the file that a page is kept in."""
-    versions = [sys.version, *(importlib.metadata.version(name) for name in _DRAWERS)]
+    versions = [sys.version, *map(version_of, _DRAWERS)]
     told = [asked, *versions, *(title for _, title in logs), *file_stamps([_ASSETS])]
     digest = hashlib.sha256(json.dumps(told).encode(errors="surrogateescape"))
     digest.update(installed_code())

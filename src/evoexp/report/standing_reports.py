@@ -7,7 +7,6 @@ for, and the files that were written, by their sizes and times.
 
 import contextlib
 import hashlib
-import importlib.metadata
 import json
 import os
 import sys
@@ -17,6 +16,7 @@ from typing import Any, NamedTuple
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.store.kept_facts import file_stamps, installed_code
+from evoexp.version import version_of
 
 _DRAWERS = ("jinja2", "matplotlib", "numpy", "pandas", "scipy", "pyarrow", "pin", "coal", "numba")
 _PACKAGE = Path(__file__).parents[1]
@@ -65,7 +65,7 @@ def inputs_of_reports(outputs: Path, folders: Sequence[Path]) -> bytes:
         outputs: Root of all outputs.
         folders: Folders of options.
     """
-    versions = [sys.version, *(importlib.metadata.version(name) for name in _DRAWERS)]
+    versions = [sys.version, *map(version_of, _DRAWERS)]
     digest = hashlib.sha256(json.dumps(versions).encode() + installed_code())
     _add_stamps(digest, [_PACKAGE / "assets", *folders, outputs / "runs"])
     return digest.digest()

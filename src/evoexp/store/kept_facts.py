@@ -7,7 +7,6 @@ under is the content of all code that has a say, so an edit or another version f
 import contextlib
 import functools
 import hashlib
-import importlib.metadata
 import importlib.util
 import json
 import os
@@ -20,7 +19,7 @@ from typing import Any
 from evoexp.numeric.code_keys import GRAIN_S
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.registry import COMPONENTS, Registration, registrations
-from evoexp.version import LOADED_FROM
+from evoexp.version import LOADED_FROM, version_of
 
 Stamp = tuple[str, int, int]  # path, size and time of a file
 
@@ -62,7 +61,7 @@ def kept_answer(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
         find: Finds it, as plain data; what it raises is not kept.
     """
     digest = hashlib.sha256(installed_code())
-    digest.update(json.dumps([kind, *_versions()]).encode())
+    digest.update(json.dumps([kind, *map(version_of, _LIBRARIES)]).encode())
     digest.update(about)
     path = cache_root() / "facts" / digest.hexdigest()[:32]
     with contextlib.suppress(FileNotFoundError, Damaged):
@@ -71,11 +70,6 @@ def kept_answer(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
     with contextlib.suppress(OSError):
         write_kept(path, json.dumps(found).encode())
     return found
-
-
-@functools.cache
-def _versions() -> list[str]:
-    return [importlib.metadata.version(name) for name in _LIBRARIES]
 
 
 def installed_code(without: Collection[str] = ()) -> bytes:
@@ -102,7 +96,7 @@ def installed_code(without: Collection[str] = ()) -> bytes:
 def _hash_of_code(components: str, stamps: tuple[Stamp, ...]) -> bytes:
     """Read all code, once per process as long as no file is written again."""
     digest = hashlib.sha256(components.encode())
-    add_files(digest, (Path(path) for path, _, _ in stamps))
+    add_files(digest, (path for path, _, _ in stamps))
     return digest.digest()
 
 
@@ -150,11 +144,12 @@ def file_stamps(roots: Iterable[Path]) -> Iterator[Stamp]:
                     yield path, status.st_size, status.st_mtime_ns
 
 
-def add_files(digest: Any, paths: Iterable[Path]) -> None:
+def add_files(digest: Any, paths: Iterable[Path | str]) -> None:
     """Add names and contents of files, of those that are there, to a hash."""
     for path in paths:
-        if path.is_file():
-            content = path.read_bytes()
+        if os.path.isfile(path):
+            with open(path, "rb", buffering=0) as file:  # two thirds of the time of a `Path`'s
+                content = file.readall()
             digest.update(f"{path}\0{len(content)}\0".encode(errors="surrogateescape") + content)
 
 

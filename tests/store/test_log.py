@@ -300,3 +300,17 @@ def test_generations_and_stretches_may_follow_each_other() -> None:
     for each in written[20:]:
         log.write(each)
     assert log.finish(summary()).content == expected.finish(summary()).content
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int32, np.int64])
+def test_costs_of_other_types_are_the_same_in_stretches(kind: type) -> None:
+    written = [
+        each._replace(costs=np.arange(20).astype(kind) + kind(each.index))
+        for each in generations(30)
+    ]
+    log, expected = (Log(CONDITION, CONFIG, 7, np.random.default_rng(5)) for _ in range(2))
+    for each in written:
+        expected.write(each)
+    for stretch in in_stretches(written, 9):
+        log.write_stretch(stretch)
+    assert log.finish(summary()).summary.digest == expected.finish(summary()).summary.digest

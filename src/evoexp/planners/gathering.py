@@ -87,7 +87,7 @@ class Gathered:
             time: When it was there [s].
         """
         keeper, statistics = self.keeper, scored.statistics
-        lowest = scored.costs.item(statistics.best)
+        lowest = float(scored.costs[statistics.best])
         if keeper.improves(lowest):
             keeper.keep(lowest, scored.candidate(statistics.best))
             self.stand(0)
@@ -190,7 +190,7 @@ def _one_by_one(scored: Iterator[Scored]) -> Iterator[Generation]:
     """Yield the records of generations."""
     keeper = Keeper()
     for each in scored:
-        lowest = each.costs.item(each.statistics.best)
+        lowest = float(each.costs[each.statistics.best])
         if keeper.improves(lowest):
             keeper.keep(lowest, each.candidate(each.statistics.best))
         yield keeper.record(

@@ -17,7 +17,7 @@ from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
 from evoexp.numeric.generator_memory import states_behind
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
-from evoexp.planners.gathering import Gathered, Run
+from evoexp.planners.gathering import Clock, Gathered, Run
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation, Stretch
 
@@ -126,9 +126,7 @@ class IndividualStretches(Stretches):
         """Return the generations, of a search whose `keep` is that of this class."""
         return Run(partial(self.generations, rng), partial(self._run_together, rng))
 
-    def _run_together(
-        self, rng: np.random.Generator, read_clock: Callable[[], float]
-    ) -> Iterator[Stretch]:
+    def _run_together(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
         """Yield the initial population, then every other generation; see `Run.stretches`."""
         self.begin(rng)
         gathered, index, last = Gathered(), 0, self._ga.num_generations
@@ -149,11 +147,11 @@ class IndividualStretches(Stretches):
         return states_behind(rng.bit_generator, 0, 1) * count
 
     def _gather(
-        self, gathered: "Gathered", first: int, last: int, states: list[bytes], time: float
+        self, gathered: Gathered, first: int, last: int, states: list[bytes], time: float
     ) -> None:
         """Keep the best of some generations, and gather what is recorded of each of them."""
         generations, keeper = np.arange(first, last + 1), gathered.keeper
-        places, count = generations % self.num_places, len(generations)
+        places = generations % self.num_places
         costs, summaries = self.costs[places], self.summaries[places]
         individuals = summaries[:, 0].astype(np.int64)
         lowest = costs[generations - first, individuals].tolist()
@@ -168,10 +166,10 @@ class IndividualStretches(Stretches):
         gathered.deviations += deviations
         gathered.num_feasible += map(int, num_feasible)
         each = self._ga.num_offspring if first else self._ga.population_size
-        evaluations = [keeper.evaluations + each * k for k in range(1, count + 1)]
+        evaluations = [keeper.evaluations + each * (k + 1) for k in range(len(places))]
         keeper.evaluations = evaluations[-1]
         gathered.evaluations += evaluations
-        gathered.collision_queries += [each * self.queries_each for each in evaluations]
+        gathered.collision_queries += [count * self.queries_each for count in evaluations]
         gathered.add_costs(costs)
         gathered.states += states
         gathered.times += [time] * len(states)

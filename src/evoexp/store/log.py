@@ -374,9 +374,10 @@ class Log:
         contents.extend(data)
 
 
-def _rows_as_bytes(block: NDArray[np.float64]) -> Iterable[bytes]:
+def _rows_as_bytes(block: NDArray[Any]) -> Iterable[bytes]:
     """Return `array_bytes` of each row of a block of costs."""
-    if block.size == 0 or np.isnan(block.item(block.argmin())):  # argmin finds a NaN first
+    is_plain = block.dtype.char == "d" and block.size > 0
+    if not is_plain or np.isnan(block.item(block.argmin())):  # argmin finds a NaN first
         return map(array_bytes, block)
     content, size = block.tobytes(), block.itemsize * block.shape[1]
     return [content[begin : begin + size] for begin in range(0, len(content), size)]

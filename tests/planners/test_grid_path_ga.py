@@ -12,9 +12,11 @@ from evoexp.errors import SettingError
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
+from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.grid_path_ga.path_sampling import PathSampling
+from evoexp.planners.grid_path_ga.planner import STRETCH
 from evoexp.planners.proofs import judge_motion
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
@@ -163,7 +165,7 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
 
     expected = run()
     monkeypatch.setattr(grid_planner, "BLOCK", block)
-    monkeypatch.setattr(grid_planner, "STRETCH", stretch)
+    monkeypatch.setattr(grid_planner, "ROUND", stretch)
     assert run() == expected
 
 
@@ -298,28 +300,37 @@ def test_random_search_draws_the_same_first_paths() -> None:
     assert np.array_equal(first.costs, drawn.costs)
 
 
-@pytest.mark.parametrize("shape", [(9, 9), (4, 4, 4)])
-def test_paths_drawn_and_measured_at_once_are_those_of_words_drawn_before(
-    shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("shape", "num_elites"), [((9, 9), 0), ((9, 9), 3), ((4, 4, 4), 1)])
+def test_random_paths_drawn_generations_at_once_are_those_of_words_drawn_before(
+    shape: tuple[int, ...], num_elites: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own = planner()
+    own = planner(num_elites=num_elites, num_generations=2 * STRETCH + 3)
     problem, at_once, one_by_one = solvable(shape, 0.3, 4, own), rng(5), rng(5)
-    draw = own.judged_samples(problem, at_once)
-    found = []
-    for count in (12, 5, 12, 1):
-        paths, judged = draw(count)
-        found.append((paths.copy(), judged, judged.named_terms(0), at_once.bit_generator.state))
-    with pytest.raises(ValueError, match=r"count must be 1\.\.12, was 13"):
-        draw(13)
+    control = RandomSearch(planner=own)
+    run = control.evolve(problem, at_once)
+    assert isinstance(run, Run)
+    stretches = list(run.stretches(lambda: 0.0))
+    costs = [row for each in stretches for block in each.costs for row in block]
+    states = [state for each in stretches for state in each.states]
     # the longer way, of any generator
     monkeypatch.setattr(PathSampling, "is_fit", lambda *_: False)
-    draw = own.judged_samples(problem, one_by_one)
-    for paths, judged, terms, state in found:
-        expected, expected_judged = draw(len(paths))
-        np.testing.assert_array_equal(paths, expected)
-        np.testing.assert_array_equal(judged.cost, expected_judged.cost)
-        assert terms == expected_judged.named_terms(0)
-        assert state == one_by_one.bit_generator.state
+    for g in control.evolve(problem, one_by_one):
+        np.testing.assert_array_equal(g.costs, costs[g.index])
+        state = one_by_one.bit_generator.state["state"]["state"]
+        assert states[g.index][:16] == state.to_bytes(16, "little")
+    np.testing.assert_array_equal(stretches[-1].population, g.population)
+    np.testing.assert_array_equal(stretches[-1].standings[-1].best, g.best)
+    assert stretches[-1].standings[-1].terms == g.terms
+    assert at_once.bit_generator.state == one_by_one.bit_generator.state
+
+
+def test_no_more_paths_are_drawn_at_once_than_there_is_memory_for() -> None:
+    problem = solvable((9, 9), 0.3, 4, planner())
+    sampling = PathSampling(problem, rng(5), 12)
+    assert sampling.draw(12).shape[0] == 12
+    for count in (0, 13):
+        with pytest.raises(ValueError, match=rf"count must be 1\.\.12, was {count}"):
+            sampling.draw(count)
 
 
 def test_populations_are_checked() -> None:

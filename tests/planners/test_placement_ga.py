@@ -58,7 +58,7 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
 
     expected = run()
     monkeypatch.setattr(placement_planner, "BLOCK", block)
-    monkeypatch.setattr(placement_planner, "STRETCH", stretch)
+    monkeypatch.setattr(placement_planner, "ROUND", stretch)
     assert run() == expected
 
 

@@ -1,6 +1,7 @@
 """Generations that are recorded many at a time, against the same ones recorded one by one."""
 
 import itertools
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.planners import gathering
 from evoexp.planners.gathering import TOGETHER, Run
+from evoexp.planners.grid_path_ga import planner as grid_planner
+from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.planners.stretches import stretch_of
 from evoexp.store.log_reader import read_log
 from masked_logs import masked_log
@@ -28,6 +31,10 @@ RUNS = (
     "experiment=chen_placement --only=B_link,_random_search",
     "experiment=rana_planar --only=random_search ga.num_generations=30",
     "experiment=chen_path --only=(c),_path_climbing",
+    "experiment=chen_path ga.num_elites=3 --only=(a),_random_search",
+    "experiment=chen_placement ga.num_elites=5 --only=B_link,_random_search",
+    "experiment=chen_path planner.revisits=true ga.num_generations=20 --only=(a),_path_climbing",
+    "experiment=chen_path planner.revisits=true ga.num_generations=20 --only=(a),_random_search",
 )
 
 
@@ -46,6 +53,25 @@ def test_the_log_is_the_same_one_by_one_and_together(words: str) -> None:
     one_by_one = run_replicate(given, 3, hear=lambda each: heard.append(each.index)).content
     assert masked_log(together) == masked_log(one_by_one)
     assert heard == [*range(len(read_log(together).generations))]
+
+
+@pytest.mark.parametrize("stretch", [16, 48])
+@pytest.mark.parametrize(
+    ("planner", "words"),
+    [
+        (grid_planner, "experiment=chen_path ga.num_generations=70"),
+        (placement_planner, "experiment=chen_placement ga.num_generations=70"),
+    ],
+)
+def test_states_are_recorded_by_rounds_however_many_generations_are_computed_per_call(
+    planner: ModuleType, words: str, stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planner, "BLOCK", 600)  # several blocks per round
+    monkeypatch.setattr(planner, "STRETCH", stretch)
+    given = condition(words)
+    together = run_replicate(given, 3).content
+    one_by_one = run_replicate(given, 3, hear=lambda each: None).content
+    assert masked_log(together) == masked_log(one_by_one)
 
 
 @pytest.mark.parametrize("words", RUNS[::3])

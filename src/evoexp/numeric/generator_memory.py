@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645  # of a PCG64
-_STATE_SIZE = 16  # [B]
+STATE_SIZE = 16  # [B] of `state_bytes`: those of the state itself, which come first
 _MASK = 2**128 - 1
 
 
@@ -47,11 +47,11 @@ def states_behind(bit_generator: Any, count: int, steps: int) -> list[bytes]:
     whole: Any = bit_generator.state
     state, increment = whole["state"]["state"], whole["state"]["inc"]
     factor, addend = _jump(count, increment)
-    rest = state_bytes(bit_generator)[_STATE_SIZE:]
+    rest = state_bytes(bit_generator)[STATE_SIZE:]
     found = []
     for _ in range(steps):
         state = (state * factor + addend) & _MASK
-        found.append(state.to_bytes(_STATE_SIZE, "little") + rest)
+        found.append(state.to_bytes(STATE_SIZE, "little") + rest)
     return found
 
 

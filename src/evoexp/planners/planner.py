@@ -205,20 +205,13 @@ class PlannerDefaults:
         """Return None: there is no local operator."""
         return None
 
-    def judged_samples(
-        self: _Sampling, problem: Any, rng: np.random.Generator
-    ) -> Callable[[int], tuple[NDArray[Any], Judgement]]:
-        """Return a function that draws and judges so many individuals, as random search does.
+    def random_run(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation] | None:
+        """Return the generations of random search, many drawn per call; None: one by one.
 
-        A planner may keep memory from one call to the next: what the function returns is valid
-        until it is called again. No more than an evaluation of a generation are asked for.
+        They are those of `RandomSearch`: as many individuals as the planner evaluates, drawn as
+        `sample` draws them and judged as `cost` judges them.
         """
-
-        def draw(count: int) -> tuple[NDArray[Any], Judgement]:
-            population = self.sample(problem, rng, count)
-            return population, self.cost(problem, population)
-
-        return draw
+        return None
 
     def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
         """Return the whole motion with the problem's scene, or nothing without a scene."""

@@ -5,6 +5,7 @@ time, and a record of each another third.
 """
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Protocol
@@ -124,27 +125,29 @@ class IndividualStretches(Stretches):
 
     def run(self, rng: np.random.Generator) -> Run:
         """Return the generations, of a search whose `keep` is that of this class."""
-        return Run(partial(self.generations, rng), partial(self._run_together, rng))
+        return Run(partial(self.generations, rng), partial(self.stretches, rng))
 
-    def _run_together(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
+    def stretches(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
         """Yield the initial population, then every other generation; see `Run.stretches`."""
         self.begin(rng)
         gathered, index, last = Gathered(), 0, self._ga.num_generations
-        self._gather(gathered, 0, 0, self._states(rng, 1), read_clock())
+        self._gather(gathered, 0, 0, states_behind(rng.bit_generator, 0, 1), read_clock())
         while index < last:
             first, index = index, min(index + self.num_places - 1, last)
             self.go_on(rng, first, index)
-            steps, drawn = index - first, self.drawn
-            states = self._states(rng, steps) if drawn is None else drawn.follow_all(steps)
-            self._gather(gathered, first + 1, index, states, read_clock())
+            self._gather(gathered, first + 1, index, self.follow(rng, first, index), read_clock())
             if gathered.is_full and index < last:
                 yield gathered.stretch(None)
         yield gathered.stretch(self.population(last % self.num_places, True))
 
-    @staticmethod
-    def _states(rng: np.random.Generator, count: int) -> list[bytes]:
-        """Return the state of the generator, so many times."""
-        return states_behind(rng.bit_generator, 0, 1) * count
+    def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
+        """Let the generator follow from one generation to another.
+
+        Returns:
+            Its state behind each of those after the first, as it is recorded.
+        """
+        assert self.drawn is not None, "a search that draws otherwise writes its own `follow`"
+        return self.drawn.follow_all(last - first)
 
     def _gather(
         self, gathered: Gathered, first: int, last: int, states: list[bytes], time: float
@@ -205,7 +208,62 @@ class IndividualStretches(Stretches):
         """Return the population at a place; that of the last generation is hashed."""
 
 
-class ScaledStretches(IndividualStretches):
+class BlockStretches(IndividualStretches):
+    """Generations that take numbers of blocks, each drawn when the last one is used up.
+
+    A generation is recorded with the generator as it is behind the last one of its round: a round
+    is computed per call where generations are yielded one by one, and several rounds where they are
+    recorded together.
+    """
+
+    def __init__(self, ga: Sizes, stretch: int, round_size: int, block: int) -> None:
+        """Begin a run.
+
+        Args:
+            ga: Its settings.
+            stretch: Generations computed per call, at most: whole rounds.
+            round_size: Generations of a round. They enter the digest.
+            block: Uniform numbers drawn at once, at least.
+        """
+        super().__init__(ga, stretch)
+        self._round, self._draws = round_size, Draws(block)
+        # Of the generator, where generations are recorded together: its state behind the round
+        # recorded last; states further ahead, each with the generation that was reached without.
+        self._state, self._ahead = b"", deque[tuple[int, bytes]]()
+        self._are_noted = False
+
+    def stretches(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
+        """Yield the generations, and note the generator's states; see `Run.stretches`."""
+        self._are_noted = True
+        return super().stretches(rng, read_clock)
+
+    def draw_for(self, rng: np.random.Generator, reached: int) -> None:
+        """Draw more numbers where those that are left do not suffice.
+
+        Args:
+            rng: The generator.
+            reached: The last generation that is complete.
+        """
+        if not self._are_noted:
+            self._draws.extend(rng)
+            return
+        self._state = self._state or states_behind(rng.bit_generator, 0, 1)[0]
+        self._draws.extend(rng)
+        self._ahead += ((reached, state) for state in states_behind(rng.bit_generator, 0, 1))
+
+    def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
+        """Return the generator's states as they are recorded; it is already ahead."""
+        found: list[bytes] = []
+        self._state = self._state or states_behind(rng.bit_generator, 0, 1)[0]
+        for begin in range(first, last, self._round):
+            end = min(begin + self._round, last)
+            while self._ahead and self._ahead[0][0] < end:
+                _, self._state = self._ahead.popleft()
+            found += [self._state] * (end - begin)
+        return found
+
+
+class ScaledStretches(BlockStretches):
     """Generations whose parents are chosen as in `scaled_selection`, by blocks of draws.
 
     Attributes:
@@ -216,7 +274,12 @@ class ScaledStretches(IndividualStretches):
     arguments: tuple[Any, ...]
 
     def __init__(
-        self, ga: ScaledGenetic, evolve: Callable[..., int], stretch: int, block: int
+        self,
+        ga: ScaledGenetic,
+        evolve: Callable[..., int],
+        stretch: int,
+        round_size: int,
+        block: int,
     ) -> None:
         """Begin a run.
 
@@ -224,15 +287,33 @@ class ScaledStretches(IndividualStretches):
             ga: Its settings.
             evolve: Kernel that computes the generations after one up to another, as far as the
                 draws suffice, and returns the last generation that was computed.
-            stretch: Generations computed per call, at most.
+            stretch: See `BlockStretches`, as for the others.
+            round_size: Generations of a round.
             block: Uniform numbers drawn at once, at least.
         """
-        super().__init__(ga, stretch)
+        super().__init__(ga, stretch, round_size, block)
         self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
-        self._evolve, self._draws = evolve, Draws(block)
+        self._evolve = evolve
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
         """Compute generations; draw more numbers whenever they do not suffice."""
         arguments = self.arguments
         while (first := self._evolve(self._draws.block, first, last, *arguments)) < last:
-            self._draws.extend(rng)
+            self.draw_for(rng, first)
+
+
+def run_of(
+    search: Callable[[int], IndividualStretches], rng: np.random.Generator, each: int, together: int
+) -> Run:
+    """Return a run that computes more generations per call where they are recorded together.
+
+    Args:
+        search: Begins the search that computes so many generations per call.
+        rng: The generator.
+        each: Generations per call where they are yielded one by one.
+        together: Where they are recorded together.
+    """
+    return Run(
+        lambda: search(each).generations(rng),
+        lambda read_clock: search(together).stretches(rng, read_clock),
+    )

@@ -85,7 +85,7 @@ def write_summary(
     summary = _build(run, stored, stamps, known, thorough)
     sink = pa.BufferOutputStream()
     table = with_context(summary.table, run_context(run.path, summary.table.column_names))
-    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    pq.write_table(table, sink, compression="snappy", write_page_checksum=True)
     if run.summary_path.is_dir():
         set_aside(run.summary_path)
     write_file(run.summary_path, sink.getvalue().to_pybytes())

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.planners.gathering import Run, Scored
-from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
+from evoexp.planners.planner import Candidate, Judgement, Keeper
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import BoolArray, Generation
 
@@ -30,6 +30,11 @@ class RandomSearch(WrappedPlanner):
         """Yield one generation of new samples after the other."""
         if self.answers_are_proven:
             return self._proven(problem, rng)
+        random_run = getattr(self.planner, "random_run", None)  # planners of others may lack it
+        if random_run is not None:
+            own: Iterator[Generation] | None = random_run(problem, rng)
+            if own is not None:
+                return own
         return Run.of(partial(self._scored, problem, rng), rng)
 
     def _proven(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
@@ -64,12 +69,8 @@ class RandomSearch(WrappedPlanner):
     def _judged(
         self, problem: Any, rng: np.random.Generator
     ) -> Iterator[tuple[NDArray[Any], Judgement]]:
-        """Yield samples and their judgements, each valid until the next ones."""
+        """Yield samples and their judgements."""
         planner = self.planner
-        # a planner of others may write everything itself
-        judged_samples = getattr(planner, "judged_samples", None)
-        if judged_samples is None:
-            judged_samples = partial(PlannerDefaults.judged_samples, planner)
-        draw = judged_samples(problem, rng)
         for index in range(planner.num_generations + 1):
-            yield draw(planner.num_evaluations(index))
+            population = planner.sample(problem, rng, planner.num_evaluations(index))
+            yield population, planner.cost(problem, population)

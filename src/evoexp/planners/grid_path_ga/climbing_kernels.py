@@ -15,9 +15,15 @@ from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_measures import Tolls, length_and_mean
 from evoexp.paths.grid_walks import walk_to_exits
 from evoexp.paths.grids import NodeArray
-from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, UNSAFENESS, Population
-from evoexp.planners.grid_path_ga.path_operators import World
-from evoexp.records import IntArray
+from evoexp.planners.grid_path_ga.kernels import (
+    COST,
+    DISTANCE,
+    UNSAFENESS,
+    Population,
+    summarise_results,
+)
+from evoexp.planners.grid_path_ga.path_operators import World, copy_path
+from evoexp.records import FloatArray, IntArray
 
 
 class Ledger(NamedTuple):
@@ -39,14 +45,14 @@ class Ledger(NamedTuple):
     exits: NodeArray
     walked: NodeArray
 
-    @classmethod
-    def of(cls, paths: NodeArray, world: World) -> "Ledger | None":
-        """Return the sums along paths without loops (paths, nodes + 1).
+    @staticmethod
+    def is_fit(world: World) -> bool:
+        """Return whether unsafeness and weights of moves are whole numbers, and the grid small."""
+        return bool(len(world.choices.entries) and len(world.tolls.of_node))
 
-        None: unsafeness or weights of moves are no whole numbers, or the grid is large.
-        """
-        if not len(world.choices.entries) or not len(world.tolls.of_node):
-            return None
+    @classmethod
+    def of(cls, paths: NodeArray, world: World) -> "Ledger":
+        """Return the sums along paths without loops (paths, nodes + 1)."""
         num, nodes = len(paths), len(world.tolls.of_node)
         own = cls(
             np.zeros((num, nodes), dtype=np.int32),
@@ -79,6 +85,59 @@ class Piece(NamedTuple):
     tail: int
     moves: int
     level: int
+
+
+@kernel
+def climb_generations(
+    draws: Block,
+    trial: int,
+    span: tuple[int, int],
+    trials: int,
+    world: World,
+    weights: tuple[float, float],
+    population: Population,
+    ledger: Ledger,
+    found: Population,
+    summaries: FloatArray,
+) -> int:
+    """Make the trials of some generations.
+
+    Args:
+        draws: Uniform numbers.
+        trial: Number of the first trial.
+        span: The last generation that is complete, and the one to reach.
+        trials: Of each generation.
+        world: See `kernels.climb`, as for `weights` and `population`.
+        weights: ε and λ of Eq. 1.
+        population: Paths and their results, changed.
+        ledger: Of these paths, changed with them.
+        found: Some generations, written as `note_climb` does; number g is at place g modulo the
+            number of places.
+        summaries: (places, 4) written, likewise.
+
+    Returns:
+        The number of the next trial: that of an earlier generation if the draws did not suffice.
+    """
+    draws, world, population, ledger = borrowed((draws, world, population, ledger))
+    found, summaries = borrowed((found, summaries))
+    for generation in range(span[0] + 1, span[1] + 1):
+        trial = climb_by_pieces(
+            draws, trial, generation * trials, world, weights, population, ledger
+        )
+        if trial < generation * trials:
+            return trial
+        note_climb(population, generation % len(summaries), found, summaries)
+    return trial
+
+
+@kernel
+def note_climb(
+    population: Population, place: int, found: Population, summaries: FloatArray
+) -> None:
+    """Write the results of a generation, its summary and its best path to a place."""
+    found.results[place] = population.results
+    summarise_results(population.results, summaries[place])
+    copy_path(population.paths[int(summaries[place, 0])], found.paths[place])
 
 
 @kernel

@@ -3,7 +3,9 @@
 A path is a row of a table, see `paths.grid_walks`.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
@@ -19,6 +21,7 @@ from evoexp.planners.grid_path_ga.path_operators import (
     cross,
     mutate,
 )
+from evoexp.planners.planner import Candidate
 from evoexp.records import FloatArray
 
 RESULTS = 3
@@ -35,6 +38,22 @@ class Population(NamedTuple):
 
     paths: NodeArray
     results: FloatArray
+
+
+def solution_of(path: NodeArray, world: World) -> FloatArray:
+    """Return a path (nodes + 1,) as a flat solution."""
+    return np.asarray(world.coordinates[path[1 : path[0] + 1]], dtype=np.float64).ravel()
+
+
+def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
+    """Return D, S and the number of nodes of a path by name."""
+    named = {"distance": float(results[DISTANCE]), "unsafeness": float(results[UNSAFENESS])}
+    return named | {"num_nodes": float(num_nodes)}
+
+
+def candidate_of(path: NodeArray, world: World, results: FloatArray) -> Candidate:
+    """Return a path, which is valid, and its terms of its results (3,)."""
+    return Candidate(solution_of(path, world), named_terms(results, path[0]), True)
 
 
 @inlined

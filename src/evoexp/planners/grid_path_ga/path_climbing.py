@@ -5,22 +5,25 @@ if it costs no more. So a comparison with the genetic algorithm tells what selec
 add to this operator.
 """
 
-from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.numeric.random_stream import Draws
-from evoexp.planners.gathering import Run, Scored
+from evoexp.paths.grids import NodeArray
+from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import kernels
-from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_by_pieces
-from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population
+from evoexp.planners.grid_path_ga.climbing_kernels import (
+    Ledger,
+    climb_generations,
+    note_climb,
+)
+from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population, candidate_of
 from evoexp.planners.grid_path_ga.path_operators import Scratch
-from evoexp.planners.grid_path_ga.planner import BLOCK, GridPathGa, Problem, named_terms, trimmed
+from evoexp.planners.grid_path_ga.planner import BLOCK, STRETCH, GridPathGa, Problem, trimmed
 from evoexp.planners.planner import Candidate
+from evoexp.planners.stretches import BlockStretches, run_of
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.validation import Count
 
@@ -56,47 +59,95 @@ class PathClimbing(WrappedPlanner):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the random walks, then the climbing paths after every generation's trials."""
-        return Run.of(partial(self._climb, problem, rng), rng)
+        assert isinstance(self.planner, GridPathGa), "prepare refuses other planners"
+        by_pieces = not self.planner.revisits and Ledger.is_fit(problem.world)
+        search = partial(_ByPieces if by_pieces else _Climbing, self.planner, problem)
+        return run_of(partial(search, self.num_paths), rng, 1, STRETCH)
 
-    def _climb(self, problem: Problem, rng: np.random.Generator) -> Iterator[Scored]:
-        planner, draws = self.planner, Draws(BLOCK)
-        assert isinstance(planner, GridPathGa), "prepare refuses other planners"
-        population, trial = self._first(planner, problem, rng), 0
-        climb, arguments = _trials(planner, problem, population)
 
-        def candidate(k: int) -> Candidate:
-            terms = named_terms(population.results[:, k], population.paths[k, 0])
-            return Candidate(planner.solution(problem, population.paths, k), terms, True)
+class _Climbing(BlockStretches):
+    """One run, and memory for its kernels; whole paths are measured."""
 
-        costs = population.results[COST]
-        for index in range(planner.num_generations + 1):
-            evaluations, is_last = planner.num_evaluations(index), index == planner.num_generations
-            last = trial + evaluations if index else 0
-            while (trial := climb(draws.block, trial, last, *arguments)) < last:
-                draws.extend(rng)
-            paths = trimmed(population.paths) if is_last else population.paths
-            statistics, count = cost_statistics(costs), len(costs)
-            yield Scored(statistics, costs, paths, candidate, count, evaluations, 0, is_last)
+    def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int, stretch: int) -> None:
+        super().__init__(planner.ga, stretch, 1, BLOCK)
+        self._planner, self._problem, self._num_paths = planner, problem, num_paths
+        width, self._trial = problem.fields.grid.num_nodes + 1, 0
+        self._found = Population(
+            np.empty((self.num_places, width), dtype=np.int32),
+            np.empty((self.num_places, RESULTS, num_paths)),
+        )
+        self.costs = self._found.results[:, COST]
 
-    def _first(self, planner: GridPathGa, problem: Problem, rng: np.random.Generator) -> Population:
-        """Draw the random walks and return the best of them, in a table as wide as any path."""
-        drawn = planner.sample(problem, rng, planner.num_evaluations(0))
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw the random walks; keep the best of them, in a table as wide as any path."""
+        planner, problem = self._planner, self._problem
+        drawn = planner.sample(problem, rng, planner.ga.population_size)
         results = planner.cost(problem, drawn).results
-        best = np.argsort(results[COST], kind="stable")[: self.num_paths]
+        best = np.argsort(results[COST], kind="stable")[: self._num_paths]
         paths = np.zeros((len(best), problem.fields.grid.num_nodes + 1), dtype=np.int32)
         paths[:, : drawn.shape[1]] = drawn[best]
-        return Population(paths, np.ascontiguousarray(results[:, best]))
+        self._paths = Population(paths, np.ascontiguousarray(results[:, best]))
+        self._note(0)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Make the trials of generations; draw more numbers whenever they do not suffice."""
+        nodes = self._problem.fields.grid.num_nodes
+        arguments = (
+            self._problem.world,
+            self._planner.objective.weights,
+            not self._planner.revisits,
+            self._paths,
+            Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1))),
+            Scratch.of(nodes),
+        )
+        for generation in range(first + 1, last + 1):
+            until = generation * self._ga.num_offspring
+            while True:
+                self._trial = kernels.climb(self._draws.block, self._trial, until, *arguments)
+                if self._trial == until:
+                    break
+                self.draw_for(rng, generation - 1)
+            self._note(generation % self.num_places)
+
+    def _note(self, place: int) -> None:
+        """Write to a place how the paths are now."""
+        note_climb(self._paths, place, self._found, self.summaries)
+
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return the best path of a generation, and its terms."""
+        results = self._found.results[place, :, individual]
+        return candidate_of(self._found.paths[place], self._problem.world, results)
+
+    def population(self, place: int, is_last: bool) -> NodeArray:
+        """Return the paths as they are now; those of the last generation without rests of rows."""
+        return trimmed(self._paths.paths) if is_last else self._paths.paths
 
 
-def _trials(
-    planner: GridPathGa, problem: Problem, population: Population
-) -> tuple[Callable[..., int], tuple[Any, ...]]:
-    """Return the kernel that makes trials, and what it takes behind the draws and their numbers."""
-    world, weights, erase = problem.world, planner.objective.weights, not planner.revisits
-    ledger = Ledger.of(population.paths, world) if erase else None
-    if ledger is not None:
-        return climb_by_pieces, (world, weights, population, ledger)
-    nodes = problem.fields.grid.num_nodes
-    candidate = Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1)))
-    scratch = Scratch.of(nodes)
-    return kernels.climb, (world, weights, erase, population, candidate, scratch)
+class _ByPieces(_Climbing):
+    """One run whose paths are measured piece by piece, some generations per call."""
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw the random walks, and add up along the best of them."""
+        super().begin(rng)
+        self._ledger = Ledger.of(self._paths.paths, self._problem.world)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Make the trials of generations; draw more numbers whenever they do not suffice."""
+        trials = self._ga.num_offspring
+        while True:
+            self._trial = climb_generations(
+                self._draws.block,
+                self._trial,
+                (first, last),
+                trials,
+                self._problem.world,
+                self._planner.objective.weights,
+                self._paths,
+                self._ledger,
+                self._found,
+                self.summaries,
+            )
+            if self._trial == last * trials:
+                return
+            first = self._trial // trials
+            self.draw_for(rng, first)

@@ -1,46 +1,52 @@
 """Random paths over a grid, drawn and measured in memory that is kept from one draw to the next."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.generator_memory import STATE_SIZE, states_behind
 from evoexp.numeric.pcg64 import Twin, Words
 from evoexp.paths.erased_walks import Exits, Sums, follow_all, room_for_exits, walk_all
 from evoexp.paths.grid_choices import Choices
 from evoexp.paths.grid_measures import Tolls, length_and_mean
 from evoexp.paths.grids import NodeArray
 from evoexp.paths.walkers import LANES, WORDS
-from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, RESULTS, UNSAFENESS
+from evoexp.planners.grid_path_ga.kernels import (
+    COST,
+    DISTANCE,
+    RESULTS,
+    UNSAFENESS,
+    Population,
+    candidate_of,
+    summarise_results,
+)
+from evoexp.planners.grid_path_ga.path_operators import copy_path
+from evoexp.planners.planner import Candidate
+from evoexp.planners.stretches import IndividualStretches
 from evoexp.records import FloatArray
 
 if TYPE_CHECKING:
-    from evoexp.planners.grid_path_ga.planner import Problem
+    from evoexp.planners.grid_path_ga.planner import GridPathGa, Problem
 
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
 FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 
 
 class PathSampling:
-    """Draws random paths without loops of one problem from one generator, and measures them."""
+    """Draws random paths without loops of one problem from one generator."""
 
-    def __init__(
-        self,
-        problem: "Problem",
-        weights: tuple[float, float],
-        rng: np.random.Generator,
-        most: int,
-    ) -> None:
+    def __init__(self, problem: "Problem", rng: np.random.Generator, most: int) -> None:
         """Take memory.
 
         Args:
             problem: For which `is_fit` holds.
-            weights: ε and λ of Eq. 1.
             rng: The generator.
             most: Paths that are drawn at once, at most.
         """
         nodes = problem.fields.grid.num_nodes
-        self._problem, self._weights, self._twin = problem, weights, Twin(rng)
+        self._problem, self._twin = problem, Twin(rng)
         self._fewest = int(problem.moves.steps[problem.ends[0]])
         self._paths = np.empty((most, nodes + 1), dtype=np.int32)
         self._exits = room_for_exits(most, nodes)
@@ -56,30 +62,130 @@ class PathSampling:
         fits = isinstance(rng.bit_generator, np.random.PCG64)
         return bool(whole) and fits and problem.ends[0] != problem.ends[1]
 
-    def draw(self, count: int) -> tuple[NodeArray, FloatArray]:
-        """Return paths (count, longest + 1), valid until the next draw; lengths, S, C (3, count).
+    def draw(self, count: int) -> NodeArray:
+        """Return paths (count, longest + 1), valid until the next draw.
 
         Raises:
             ValueError: If there is no memory for so many.
         """
+        return self._run(_draw, count)
+
+    def draw_generations(
+        self,
+        count: int,
+        weights: tuple[float, float],
+        span: tuple[int, int],
+        found: Population,
+        summaries: FloatArray,
+        states: Words,
+    ) -> NodeArray:
+        """Draw and measure the paths of some generations, as if one after the other.
+
+        Args:
+            count: Paths of each.
+            weights: ε and λ of Eq. 1.
+            span: The first and the last generation.
+            found: Some generations, written: of each only its best path, and the results of all;
+                number g is at place g modulo the number of places.
+            summaries: (places, 4) written, see `summarise_results`.
+            states: (places, 2) written: the generator's state behind each, high half first.
+
+        Returns:
+            The paths of the last generation, see `draw`.
+
+        Raises:
+            ValueError: If there is no memory for so many.
+        """
+        return self._run(_draw_generations, count, weights, span, found, summaries, states)
+
+    def _run(self, kernel: Callable[..., int], count: int, *arguments: Any) -> NodeArray:
+        """Run a kernel that draws; let the generator follow."""
         if not 0 < count <= len(self._paths):
             raise ValueError(f"count must be 1..{len(self._paths)}, was {count}")
-        paths, results, problem = self._paths[:count], np.empty((RESULTS, count)), self._problem
+        problem, paths = self._problem, self._paths[:count]
         self._twin.meet()
-        longest = _draw_and_measure(
+        longest = kernel(
             self._twin.words,
             problem.choices,
             problem.ends,
             (first_words(count, self._fewest), FEW_WORDS),
             problem.world.tolls,
-            self._weights,
-            self._exits,
-            self._sums,
-            paths,
-            results,
+            Drawn(self._exits, self._sums, paths),
+            *arguments,
         )
         self._twin.follow(self._twin.words)
-        return paths[:, : longest + 1], results
+        return paths[:, : longest + 1]
+
+
+class RandomPaths(IndividualStretches):
+    """Generations of random paths, each drawn anew: the random search of a path search."""
+
+    def __init__(
+        self, planner: "GridPathGa", problem: "Problem", rng: np.random.Generator, stretch: int
+    ) -> None:
+        """Begin a run.
+
+        Args:
+            planner: Whose sampling, cost and budget are used.
+            problem: For which `PathSampling.is_fit` holds.
+            rng: The generator.
+            stretch: Generations drawn per call; only the paths of the last one of them are kept.
+        """
+        ga = planner.ga
+        super().__init__(ga, stretch)
+        self._weights, self._world = planner.objective.weights, problem.world
+        self._sampling = PathSampling(problem, rng, ga.population_size)
+        self._best = np.empty((self.num_places, problem.fields.grid.num_nodes + 1), dtype=np.int32)
+        self._states = np.empty((self.num_places, 2), dtype=np.uint64)
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw the initial population."""
+        self._draw(self._ga.population_size, 0, 0)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Draw generations."""
+        self._draw(self._ga.num_offspring, first + 1, last)
+
+    def _draw(self, count: int, first: int, last: int) -> None:
+        if first < 2:  # more paths are drawn at first than later
+            self._results = np.empty((self.num_places, RESULTS, count))
+            self.costs = self._results[:, COST]
+        self._paths = self._sampling.draw_generations(
+            count,
+            self._weights,
+            (first, last),
+            Population(self._best, self._results),
+            self.summaries,
+            self._states,
+        )
+
+    def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
+        """Return the generator's states; it followed at once. See `IndividualStretches`."""
+        rest = states_behind(rng.bit_generator, 0, 1)[0][STATE_SIZE:]
+        places = np.arange(first + 1, last + 1) % self.num_places
+        return [state.tobytes() + rest for state in self._states[places, ::-1]]
+
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return the best path of a generation, and its terms."""
+        return candidate_of(self._best[place], self._world, self._results[place, :, individual])
+
+    def population(self, place: int, is_last: bool) -> NodeArray:
+        """Return the paths of the last generation that was drawn."""
+        return self._paths
+
+
+class Drawn(NamedTuple):
+    """Random paths, written as they are drawn.
+
+    Attributes:
+        exits: See `walk_all`.
+        sums: Along each path.
+        paths: (paths, nodes + 1), see `follow_all`.
+    """
+
+    exits: Exits
+    sums: Sums
+    paths: NodeArray
 
 
 def first_words(count: int, fewest: int) -> int:
@@ -88,25 +194,48 @@ def first_words(count: int, fewest: int) -> int:
 
 
 @kernel
-def _draw_and_measure(
+def _draw(
     words: Words,
     choices: Choices,
     ends: tuple[int, int],
     blocks: tuple[int, int],
     tolls: Tolls,
-    weights: tuple[float, float],
-    exits: Exits,
-    sums: Sums,
-    paths: NodeArray,
-    results: FloatArray,
+    memory: Drawn,
 ) -> int:
     """Run the kernel of `PathSampling.draw`; return the number of nodes of the longest path."""
-    choices, tolls, exits, sums = borrowed((choices, tolls, exits, sums))
-    paths, results = borrowed((paths, results))
+    exits, sums, paths = memory
     walk_all(words, choices, ends, blocks, len(paths), exits)
     longest: int = follow_all(exits, ends, tolls, paths, sums)
-    for k in range(len(paths)):
-        distance, mean = length_and_mean(paths[k, 0], sums.moves[k], sums.levels[k])
-        results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
-        results[COST, k] = weights[0] * distance + weights[1] * mean
+    return longest
+
+
+@kernel
+def _draw_generations(
+    words: Words,
+    choices: Choices,
+    ends: tuple[int, int],
+    blocks: tuple[int, int],
+    tolls: Tolls,
+    memory: Drawn,
+    weights: tuple[float, float],
+    span: tuple[int, int],
+    found: Population,
+    summaries: FloatArray,
+    states: Words,
+) -> int:
+    """Run the kernel of `PathSampling.draw_generations`; return the same of the last generation."""
+    choices, tolls, memory, found = borrowed((choices, tolls, memory, found))
+    summaries, states = borrowed((summaries, states))
+    paths, sums, longest = memory.paths, memory.sums, 0
+    for generation in range(span[0], span[1] + 1):
+        place = generation % len(summaries)
+        results = found.results[place]
+        longest = _draw(words, choices, ends, blocks, tolls, memory)
+        states[place, 0], states[place, 1] = words[0], words[1]
+        for k in range(len(paths)):
+            distance, mean = length_and_mean(paths[k, 0], sums.moves[k], sums.levels[k])
+            results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
+            results[COST, k] = weights[0] * distance + weights[1] * mean
+        summarise_results(results, summaries[place])
+        copy_path(paths[int(summaries[place, 0])], found.paths[place])
     return longest

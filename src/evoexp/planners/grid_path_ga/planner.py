@@ -11,7 +11,7 @@ coordinates of its nodes, x, y[, z] of one after the other, as many as there are
 """
 
 import functools
-from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -37,14 +37,21 @@ from evoexp.planners.grid_path_ga.kernels import (
     RESULTS,
     UNSAFENESS,
     Population,
+    candidate_of,
+    named_terms,
+    solution_of,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
-from evoexp.planners.grid_path_ga.path_sampling import FEW_WORDS, PathSampling, first_words
+from evoexp.planners.grid_path_ga.path_sampling import (
+    FEW_WORDS,
+    PathSampling,
+    RandomPaths,
+    first_words,
+)
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
-from evoexp.planners.judgements import Judgement as AnyJudgement
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import ScaledStretches
+from evoexp.planners.stretches import ScaledStretches, run_of, stretch_of
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -54,11 +61,10 @@ FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out 
 FEWER_NODES = 1200  # and the choices of walks between them: at most 6 MB
 MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
-# Generations that are computed in one call of a kernel, at most. The generator is digested as it is
-# behind the call: another number needs another revision.
-STRETCH = 8
+ROUND = 8  # generations; see `BlockStretches`: another number needs another revision
+STRETCH = 16  # generations that are computed in one call of a kernel, at most,
+MEMORY = 1 << 23  # [B] or as many as take so much memory, but a round
 BLOCK = 16384  # uniform numbers drawn at once, at least
-TABLES = 10  # of paths: those of a stretch, and of those that are bred
 
 
 class Problem(NamedTuple):
@@ -150,13 +156,13 @@ class GridPathGa(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the population of random paths, then every generation."""
-        return _Search(self, problem).run(rng)
+        together = ROUND * stretch_of(STRETCH // ROUND, ROUND * self._table_size(problem), MEMORY)
+        return run_of(partial(_Search, self, problem), rng, ROUND, together)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
         if not self.revisits and PathSampling.is_fit(problem, rng) and count:
-            sampling = PathSampling(problem, self.objective.weights, rng, count)
-            return np.ascontiguousarray(sampling.draw(count)[0])
+            return np.ascontiguousarray(PathSampling(problem, rng, count).draw(count))
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
         if len(problem.choices.entries):
             self._fill(problem, rng, paths)
@@ -164,20 +170,11 @@ class GridPathGa(PlannerDefaults, Component):
             self._fill_one_by_one(problem, rng, paths)
         return trimmed(paths)
 
-    def judged_samples(
-        self, problem: Problem, rng: np.random.Generator
-    ) -> Callable[[int], tuple[np.ndarray, AnyJudgement]]:
-        """Return a function that draws and judges so many paths, see `PlannerDefaults`."""
-        if self.revisits or not PathSampling.is_fit(problem, rng):
-            return super().judged_samples(problem, rng)
-        most = max(self.num_evaluations(0), self.num_evaluations(1))
-        sampling = PathSampling(problem, self.objective.weights, rng, most)
-
-        def draw(count: int) -> tuple[np.ndarray, Judgement]:
-            paths, results = sampling.draw(count)
-            return paths, Judgement(results, paths[:, 0])
-
-        return draw
+    def random_run(self, problem: Problem, rng: np.random.Generator) -> Run | None:
+        """Return generations of random paths, see `PlannerDefaults`."""
+        if self.revisits or not PathSampling.is_fit(problem, rng) or not self.ga.num_offspring:
+            return None
+        return run_of(partial(RandomPaths, self, problem, rng), rng, 1, STRETCH)
 
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths."""
@@ -214,9 +211,7 @@ class GridPathGa(PlannerDefaults, Component):
 
     def solution(self, problem: Problem, population: np.ndarray, individual: int) -> FloatArray:
         """Return a path as a flat solution."""
-        path = population[individual]
-        nodes = problem.fields.grid.coordinates[path[1 : path[0] + 1]]
-        return np.asarray(nodes, dtype=np.float64).ravel()
+        return solution_of(population[individual], problem.world)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: from node to node in equal times."""
@@ -264,13 +259,16 @@ class GridPathGa(PlannerDefaults, Component):
         ]
 
     def memory(self, problem: Problem) -> int:
-        """Return the memory of a table of paths, each as long as there are nodes."""
-        width = 4 * (problem.fields.grid.num_nodes + 1)
-        return TABLES * width * self.ga.population_size
+        """Return the memory of the paths of a round, each as long as there are nodes."""
+        return (ROUND + 2) * self._table_size(problem)
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of nodes, each its coordinates."""
         return (..., (problem.fields.grid.free.ndim,))
+
+    def _table_size(self, problem: Problem) -> int:
+        """Return the memory of the paths of a generation [B]."""
+        return 4 * (problem.fields.grid.num_nodes + 1) * self.ga.population_size
 
     def _nodes(self, problem: Problem, solution: FloatArray) -> FloatArray:
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
@@ -279,9 +277,9 @@ class GridPathGa(PlannerDefaults, Component):
 class _Search(ScaledStretches):
     """One run, and memory for its kernels."""
 
-    def __init__(self, planner: GridPathGa, problem: Problem) -> None:
+    def __init__(self, planner: GridPathGa, problem: Problem, stretch: int) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
-        super().__init__(ga, kernels.evolve, STRETCH, BLOCK)
+        super().__init__(ga, kernels.evolve, stretch, ROUND, BLOCK)
         self._planner, self._problem = planner, problem
         self._table = Population(
             np.empty((self.num_places, size, nodes + 1), dtype=np.int32),
@@ -309,9 +307,8 @@ class _Search(ScaledStretches):
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return a path, which is valid, and its terms."""
-        paths, results = self._table.paths[place], self._table.results[place]
-        terms = named_terms(results[:, individual], paths[individual, 0])
-        return Candidate(self._planner.solution(self._problem, paths, individual), terms, True)
+        path, results = self._table.paths[place, individual], self._table.results[place]
+        return candidate_of(path, self._problem.world, results[:, individual])
 
     def population(self, place: int, is_last: bool) -> NodeArray:
         """Return the paths; of the last generation without the rest of each row."""
@@ -373,12 +370,6 @@ def _prepared(
     )
     moves = Moves(own.neighbours, fields.potentials, steps)
     return Problem(fields, moves, choice_table(moves), (start, goal), world, bodies, margin)
-
-
-def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
-    """Return D, S and the number of nodes of a path by name."""
-    named = {"distance": float(results[DISTANCE]), "unsafeness": float(results[UNSAFENESS])}
-    return named | {"num_nodes": float(num_nodes)}
 
 
 def _fronts(fields: Fields) -> StepArray:

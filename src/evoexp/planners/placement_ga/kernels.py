@@ -149,6 +149,37 @@ def advance(
 
 
 @kernel
+def draw_generations(
+    uniforms: FloatArray,
+    first: int,
+    coding: Coding,
+    model: Model,
+    table: Population,
+    summaries: FloatArray,
+) -> None:
+    """Draw and judge generations of random strings.
+
+    Args:
+        uniforms: (generations, 2 · individuals) in [0, 1): a row per generation.
+        first: The generation before them.
+        coding: The meaning of strings.
+        model: Task, weights and limits of the criteria.
+        table: Some generations, written; number g is at place g modulo the number of places.
+        summaries: (places, 4) written, see `summarise_rows`.
+    """
+    coding, model, table, summaries = borrowed((coding, model, table, summaries))
+    count, values = table.strings.shape[2], 2.0**coding.bits
+    for step in range(len(uniforms)):
+        place = (first + 1 + step) % len(summaries)
+        strings, rows = table.strings[place], table.rows[place]
+        for gene in range(GENES):
+            for k in range(count):
+                strings[gene, k] = int(values * uniforms[step, gene * count + k])
+        judge(strings, coding, model, count, rows)
+        summarise_rows(rows, summaries[place])
+
+
+@kernel
 def judge(strings: IntArray, coding: Coding, model: Model, count: int, rows: FloatArray) -> None:
     """Decode and measure the first individuals: fill their rows."""
     decode_strings(strings[:, :count], coding.bits, coding.gray, coding.limits, rows[:GENES])

@@ -8,6 +8,7 @@ A population is an array (2, individuals) of strings of bits, a number per angle
 flat: θ1, θ2 [deg].
 """
 
+from functools import partial
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
@@ -26,7 +28,7 @@ from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import ScaledStretches
+from evoexp.planners.stretches import IndividualStretches, ScaledStretches, run_of, stretch_of
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
@@ -36,10 +38,9 @@ from evoexp.validation import Component
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
-# Generations that are computed in one call of a kernel, at most. The generator is digested as it is
-# behind the call: another number needs another revision.
-STRETCH = 16
-TERM_VALUES = 200  # numbers kept for an individual: those of the generations of a stretch
+ROUND = 16  # generations; see `BlockStretches`: another number needs another revision
+STRETCH = 64  # generations that are computed in one call of a kernel, at most,
+MEMORY = 1 << 21  # [B] or as many as take so much memory, but a round
 BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
@@ -134,7 +135,12 @@ class PlacementGa(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the initial population, then every generation."""
-        return _Search(self, problem).run(rng)
+        rounds = stretch_of(STRETCH // ROUND, ROUND * self._table_size, MEMORY)
+        return run_of(partial(_Search, self, problem), rng, ROUND, ROUND * rounds)
+
+    def random_run(self, problem: Problem, rng: np.random.Generator) -> Run | None:
+        """Return generations of random strings, see `PlannerDefaults`."""
+        return _RandomStrings(self, problem).run(rng) if self.ga.num_offspring else None
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random strings, (2, count)."""
@@ -200,29 +206,33 @@ class PlacementGa(PlannerDefaults, Component):
         return beyond + ([] if is_feasible else ["no θ3 reaches the target within all limits"])
 
     def memory(self, problem: Problem) -> int:
-        """Return the memory of everybody's terms, by which either value of θ3 is judged."""
-        return 8 * TERM_VALUES * self.ga.population_size
+        """Return the memory of the tables of a round."""
+        return (ROUND + 2) * self._table_size
+
+    @property
+    def _table_size(self) -> int:
+        """Memory of the strings of a generation and what they are judged by [B]."""
+        return 8 * (GENES + ROWS) * self.ga.population_size
 
     def shape(self, problem: Problem) -> tuple[tuple[()], ...]:
         """Return the documented shape of a solution: two numbers, θ1 and θ2."""
         return ((),) * GENES
 
 
-class _Search(ScaledStretches):
-    """One run, and memory for its kernels."""
+class _Strings(IndividualStretches):
+    """Generations of strings in a table."""
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
-        ga, size = planner.ga, planner.ga.population_size
-        super().__init__(ga, kernels.evolve, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
+        self._judging = planner.strings_of(problem), problem.model
+
+    def _take(self, size: int) -> None:
+        """Take memory for generations of a size."""
         self._table = Population(
             np.empty((self.num_places, GENES, size), dtype=np.int64),
             np.empty((self.num_places, ROWS, size)),
         )
         self.costs = self._table.rows[:, FIRST_CRITERION]
-        breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
-        self._judging = planner.strings_of(problem), problem.model
-        self.arguments = breeding, *self._judging, self._table, self.chosen, self.summaries
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
@@ -240,6 +250,40 @@ class _Search(ScaledStretches):
     def population(self, place: int, is_last: bool) -> IntArray:
         """Return the strings."""
         return np.asarray(self._table.strings[place])
+
+
+class _Search(_Strings, ScaledStretches):
+    """One run, and memory for its kernels."""
+
+    def __init__(self, planner: PlacementGa, problem: Problem, stretch: int) -> None:
+        ga = planner.ga
+        ScaledStretches.__init__(self, ga, kernels.evolve, stretch, ROUND, BLOCK)
+        _Strings.__init__(self, planner, problem)
+        self._take(ga.population_size)
+        breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
+        self.arguments = breeding, *self._judging, self._table, self.chosen, self.summaries
+
+
+class _RandomStrings(_Strings):
+    """Generations of random strings: the random search of a placement search."""
+
+    def __init__(self, planner: PlacementGa, problem: Problem) -> None:
+        stretch = stretch_of(STRETCH, planner._table_size, MEMORY)
+        IndividualStretches.__init__(self, planner.ga, stretch)
+        _Strings.__init__(self, planner, problem)
+        self._take(planner.ga.population_size)
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and judge the initial population."""
+        super().begin(rng)
+        self.drawn = self._ahead = DrawnAhead(rng, GENES * self._ga.num_offspring)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Draw and judge generations."""
+        if first == 0:  # more strings are drawn at first than later
+            self._take(self._ga.num_offspring)
+        uniforms = self._ahead.draw(last - first)
+        kernels.draw_generations(uniforms, first, *self._judging, self._table, self.summaries)
 
 
 def _two(solution: FloatArray) -> tuple[float, float]:

@@ -21,7 +21,8 @@ from mcap.records import (
     Schema,
 )
 
-from evoexp.store.log import CONTENT_DIGEST, SUMMARY, ContentDigest, channel_identity
+from evoexp.store.digests import ContentDigest, channel_identity
+from evoexp.store.log import CONTENT_DIGEST, SUMMARY
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")

@@ -13,6 +13,7 @@ from store_samples import CONDITION, CONFIG, generations, summary, write
 
 from evoexp.errors import CorruptLog
 from evoexp.store import log as log_module
+from evoexp.store.digests import ContentDigest
 from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log, read_solution, read_summary
@@ -118,7 +119,7 @@ def test_killed_before_finish() -> None:
 
 
 def test_content_digest_sees_what_good_checksums_hide(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_module.ContentDigest, "hexdigest", lambda self: "0" * 32)
+    monkeypatch.setattr(ContentDigest, "hexdigest", lambda self: "0" * 32)
     forged = write(generations(3)).content
     monkeypatch.undo()
     assert "content digest" in refusal(read_log, forged)

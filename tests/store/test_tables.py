@@ -84,7 +84,7 @@ def test_done_and_failed_rows(run: RunDirectory, add: Add) -> None:
         kinds["evaluations"] == kinds["first_feasible_generation"] == "int64"
         and kinds["digest"] == "string"
     )
-    assert pq.ParquetFile(run.summary_path).metadata.row_group(0).column(0).compression == "ZSTD"
+    assert pq.ParquetFile(run.summary_path).metadata.row_group(0).column(0).compression == "SNAPPY"
 
 
 def test_more_replicates_read_only_themselves(

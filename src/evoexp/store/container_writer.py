@@ -9,6 +9,7 @@ import struct
 import zlib
 from bisect import bisect_right
 from collections.abc import Mapping
+from functools import lru_cache
 from itertools import accumulate, chain, repeat
 from operator import add
 from typing import NamedTuple
@@ -130,8 +131,7 @@ class ContainerWriter:
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add named texts."""
-        texts = b"".join(map(_text, chain.from_iterable(values.items())))
-        record = _record(Opcode.METADATA, _text(name) + _bytes(texts))
+        record = _metadata(name, tuple(values.items()))
         index = struct.pack("<QQ", self._size, len(record))
         self._add_index(Opcode.METADATA_INDEX, index + _text(name))
         self._add_to_file(record)
@@ -211,6 +211,12 @@ class ContainerWriter:
         where = struct.pack("<QQ", begin, len(chunk)) + _bytes(offsets) + length
         self._add_index(Opcode.CHUNK_INDEX, span + where + _text(_COMPRESSION) + sizes)
         self._chunk, self._chunk_length, self._in_chunk = [], 0, []
+
+
+@lru_cache(maxsize=8)  # most logs of a process have the same environment
+def _metadata(name: str, values: tuple[tuple[str, str], ...]) -> bytes:
+    texts = b"".join(map(_text, chain.from_iterable(values)))
+    return _record(Opcode.METADATA, _text(name) + _bytes(texts))
 
 
 def _record(opcode: Opcode, body: bytes) -> bytes:

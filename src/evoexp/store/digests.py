@@ -1,6 +1,8 @@
-"""The chain of digests, which tells from which generation on two runs differ."""
+"""The chain of digests, which tells from which generation on two runs differ; that of a log."""
 
+import struct
 from collections.abc import Iterable
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,9 @@ import xxhash
 from numpy.typing import NDArray
 
 from evoexp.numeric.generator_memory import state_reader
+from evoexp.store.container_writer import Messages
+
+_MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 
 
 class Chain:
@@ -73,3 +78,30 @@ def array_bytes(array: NDArray[Any]) -> bytes:
 def any_nan(arrays: Iterable[bytes]) -> bool:
     """Return whether float64 arrays, given as bytes, hold any NaN."""
     return bool(np.isnan(np.frombuffer(b"".join(arrays))).any())
+
+
+class ContentDigest:
+    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
+
+    def __init__(self) -> None:
+        """Start with no message."""
+        self._hash = xxhash.xxh3_128()
+
+    def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
+        """Append one message; `channel` comes from `channel_identity`."""
+        self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
+
+    def update_all(self, channels: Iterable[bytes], messages: Messages) -> None:
+        """Append messages; `channels` has one entry for each of them."""
+        heads = map(_MESSAGE.pack, messages.times, messages.sequences, map(len, messages.data))
+        parts = zip(channels, heads, messages.data, strict=True)
+        self._hash.update(b"".join(chain.from_iterable(parts)))
+
+    def hexdigest(self) -> str:
+        """Return the digest so far as 32 hex digits."""
+        return self._hash.hexdigest()
+
+
+def channel_identity(topic: str, schema_name: str, message_encoding: str) -> bytes:
+    """Return the channel's part in the digest of each of its messages."""
+    return "\0".join((topic, schema_name, message_encoding, "")).encode()

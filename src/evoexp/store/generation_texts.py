@@ -5,12 +5,14 @@ generations, whose best changes rarely, takes half of that.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from itertools import repeat
+from math import isfinite
+from typing import Any, NamedTuple
 
 import orjson
 
 from evoexp.records import Standing, Stretch
-from evoexp.store.messages import TERM, flagged
+from evoexp.store.messages import NONFINITE, TERM, flagged
 
 
 def generation_row(
@@ -71,10 +73,7 @@ def encode_stretch(stretch: Stretch, links: Sequence[str]) -> list[bytes]:
     """
     count, standings = len(links), stretch.standings
     ends = [standing.place for standing in standings[1:]]
-    texts = [part for each in standings for part in _standing_texts(each)]
     numbers = orjson.dumps([*stretch.lowest, *stretch.means, *stretch.deviations]).decode()
-    if "null" in numbers or any("null" in text for text in texts):  # a number is not finite
-        return [orjson.dumps(flagged(row)) for row in _rows(stretch, links)]
     written = numbers[1:-1].split(",")
     fields = (
         written[:count],
@@ -84,48 +83,62 @@ def encode_stretch(stretch: Stretch, links: Sequence[str]) -> list[bytes]:
         stretch.evaluations,
         stretch.collision_queries,
         links,
+        _flags_of_each(stretch) if "null" in numbers else repeat("", count),
     )
+    own = zip(*fields, strict=True)
     found: list[bytes] = []
-    for begin, end, cost, rest in zip(
-        [0, *ends], [*ends, count], texts[::2], texts[1::2], strict=True
-    ):
-        own = zip(*(field[begin:end] for field in fields), strict=True)
+    for standing, begin, end in zip(standings, [0, *ends], [*ends, count], strict=True):
+        cost, rest, flags, more_flags = _standing_texts(standing)
         found += [
             f'{{"index":{index},{cost},"best_cost_in_generation":{lowest},"mean_cost":{mean},'
             f'"std_cost":{deviation},"num_feasible":{num_feasible},"evaluations":{evaluations},'
-            f'"collision_queries":{queries},{rest},"chain":"{link}"}}'.encode()
-            for index, (lowest, mean, deviation, num_feasible, evaluations, queries, link) in (
-                enumerate(own, stretch.first + begin)
-            )
+            f'"collision_queries":{queries},{rest},"chain":"{link}"'
+            f"{_nonfinite(flags + own_flags + more_flags)}}}".encode()
+            for index, (
+                lowest,
+                mean,
+                deviation,
+                num_feasible,
+                evaluations,
+                queries,
+                link,
+                own_flags,
+            ) in zip(range(stretch.first + begin, stretch.first + end), own, strict=False)
         ]
     return found
 
 
-def _standing_texts(standing: Standing) -> tuple[str, str]:
-    """Return the two pieces of a message that are the same while a solution is the best."""
-    cost = orjson.dumps({"best_cost": standing.cost})
+class _StandingTexts(NamedTuple):
+    """The pieces of a message that are the same while a solution is the best."""
+
+    cost: str
+    rest: str  # from `solved` on
+    flags: str  # of the cost, see `_flags`
+    more_flags: str  # of the terms
+
+
+def _standing_texts(standing: Standing) -> _StandingTexts:
+    cost = {"best_cost": standing.cost}
     terms = {TERM + name: float(standing.terms[name]) for name in sorted(standing.terms)}
-    return cost[1:-1].decode(), orjson.dumps({"solved": standing.solved, **terms})[1:-1].decode()
+    cost_text = orjson.dumps(cost)[1:-1].decode()
+    rest = orjson.dumps({"solved": standing.solved, **terms})[1:-1].decode()
+    more_flags = _flags(terms) if "null" in rest else ""
+    return _StandingTexts(cost_text, rest, _flags(cost) if "null" in cost_text else "", more_flags)
 
 
-def _rows(stretch: Stretch, links: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the rows of the generations of a stretch."""
-    rows, standing, later = [], stretch.standings[0], stretch.standings[1:]
-    columns = [(name, TERM + name) for name in sorted(standing.terms)]
-    for k, link in enumerate(links):
-        if later and later[0].place == k:
-            standing, *later = later
-        values = (
-            stretch.first + k,
-            standing.best,
-            standing.cost,
-            stretch.lowest[k],
-            stretch.means[k],
-            stretch.deviations[k],
-            stretch.num_feasible[k],
-            stretch.evaluations[k],
-            stretch.collision_queries[k],
-            standing.solved,
-        )
-        rows.append(generation_row(values, standing.terms, columns, link))
-    return rows
+def _flags_of_each(stretch: Stretch) -> list[str]:
+    """Return the flags of the numbers that every generation has for itself."""
+    names = "best_cost_in_generation", "mean_cost", "std_cost"
+    own = zip(stretch.lowest, stretch.means, stretch.deviations, strict=True)
+    return [_flags(dict(zip(names, values, strict=True))) for values in own]
+
+
+def _flags(row: Mapping[str, float]) -> str:
+    """Return the numbers that are not finite as JSON, each with a comma behind it."""
+    texts = {name: repr(float(value)) for name, value in row.items() if not isfinite(value)}
+    return orjson.dumps(texts)[1:-1].decode() + "," if texts else ""
+
+
+def _nonfinite(flags: str) -> str:
+    """Return the end of a message, which names the numbers that are not finite."""
+    return f',"{NONFINITE}":{{{flags[:-1]}}}' if flags else ""

@@ -1,14 +1,12 @@
 """One replicate as one self-contained MCAP, written in memory."""
 
 import io
-import struct
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, compress, repeat
 from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
-import xxhash
 from numpy.typing import NDArray
 
 from evoexp.errors import EvoexpError
@@ -23,7 +21,7 @@ from evoexp.records import (
 )
 from evoexp.store.container import MAX_LOG
 from evoexp.store.container_writer import ContainerWriter, Messages
-from evoexp.store.digests import Chain, any_nan, array_bytes
+from evoexp.store.digests import Chain, ContentDigest, any_nan, array_bytes, channel_identity
 from evoexp.store.generation_texts import encode_generations, encode_stretch, generation_row
 from evoexp.store.messages import (
     TERM,
@@ -48,7 +46,6 @@ PUBLISHED, CPU_TIME = "publish_time", "cpu"  # the entry of `RUN` that tells pub
 GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
 
 _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
-_MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 _BATCH = 64  # generations encoded together
 _NUM_VALUES = Generation._fields.index("terms")  # fields of a generation before its terms
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
@@ -63,33 +60,6 @@ class Finished(NamedTuple):
 
     content: bytes
     summary: ReplicateSummary
-
-
-class ContentDigest:
-    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
-
-    def __init__(self) -> None:
-        """Start with no message."""
-        self._hash = xxhash.xxh3_128()
-
-    def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
-        """Append one message; `channel` comes from `channel_identity`."""
-        self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
-
-    def update_all(self, channels: Iterable[bytes], messages: Messages) -> None:
-        """Append messages; `channels` has one entry for each of them."""
-        heads = map(_MESSAGE.pack, messages.times, messages.sequences, map(len, messages.data))
-        parts = zip(channels, heads, messages.data, strict=True)
-        self._hash.update(b"".join(chain.from_iterable(parts)))
-
-    def hexdigest(self) -> str:
-        """Return the digest so far as 32 hex digits."""
-        return self._hash.hexdigest()
-
-
-def channel_identity(topic: str, schema_name: str, message_encoding: str) -> bytes:
-    """Return the channel's part in the digest of each of its messages."""
-    return "\0".join((topic, schema_name, message_encoding, "")).encode()
 
 
 def array_file(array: NDArray[Any]) -> bytes:
@@ -268,7 +238,7 @@ class Log:
         solutions: Sequence[bytes],
         best_costs: Sequence[float],
     ) -> None:
-        """Let the messages of generations wait, and those of better solutions behind them.
+        """Let the messages of generations wait, with each better solution behind its generation.
 
         Args:
             data: Of the generations, encoded.
@@ -278,16 +248,23 @@ class Log:
             solutions: `array_bytes` of the best, one for each of these places.
             best_costs: Likewise, their costs.
         """
-        begin = 0
-        for k, best, cost in zip(places, solutions, best_costs, strict=True):
-            if cost < self._written_cost or GENERATION_TOPIC not in self._channels:
-                own, begin = slice(begin, k + 1), k + 1
-                self._add(GENERATION_TOPIC, GenerationRow, indices[own], data[own], cpu[own])
-                self._best, self._best_cost, self._cpu = best, cost, cpu[k]
-                self._write_solution(indices[k])
-        own = slice(begin, len(data))
-        self._add(GENERATION_TOPIC, GenerationRow, indices[own], data[own], cpu[own])
-        self._best, self._best_cost, self._cpu = solutions[-1], best_costs[-1], cpu[-1]
+        begin, count = 0, 0
+        if not self._channels:  # each is registered with its first message
+            self._add(GENERATION_TOPIC, GenerationRow, indices[:1], data[:1], cpu[:1])
+            self._best, self._best_cost, self._cpu = solutions[0], best_costs[0], cpu[0]
+            self._write_solution(indices[0])
+            begin = 1
+        messages = self._numbered(GENERATION_TOPIC, indices[begin:], data[begin:], cpu[begin:])
+        for k, self._best, self._best_cost in zip(places, solutions, best_costs, strict=True):
+            if self._best_cost < self._written_cost:
+                solution = [self._encoded_solution(indices[k])]
+                one = self._numbered(SOLUTION_TOPIC, indices[k : k + 1], solution, cpu[k : k + 1])
+                count, at = count + 1, k - begin + 1 + count
+                columns: Iterable[tuple[list[Any], list[Any]]] = zip(messages, one, strict=True)
+                for column, value in columns:
+                    column[at:at] = value
+        self._cpu = cpu[-1]
+        self._wait(messages)
 
     def _send(self) -> None:
         """Write the messages that wait."""
@@ -339,9 +316,14 @@ class Log:
         return Finished(self._writer.finish(), summary)
 
     def _write_solution(self, index: int) -> None:
+        self._add(
+            SOLUTION_TOPIC, SolutionRow, [index], [self._encoded_solution(index)], [self._cpu]
+        )
+
+    def _encoded_solution(self, index: int) -> bytes:
+        """Return the message of the best solution, which is then written."""
         self._written, self._written_cost = self._best, self._best_cost
-        data = encode_solution(index, self._best_cost, np.frombuffer(self._best))
-        self._add(SOLUTION_TOPIC, SolutionRow, [index], [data], [self._cpu])
+        return encode_solution(index, self._best_cost, np.frombuffer(self._best))
 
     def _add(
         self,
@@ -360,18 +342,31 @@ class Log:
             data: Encoded.
             cpu: Times of the replicate [ns].
         """
-        channel = self._channels.get(topic)
-        if channel is None:  # registered with its first message, when the terms are known
+        if topic not in self._channels:  # registered with its first message: the terms are known
             self._send()  # the channel comes behind the messages before
             terms = tuple(self._terms) if record is GenerationRow else ()
-            channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
-        channels, sequences, times, published, contents = self._messages
+            self._channels[topic] = _Channel(self._writer, topic, record, terms)
+        self._wait(self._numbered(topic, generations, data, cpu))
+
+    def _numbered(
+        self, topic: str, generations: Sequence[int], data: Sequence[bytes], cpu: Sequence[int]
+    ) -> Messages:
+        """Return messages of a channel with their numbers; see `_add`."""
+        channel = self._channels[topic]
         first, channel.num_messages = channel.num_messages, channel.num_messages + len(data)
-        channels.extend(repeat(channel.id, len(data)))
-        sequences.extend(range(first, channel.num_messages))
-        times.extend([int(generation) * _TICK for generation in generations])
-        published.extend(cpu)
-        contents.extend(data)
+        return Messages(
+            [channel.id] * len(data),
+            [*range(first, channel.num_messages)],
+            [int(generation) * _TICK for generation in generations],
+            [*cpu],
+            [*data],
+        )
+
+    def _wait(self, messages: Messages) -> None:
+        """Let messages wait to be written."""
+        columns: Iterable[tuple[list[Any], list[Any]]] = zip(self._messages, messages, strict=True)
+        for column, values in columns:
+            column += values
 
 
 def _rows_as_bytes(block: NDArray[Any]) -> Iterable[bytes]:

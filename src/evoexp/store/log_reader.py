@@ -38,6 +38,7 @@ from evoexp.store.container import (
     parse,
     unreadable_is_corrupt,
 )
+from evoexp.store.digests import ContentDigest, channel_identity
 from evoexp.store.messages import (
     decode_environment,
     decode_front,
@@ -284,10 +285,10 @@ def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
 
 def _messages(container: Container, index: _Index) -> tuple[dict[str, list[Message]], str]:
     """Return all messages by topic, and the content digest over them."""
-    digest = written.ContentDigest()
+    digest = ContentDigest()
     topics = {channel.id: topic for topic, channel in index.channels.items()}
     identities = {
-        c.id: written.channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
+        c.id: channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
         for c in index.channels.values()
     }
     messages: dict[str, list[Message]] = {}

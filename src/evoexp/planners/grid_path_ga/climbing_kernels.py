@@ -20,9 +20,9 @@ from evoexp.planners.grid_path_ga.kernels import (
     DISTANCE,
     UNSAFENESS,
     Population,
-    summarise_results,
+    note,
 )
-from evoexp.planners.grid_path_ga.path_operators import World, copy_path
+from evoexp.planners.grid_path_ga.path_operators import World
 from evoexp.records import FloatArray, IntArray
 
 
@@ -111,8 +111,8 @@ def climb_generations(
         weights: ε and λ of Eq. 1.
         population: Paths and their results, changed.
         ledger: Of these paths, changed with them.
-        found: Some generations, written as `note_climb` does; number g is at place g modulo the
-            number of places.
+        found: Some generations, see `kernels.note`; number g is at place g modulo the number of
+            places.
         summaries: (places, 4) written, likewise.
 
     Returns:
@@ -126,18 +126,8 @@ def climb_generations(
         )
         if trial < generation * trials:
             return trial
-        note_climb(population, generation % len(summaries), found, summaries)
+        note(population, generation % len(summaries), found, summaries)
     return trial
-
-
-@kernel
-def note_climb(
-    population: Population, place: int, found: Population, summaries: FloatArray
-) -> None:
-    """Write the results of a generation, its summary and its best path to a place."""
-    found.results[place] = population.results
-    summarise_results(population.results, summaries[place])
-    copy_path(population.paths[int(summaries[place, 0])], found.paths[place])
 
 
 @kernel

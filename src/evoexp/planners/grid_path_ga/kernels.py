@@ -90,6 +90,7 @@ def evolve(
     table: Population,
     chosen: SelectionMemory,
     scratch: Scratch,
+    found: Population,
     summaries: FloatArray,
 ) -> int:
     """Go on from one generation to another.
@@ -101,18 +102,18 @@ def evolve(
         world: Grid and fields.
         weights: ε and λ of Eq. 1.
         breeding: Settings of the operators.
-        table: Some generations; number g is at place g modulo the number of places.
+        table: Two generations or more; number g is at place g modulo the number of places.
         chosen: Parents and elites, written.
         scratch: Of the operators.
-        summaries: (places, 4) written, see `summarise_results`.
+        found: What is recorded of some generations, see `note`; likewise at places of its own.
+        summaries: (places, 4) likewise.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on
         there with more.
     """
-    draws, world, table, chosen, scratch, summaries = borrowed(
-        (draws, world, table, chosen, scratch, summaries)
-    )
+    draws, world, table, chosen, scratch = borrowed((draws, world, table, chosen, scratch))
+    found, summaries = borrowed((found, summaries))
     paths, results = table.paths, table.results
     for generation in range(first, last):
         before, own = draws.taken[0], generation % len(paths)
@@ -122,15 +123,26 @@ def evolve(
         if not advance(draws, world, weights, breeding, population, following, chosen, scratch):
             draws.taken[0] = before
             return generation
-        summarise_results(results[other], summaries[other])
+        note(following, (generation + 1) % len(summaries), found, summaries)
     return last
 
 
 @kernel
-def summarise_results(results: FloatArray, out: FloatArray) -> None:
-    """Write index of the best, mean and deviation of the costs, number of paths: all are valid."""
-    out[0], out[1], out[2] = summarise(results[COST])
-    out[3] = results.shape[1]
+def note(population: Population, place: int, found: Population, summaries: FloatArray) -> None:
+    """Write to a place what is recorded of a generation.
+
+    Args:
+        population: The generation.
+        place: Where.
+        found: Written: results of all paths, and the best path alone.
+        summaries: (places, 4) written: index of the best, mean and deviation of the costs, number
+            of paths: all are valid.
+    """
+    results, own = population.results, summaries[place]
+    found.results[place] = results
+    own[0], own[1], own[2] = summarise(results[COST])
+    own[3] = results.shape[1]
+    copy_path(population.paths[int(own[0])], found.paths[place])
 
 
 @kernel

@@ -17,7 +17,6 @@ from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.climbing_kernels import (
     Ledger,
     climb_generations,
-    note_climb,
 )
 from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population, candidate_of
 from evoexp.planners.grid_path_ga.path_operators import Scratch
@@ -111,7 +110,7 @@ class _Climbing(BlockStretches):
 
     def _note(self, place: int) -> None:
         """Write to a place how the paths are now."""
-        note_climb(self._paths, place, self._found, self.summaries)
+        kernels.note(self._paths, place, self._found, self.summaries)
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return the best path of a generation, and its terms."""

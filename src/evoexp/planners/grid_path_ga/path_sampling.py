@@ -20,9 +20,8 @@ from evoexp.planners.grid_path_ga.kernels import (
     UNSAFENESS,
     Population,
     candidate_of,
-    summarise_results,
+    note,
 )
-from evoexp.planners.grid_path_ga.path_operators import copy_path
 from evoexp.planners.planner import Candidate
 from evoexp.planners.stretches import IndividualStretches
 from evoexp.records import FloatArray
@@ -85,9 +84,9 @@ class PathSampling:
             count: Paths of each.
             weights: ε and λ of Eq. 1.
             span: The first and the last generation.
-            found: Some generations, written: of each only its best path, and the results of all;
-                number g is at place g modulo the number of places.
-            summaries: (places, 4) written, see `summarise_results`.
+            found: What is recorded of some generations, see `kernels.note`; number g is at place g
+                modulo the number of places.
+            summaries: (places, 4) likewise.
             states: (places, 2) written: the generator's state behind each, high half first.
 
         Returns:
@@ -227,15 +226,14 @@ def _draw_generations(
     choices, tolls, memory, found = borrowed((choices, tolls, memory, found))
     summaries, states = borrowed((summaries, states))
     paths, sums, longest = memory.paths, memory.sums, 0
+    results = np.empty((RESULTS, len(paths)))
     for generation in range(span[0], span[1] + 1):
         place = generation % len(summaries)
-        results = found.results[place]
         longest = _draw(words, choices, ends, blocks, tolls, memory)
         states[place, 0], states[place, 1] = words[0], words[1]
         for k in range(len(paths)):
             distance, mean = length_and_mean(paths[k, 0], sums.moves[k], sums.levels[k])
             results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
             results[COST, k] = weights[0] * distance + weights[1] * mean
-        summarise_results(results, summaries[place])
-        copy_path(paths[int(summaries[place, 0])], found.paths[place])
+        note(Population(paths, results), place, found, summaries)
     return longest

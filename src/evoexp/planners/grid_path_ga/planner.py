@@ -51,7 +51,7 @@ from evoexp.planners.grid_path_ga.path_sampling import (
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import ScaledStretches, run_of, stretch_of
+from evoexp.planners.stretches import ScaledStretches, run_of
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -62,8 +62,7 @@ FEWER_NODES = 1200  # and the choices of walks between them: at most 6 MB
 MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 ROUND = 8  # generations; see `BlockStretches`: another number needs another revision
-STRETCH = 16  # generations that are computed in one call of a kernel, at most,
-MEMORY = 1 << 23  # [B] or as many as take so much memory, but a round
+STRETCH = 64  # generations that are computed in one call where they are recorded together: rounds
 BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
@@ -156,8 +155,7 @@ class GridPathGa(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the population of random paths, then every generation."""
-        together = ROUND * stretch_of(STRETCH // ROUND, ROUND * self._table_size(problem), MEMORY)
-        return run_of(partial(_Search, self, problem), rng, ROUND, together)
+        return run_of(partial(_Search, self, problem), rng, ROUND, STRETCH)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
@@ -260,15 +258,12 @@ class GridPathGa(PlannerDefaults, Component):
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of the paths of a round, each as long as there are nodes."""
-        return (ROUND + 2) * self._table_size(problem)
+        width = 4 * (problem.fields.grid.num_nodes + 1)
+        return (ROUND + 2) * width * self.ga.population_size
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of nodes, each its coordinates."""
         return (..., (problem.fields.grid.free.ndim,))
-
-    def _table_size(self, problem: Problem) -> int:
-        """Return the memory of the paths of a generation [B]."""
-        return 4 * (problem.fields.grid.num_nodes + 1) * self.ga.population_size
 
     def _nodes(self, problem: Problem, solution: FloatArray) -> FloatArray:
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
@@ -281,11 +276,16 @@ class _Search(ScaledStretches):
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
         super().__init__(ga, kernels.evolve, stretch, ROUND, BLOCK)
         self._planner, self._problem = planner, problem
-        self._table = Population(
-            np.empty((self.num_places, size, nodes + 1), dtype=np.int32),
+        self._found = Population(
+            np.empty((self.num_places, nodes + 1), dtype=np.int32),
             np.empty((self.num_places, RESULTS, size)),
         )
-        self.costs = self._table.results[:, COST]
+        self.costs = self._found.results[:, COST]
+        # where generations are yielded one by one, a round of whole populations is kept
+        kept = self.num_places if stretch == ROUND else 2
+        self._table = Population(
+            np.empty((kept, size, nodes + 1), dtype=np.int32), np.empty((kept, RESULTS, size))
+        )
         breeding = Breeding(
             not planner.revisits,
             ga.scaling_multiple,
@@ -293,9 +293,9 @@ class _Search(ScaledStretches):
             planner.crossover_reach,
             ga.mutation_rate,
         )
-        scratch = Scratch.of(nodes)
+        scratch, found = Scratch.of(nodes), (self._found, self.summaries)
         self._world = problem.world, planner.objective.weights
-        self.arguments = *self._world, breeding, self._table, self.chosen, scratch, self.summaries
+        self.arguments = *self._world, breeding, self._table, self.chosen, scratch, *found
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
@@ -303,16 +303,17 @@ class _Search(ScaledStretches):
         drawn = self._planner.sample(self._problem, rng, len(paths))
         paths[:, : drawn.shape[1]] = drawn
         kernels.measure_all(paths, *self._world, results)
-        kernels.summarise_results(results, self.summaries[0])
+        kernels.note(Population(paths, results), 0, self._found, self.summaries)
 
     def candidate(self, place: int, individual: int) -> Candidate:
-        """Return a path, which is valid, and its terms."""
-        path, results = self._table.paths[place, individual], self._table.results[place]
-        return candidate_of(path, self._problem.world, results[:, individual])
+        """Return the best path of a generation, and its terms."""
+        results = self._found.results[place, :, individual]
+        return candidate_of(self._found.paths[place], self._problem.world, results)
 
     def population(self, place: int, is_last: bool) -> NodeArray:
         """Return the paths; of the last generation without the rest of each row."""
-        paths: NodeArray = self._table.paths[place]
+        last, kept = self._ga.num_generations, len(self._table.paths)
+        paths: NodeArray = self._table.paths[last % kept if is_last else place]
         return trimmed(paths) if is_last else paths
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import math
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -16,6 +17,9 @@ from evoexp.records import Generation, ReplicateSummary
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
+SHORT_S = 0.05  # [s] replicates shorter than this run step by step, several together:
+TOGETHER = 16  # so many at most, and as many as take
+MEMORY = 1 << 28  # [B] at most
 
 
 class Job(NamedTuple):
@@ -92,35 +96,76 @@ def run_jobs(
     Returns:
         Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
     """
-    from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
-
     outcomes: list[Outcome] = []
-    begun = time.perf_counter()
-    for job in jobs:
+    begun, mean_s = time.perf_counter(), math.inf
+    while (done := len(outcomes)) < len(jobs):
         start = time.perf_counter()
         if outcomes and start - begun > LONGEST_TASK_S:
             break
-        try:
-            keep_all(job.files)
-            condition = _condition(job.condition_json)
-            condition.prepare()
-            with limited(limits, in_worker=in_worker):
-                content, summary = run_replicate(
-                    condition, job.replicate, job.condition_json, _heard(curves, job)
-                )
-            reason, trace, may_pass = "", "", False
-        except Exception as error:
-            content, summary, trace = b"", None, traceback.format_exc()
-            reason = f"{type(error).__name__}: {error}".splitlines()[0]
-            reason = str(error) if isinstance(error, TookTooLong) else reason
-            may_pass = isinstance(error, TookTooLong | MemoryError)
-        seconds = time.perf_counter() - start
-        outcomes.append(
-            Outcome(
-                job.condition_id, job.replicate, reason, trace, content, seconds, summary, may_pass
-            )
-        )
+        found = None
+        if mean_s < SHORT_S and limits.timeout_s is None and curves is None:
+            found = _run_together(_alike(jobs[done - 1 :])[1:], limits, in_worker)
+        outcomes += found or [_run_one(jobs[done], limits, in_worker, curves)]
+        new = outcomes[done:]
+        mean_s = sum(each.wall_s for each in new) / len(new)
     return outcomes
+
+
+def _alike(jobs: Sequence[Job]) -> Sequence[Job]:
+    """Return the first jobs that are of one condition: the first one, and some more."""
+    count = 1
+    while count < min(len(jobs), TOGETHER + 1) and jobs[count].condition_id == jobs[0].condition_id:
+        count += 1
+    return jobs[:count]
+
+
+def _run_together(
+    jobs: Sequence[Job], limits: ReplicateLimits, in_worker: bool
+) -> list[Outcome] | None:
+    """Run short replicates of a condition step by step; None: there are none, or one failed."""
+    if not jobs:
+        return None
+    from evoexp.batch.replicate import run_together
+
+    start, config_json = time.perf_counter(), jobs[0].condition_json
+    condition = _condition(config_json)
+    planner, problem = condition.prepare()
+    jobs = jobs[: max(1, int(MEMORY // max(planner.memory(problem), 1.0)))]
+    try:
+        with limited(limits, in_worker=in_worker):
+            found = run_together(condition, [job.replicate for job in jobs], config_json)
+    except Exception:  # then each runs by itself, and tells its own failure
+        return None
+    seconds = (time.perf_counter() - start) / len(jobs)
+    return [
+        Outcome(job.condition_id, job.replicate, "", "", content, seconds, summary)
+        for job, (content, summary) in zip(jobs, found, strict=True)
+    ]
+
+
+def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | None) -> Outcome:
+    """Run one replicate; a failure is an outcome."""
+    from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
+
+    start = time.perf_counter()
+    try:
+        keep_all(job.files)
+        condition = _condition(job.condition_json)
+        condition.prepare()
+        with limited(limits, in_worker=in_worker):
+            content, summary = run_replicate(
+                condition, job.replicate, job.condition_json, _heard(curves, job)
+            )
+        reason, trace, may_pass = "", "", False
+    except Exception as error:
+        content, summary, trace = b"", None, traceback.format_exc()
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        reason = str(error) if isinstance(error, TookTooLong) else reason
+        may_pass = isinstance(error, TookTooLong | MemoryError)
+    seconds = time.perf_counter() - start
+    return Outcome(
+        job.condition_id, job.replicate, reason, trace, content, seconds, summary, may_pass
+    )
 
 
 def _heard(curves: Path | None, job: Job) -> Callable[[Generation], None] | None:

@@ -8,7 +8,7 @@ A population is an array (2, individuals) of strings of bits, a number per angle
 flat: θ1, θ2 [deg].
 """
 
-from functools import partial
+from functools import lru_cache, partial
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -129,8 +129,8 @@ class PlacementGa(PlannerDefaults, Component):
         task = Task(*robot.link_lengths, *scenario.target, *scenario.force)
         avoided = self.objective.avoided(scenario.obstacle_points())
         model = Model(task, self.objective.weights, avoided, robot.limits)
-        assembly, limits = robot.build(), np.array([self.angle_range] * GENES)
-        bodies = scene(assembly, scenario.obstacles, self_pairs=True)
+        limits = np.array([self.angle_range] * GENES)
+        assembly, bodies = _built(robot, scenario)
         return Problem(assembly, model, limits, bodies, scenario.security_margin)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
@@ -284,6 +284,13 @@ class _RandomStrings(_Strings):
             self._take(self._ga.num_offspring)
         uniforms = self._ahead.draw(last - first)
         kernels.draw_generations(uniforms, first, *self._judging, self._table, self.summaries)
+
+
+@lru_cache(maxsize=32)
+def _built(robot: MobileArm, scenario: Docking) -> tuple[Assembly, Scene]:
+    """Build the robot and its scene, kept for planners that differ in weights and rates alone."""
+    assembly = robot.build()
+    return assembly, scene(assembly, scenario.obstacles, self_pairs=True)
 
 
 def _two(solution: FloatArray) -> tuple[float, float]:

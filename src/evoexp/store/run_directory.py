@@ -9,8 +9,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
 from evoexp.store.damage import warn
@@ -31,6 +29,7 @@ from evoexp.store.identity import (
     whole_log,
 )
 from evoexp.store.plans import PLANS, Plan, as_json, read_plans
+from evoexp.store.run_lock import RunLock
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
 COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
@@ -60,7 +59,7 @@ class RunDirectory:
             raise ValueError(f"condition_id: must be 64 hex digits, was {condition_id!r}")
         self.condition_id = condition_id
         self.path = Path(outputs) / "runs" / condition_id[:HASH_LENGTH]
-        self._lock = FileLock(self.path / ".lock", timeout=0)
+        self._lock = RunLock(self.path / ".lock")
 
     @property
     def hash12(self) -> str:
@@ -276,12 +275,8 @@ class RunDirectory:
             Busy: Another process, or another object of this one, holds the run.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        try:
-            self._lock.acquire()
-        except Timeout as error:
-            raise Busy(
-                f"run {self.hash12}: another process is writing it now ({self.path})"
-            ) from error
+        if not self._lock.acquire():
+            raise Busy(f"run {self.hash12}: another process is writing it now ({self.path})")
         try:
             remove_stale((self.path, self.replicates))
             yield

@@ -5,10 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.scenarios.docking import Docking
-from evoexp.scenarios.mission import Mission
-from evoexp.scenarios.pick_and_place import PickAndPlace
-from evoexp.scenarios.posture_task import PointGoal, PoseGoal, PostureTask
 
 
 class Target(NamedTuple):
@@ -24,26 +20,16 @@ class Target(NamedTuple):
 
 
 def targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
-    """Return the places that a scenario names for a robot; none if it names configurations."""
-    if isinstance(scenario, PickAndPlace):
-        return (
-            _target("via point", scenario.via_point),
-            _target("goal point", scenario.goal_point),
-        )
-    if isinstance(scenario, Docking):
-        return (_target("target", scenario.target),)
-    if isinstance(scenario, Mission):
-        (x, y), (along, up) = scenario.task_origin, scenario.docking.target
-        return (_target("target", (x + along, y, robot.body_height + up)),)
-    if isinstance(scenario, PostureTask):
-        goals = ((phase.name, phase.goal) for phase in scenario.all_phases)
-        return tuple(
-            _target(name, goal.point)
-            for name, goal in goals
-            if isinstance(goal, PointGoal | PoseGoal)
-        )
-    return ()
+    """Return the places that a scenario names for a robot; none if it names configurations.
 
-
-def _target(name: str, point: tuple[float, ...]) -> Target:
-    return Target(name.replace("_", " "), np.array([*point, 0.0][:3]))
+    Args:
+        scenario: One that names places has a method `named_places(robot)`, which returns names and
+            points, in the plane or in space.
+        robot: The robot.
+    """
+    if not hasattr(scenario, "named_places"):
+        return ()
+    return tuple(
+        Target(name.replace("_", " "), np.array([*point, 0.0][:3]))
+        for name, point in scenario.named_places(robot)
+    )

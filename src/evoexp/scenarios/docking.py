@@ -1,6 +1,6 @@
 """A place and a load for the end-effector of a mobile arm, and the obstacles around it."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,6 +29,10 @@ class Docking(Component):
     security_margin: NonNegative
     length_unit: str
     obstacles: tuple[Obstacle, ...] = ()
+
+    def named_places(self, robot: Any) -> list[tuple[str, tuple[float, ...]]]:
+        """Return names and points of the places that pictures mark [length unit]."""
+        return [("target", self.target)]
 
     def obstacle_points(self) -> FloatArray:
         """Return the middles of the obstacles, X_o, (obstacles, 2)."""

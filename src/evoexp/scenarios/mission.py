@@ -1,6 +1,6 @@
 """A platform drives over a grid to where its arm has a task."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from evoexp.scenarios.docking import Docking
 from evoexp.scenarios.grid_motion import GridMotion
@@ -29,3 +29,8 @@ class Mission(Component):
     def length_unit(self) -> str:
         """Of the grid."""
         return self.grid.length_unit
+
+    def named_places(self, robot: Any) -> list[tuple[str, tuple[float, ...]]]:
+        """Return names and points of the places that pictures mark [length unit]."""
+        (x, y), (along, up) = self.task_origin, self.docking.target
+        return [("target", (x + along, y, robot.body_height + up))]

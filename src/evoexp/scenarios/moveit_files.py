@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
@@ -79,6 +78,8 @@ class Document:
         Raises:
             SettingError: If it is no mapping, too large or too deep, or refers to parts of itself.
         """
+        import yaml  # most tasks come out of no such file
+
         self.field = field
         if len(content) > MAX_SCENE:
             must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
@@ -93,6 +94,8 @@ class Document:
             raise SettingError(field, "YAML as MoveIt writes it", type(self.root).__name__)
 
     def _check(self, content: bytes) -> None:
+        import yaml
+
         depth = 0
         for count, event in enumerate(yaml.parse(content, yaml.CSafeLoader)):
             depth += isinstance(event, yaml.CollectionStartEvent)

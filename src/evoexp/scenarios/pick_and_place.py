@@ -1,6 +1,6 @@
 """An arm whose tip shall pass a via point and end at a goal point inside a box, among obstacles."""
 
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -54,6 +54,10 @@ class PickAndPlace(Component):
         """Least x, greatest x, least y, greatest y of the box where it stands."""
         (dx, dy), (left, right), (bottom, top) = self.obstacle_shift, self.box_x, self.box_y
         return left + dx, right + dx, bottom + dy, top + dy
+
+    def named_places(self, robot: Any) -> list[tuple[str, tuple[float, ...]]]:
+        """Return names and points of the places that pictures mark [length unit]."""
+        return [("via point", self.via_point), ("goal point", self.goal_point)]
 
     def obstacle_table(self) -> ObstacleTable:
         """Return the obstacles where they stand."""

@@ -4,7 +4,7 @@ A task of one phase is a reaching task; manoeuvres such as pick-and-place are a 
 (Corsépius 2001, section 4.3: fitness functions and termination criteria together make a manoeuvre).
 """
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -234,3 +234,10 @@ class PostureTask(Component):
         points = (PointGoal(kind="point", point=point) for point in self.subgoals)
         ways = [Phase(name=f"subgoal_{k + 1}", goal=goal) for k, goal in enumerate(points)]
         return (*ways, *self.phases)
+
+    def named_places(self, robot: Any) -> list[tuple[str, tuple[float, ...]]]:
+        """Return names and points of the places that pictures mark [length unit]."""
+        goals = ((phase.name, phase.goal) for phase in self.all_phases)
+        return [
+            (name, goal.point) for name, goal in goals if isinstance(goal, PointGoal | PoseGoal)
+        ]

@@ -18,4 +18,8 @@ def version_of(distribution: str) -> str:
     """
     from importlib import metadata  # which takes longer than the rest of this module
 
-    return metadata.version(distribution)
+    found = metadata.distribution(distribution)
+    for line in (found.read_text("METADATA") or "").splitlines():
+        if line.startswith("Version:"):  # the others, licences among them, are not parsed
+            return line.removeprefix("Version:").strip()
+    return found.version

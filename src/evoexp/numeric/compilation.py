@@ -6,18 +6,17 @@ The options keep results bit-identical: no fastmath, no contraction, no reassoci
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar, cast
 
-import numba
-from numba.core import cgutils, types
-from numba.extending import intrinsic
-from numba.np.arrayobj import populate_array
-
+from evoexp.numeric.bare_numba import numba
 from evoexp.numeric.kernel_cache import SharedCache, use_content_cache
+from evoexp.numeric.plain_arrays import use_plain_arrays
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Value = TypeVar("Value")
 
-use_content_cache()
+cgutils, types, intrinsic = numba.core.cgutils, numba.core.types, numba.extending.intrinsic
 
+use_content_cache()
+use_plain_arrays()
 
 _OPTIONS: dict[str, Any] = {
     "fastmath": False,  # nor contraction, nor reassociation: the same bits on every machine
@@ -74,6 +73,8 @@ def _viewing(num_widths: int) -> Any:
     """Return a function for kernels that views part of a flat array, with rows or without."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from numba.np.arrayobj import populate_array  # what only compiles is not loaded to run
+
         whole, first, *shape = arguments
         data = context.make_array(signature.args[0])(context, builder, whole).data
         itemsize = context.get_constant(types.intp, 8)

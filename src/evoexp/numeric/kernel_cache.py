@@ -13,10 +13,9 @@ import os
 import shutil
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numba
-from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import caching
 from numba.core.runtime.nrt import rtsys
 
@@ -24,6 +23,9 @@ from evoexp.numeric.code_keys import is_kernel_module, module_key, written_since
 from evoexp.numeric.kept_files import MESSAGES, cache_root
 from evoexp.numeric.kept_libraries import FORMAT, LibraryFiles, use_kept_libraries
 from evoexp.numeric.kept_runtime import use_kept_runtime
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
 
 NUM_KEPT_CACHES = 4  # [-] states of a module whose compiled kernels are kept
 KEPT_S = 86_400.0  # [s] and any that was used so lately
@@ -83,6 +85,8 @@ class _OpenedCache(caching.FunctionCache):
         found = self._loaded(signature, target_context)
         if found is not None:
             return found
+        from filelock import FileLock, Timeout  # what only compiles is not loaded to run
+
         _spare_blas()
         with contextlib.suppress(OSError, Timeout):
             Path(self._cache_path).mkdir(parents=True, exist_ok=True)

@@ -45,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if is_process:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
         os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
+        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looked for in all packages
         open_streams()
         search_less()
         interruption.hear()

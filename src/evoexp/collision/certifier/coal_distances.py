@@ -60,12 +60,14 @@ class _Body(NamedTuple):
     """A body: coal's shape, and its place.
 
     Attributes:
+        number: Of its shape in the scene.
         shape: Coal's.
         joint: Index of its Pinocchio joint; 0: the world.
         local: Its `pin.SE3` in the joint's frame.
         num_triangles: Of a mesh; 0 for convex shapes.
     """
 
+    number: int
     shape: Any
     joint: int
     local: Any
@@ -84,8 +86,10 @@ class CoalDistance:
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._request.gjk_tolerance = GJK_TOLERANCE
         self._request.gjk_max_iterations = GJK_ITERATIONS
-        self._balls: list[tuple[int, FloatArray, float]] | None = None
+        self._balls: _Balls | None = None
         self._t = np.nan
+        self._still: dict[int, Any] = {}  # body → coal's transform, of those that do not move
+        self._moved: dict[int, Any] = {}  # and of those that do, at t
         self._known: dict[tuple[int, float], float] = {}
         self._near: list[NearPart] = []  # each within the one before it
 
@@ -111,13 +115,13 @@ class CoalDistance:
         """
         self._place(t)
         if self._balls is None:
-            self._balls = [_ball(_body(*shape)) for shape in self.scene.shapes]
-        places = self._data.oMi
-        middles = np.array([places[joint].act(middle) for joint, middle, _ in self._balls])
-        radii = np.array([radius for _, _, radius in self._balls])
+            self._balls = _balls(self.scene)
+        places, balls = self._data.oMi, self._balls
+        for body, joint, middle in balls.moving:
+            balls.middles[body] = places[joint].act(middle)
         one, two = self.scene.pairs.T
-        away = middles[one] - middles[two]
-        found: FloatArray = np.sqrt((away * away).sum(axis=1)) - radii[one] - radii[two]
+        away = balls.middles[one] - balls.middles[two]
+        found: FloatArray = np.sqrt((away * away).sum(axis=1)) - balls.reach
         return found
 
     def narrow(
@@ -160,7 +164,7 @@ class CoalDistance:
             if near.holds(pair, t, t):
                 first, second = (near.mesh, second) if one.num_triangles > 0 else (first, near.mesh)
                 break
-        places = _transform(self._at(one)), _transform(self._at(two))
+        places = self._transform(one), self._transform(two)
         self._result.clear()
         return float(
             coal.distance(first, places[0], second, places[1], self._request, self._result)
@@ -170,31 +174,58 @@ class CoalDistance:
         if t != self._t or _scratch.owner is not self._token:
             pin.forwardKinematics(self._model, self._data, self.motion.at(t))
             self._t, _scratch.owner = t, self._token
+            self._moved.clear()
 
     def _bodies(self, pair: int) -> tuple[_Body, _Body]:
         if pair not in self._pairs:
-            one, two = (_body(*self.scene.shapes[int(k)]) for k in self.scene.pairs[pair])
+            one, two = (_body(self.scene, int(k)) for k in self.scene.pairs[pair])
             self._pairs[pair] = one, two
         return self._pairs[pair]
 
     def _at(self, body: _Body) -> Any:
         return body.local if body.joint == 0 else self._data.oMi[body.joint] * body.local
 
-
-def _body(shape: Any, joint: int, local: Any) -> _Body:
-    return _Body(shape, joint, local, getattr(shape, "num_tris", 0))
-
-
-def _ball(body: _Body) -> tuple[int, FloatArray, float]:
-    """Return a body's joint, and middle and radius of the ball around it in the joint's frame."""
-    body.shape.computeLocalAABB()
-    radius = float(body.shape.aabb_radius)
-    middle = body.shape.aabb_center if np.isfinite(radius) else np.zeros(3)
-    return body.joint, np.asarray(body.local.act(middle)), radius
+    def _transform(self, body: _Body) -> Any:
+        """Return coal's transform of a body, made once per instant; of a body that stays, once."""
+        known = self._still if body.joint == 0 else self._moved
+        found = known.get(body.number)
+        if found is None:
+            placement = self._at(body)
+            found = coal.Transform3s(placement.rotation, placement.translation)
+            known[body.number] = found
+        return found
 
 
-def _transform(placement: Any) -> Any:
-    return coal.Transform3s(placement.rotation, placement.translation)
+def _body(scene: Scene, index: int) -> _Body:
+    shape, joint, local = scene.shapes[index]
+    return _Body(index, shape, joint, local, getattr(shape, "num_tris", 0))
+
+
+class _Balls(NamedTuple):
+    """The balls around the bodies of a scene.
+
+    Attributes:
+        moving: Index, joint, and middle in the joint's frame, of each body that moves.
+        middles: (bodies, 3) in the world; those of moving bodies are set at every instant.
+        reach: (pairs,) sums of both radii.
+    """
+
+    moving: list[tuple[int, int, FloatArray]]
+    middles: FloatArray
+    reach: FloatArray
+
+
+def _balls(scene: Scene) -> _Balls:
+    moving, middles, radii = [], [], []
+    for index, (shape, joint, local) in enumerate(scene.shapes):
+        shape.computeLocalAABB()
+        radii.append(float(shape.aabb_radius))
+        middle = shape.aabb_center if np.isfinite(radii[-1]) else np.zeros(3)
+        middles.append(np.asarray(local.act(middle)))
+        if joint != 0:
+            moving.append((index, int(joint), middles[-1]))
+    one, two = scene.pairs.T
+    return _Balls(moving, np.array(middles), np.array(radii)[one] + np.array(radii)[two])
 
 
 def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> float | None:

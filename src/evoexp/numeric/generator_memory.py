@@ -17,7 +17,7 @@ STATE_SIZE = 16  # [B] of `state_bytes`: those of the state itself, which come f
 _MASK = 2**128 - 1
 
 
-def state_bytes(bit_generator: np.random.PCG64) -> bytes:
+def state_bytes(bit_generator: "np.random.PCG64") -> bytes:
     """Return the state of a PCG64.
 
     State (16), increment (16), has_uint32 (4), uinteger (4), all little-endian.
@@ -84,7 +84,7 @@ def _demand_pcg64(bit_generator: Any) -> None:
         raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")
 
 
-def words_of(bit_generator: np.random.PCG64) -> NDArray[np.uint64]:
+def words_of(bit_generator: "np.random.PCG64") -> NDArray[np.uint64]:
     """Return state and increment of a generator, lower halves first, in its own memory.
 
     Only where the layout is known, and while the generator lives.
@@ -93,17 +93,17 @@ def words_of(bit_generator: np.random.PCG64) -> NDArray[np.uint64]:
     return np.asarray(words)
 
 
-def _address_of_words(bit_generator: np.random.PCG64) -> int:
+def _address_of_words(bit_generator: "np.random.PCG64") -> int:
     # struct {struct {uint128 state, increment} *words; int has_uint32; uint32 uinteger;}
     return ctypes.c_void_p.from_address(bit_generator.ctypes.state_address).value or 0
 
 
-def _read_memory(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
+def _read_memory(bit_generator: "np.random.PCG64") -> Callable[[], bytes]:
     address: int = bit_generator.ctypes.state_address
     words = memoryview((ctypes.c_uint8 * 32).from_address(_address_of_words(bit_generator)))
     half = memoryview((ctypes.c_uint8 * 8).from_address(address + ctypes.sizeof(ctypes.c_void_p)))
 
-    def read(owner: np.random.PCG64 = bit_generator) -> bytes:  # the owner keeps the memory alive
+    def read(owner: Any = bit_generator) -> bytes:  # the owner keeps the memory alive
         return b"".join((words, half))
 
     return read

@@ -21,7 +21,7 @@ class Chain:
     The generator is only read, never drawn from.
     """
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: "np.random.Generator") -> None:
         """Start a chain, its link being empty.
 
         Args:

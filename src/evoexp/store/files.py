@@ -3,11 +3,13 @@
 import os
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 NUM_THREADS = 8  # that write files at the same time
 _SUFFIX = ".tmp"
@@ -60,6 +62,8 @@ def _write_all(files: Sequence[_File]) -> None:
     if len(files) == 1:
         _write(files[0])
         return
+    from concurrent.futures import wait  # who writes one file needs no threads
+
     # one task per thread, not per file: handing a task over takes as long as writing a file
     shares = [files[k::NUM_THREADS] for k in range(min(NUM_THREADS, len(files)))]
     stop, locks = threading.Event(), [threading.Lock() for _ in shares]
@@ -88,12 +92,14 @@ def _write_share(files: Sequence[_File], stop: threading.Event, lock: threading.
 
 
 @cache
-def _threads(process: int) -> ThreadPoolExecutor:
+def _threads(process: int) -> "ThreadPoolExecutor":
     """Return the threads that write; they stay, as starting them takes as long as two files.
 
     Args:
         process: Whose they are: a copy of a process that has them needs its own.
     """
+    from concurrent.futures import ThreadPoolExecutor
+
     return ThreadPoolExecutor(NUM_THREADS, "write")
 
 

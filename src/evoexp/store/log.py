@@ -97,7 +97,7 @@ class Log:
         condition_id: str,
         config_json: bytes,
         replicate: int,
-        rng: np.random.Generator,
+        rng: "np.random.Generator",
         attachments: Mapping[str, bytes] | None = None,
         environment: Mapping[str, Any] | None = None,
     ) -> None:

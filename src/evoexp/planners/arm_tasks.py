@@ -11,7 +11,6 @@ import pinocchio as pin
 
 from evoexp.collision.box_support import coal
 from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
-from evoexp.collision.models.link_collision import two_link_arms
 from evoexp.collision.models.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.collision.scene import Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
@@ -123,6 +122,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         return floor_motion(task)
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
+    from evoexp.collision.models.link_collision import two_link_arms  # and its kernels
+
     if task.stationary:
         must = "empty: this planner moves all robots"
         raise SettingError("scenario.stationary", must, list(task.stationary))

@@ -1,6 +1,7 @@
 """A task that MoveIt wrote, in the words of planners: joints by name, pairs that may touch."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit import Joints, MoveitTask
 from evoexp.scenarios.moveit_files import Pose
-from evoexp.scenarios.posture_task import PostureTask
+
+if TYPE_CHECKING:
+    from evoexp.scenarios.posture_task import PostureTask
 
 
 def moving_joints(assembly: Assembly) -> Joints:
@@ -40,13 +43,13 @@ def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
     return task if isinstance(task, ArmMotion) else task.arm_motion(moving_joints(assembly))
 
 
-def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureTask:
+def posture_task(assembly: Assembly, task: "PostureTask | MoveitTask") -> "PostureTask":
     """Return a task as one of reaching a pose of the tool.
 
     Raises:
         SettingError: If a joint has no start, or pairs with obstacles may touch.
     """
-    if isinstance(task, PostureTask):
+    if not isinstance(task, MoveitTask):
         return task
     names = tuple(item.name for item in assembly.geometry.geometryObjects)
     if pairs := task.touching(names):

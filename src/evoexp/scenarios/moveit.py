@@ -7,7 +7,7 @@ or to a pose of the tool.
 
 import functools
 import re
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,10 @@ from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit_files import MAX_SCENE, Pose
 from evoexp.scenarios.moveit_request import LinkGoal, Request, read_request, state_of
 from evoexp.scenarios.moveit_scene import World, read_world
-from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
 from evoexp.validation import Component, NonNegative, Positive
+
+if TYPE_CHECKING:
+    from evoexp.scenarios.posture_task import PostureTask
 
 FILES = ("scene", "request")
 UP = (0.0, 0.0, 1.0)  # as MoveIt's planning frames have it
@@ -166,13 +168,15 @@ class MoveitTask(Component):
                 raise SettingError("scenario.request", must, name, hint)
         return state_of(joints.names, goal, self.state) if goal else None
 
-    def posture_task(self, joints: Joints, tool_at_goal: Pose | None) -> PostureTask:
+    def posture_task(self, joints: Joints, tool_at_goal: Pose | None) -> "PostureTask":
         """Return the task as one of reaching a pose.
 
         Args:
             joints: Of the robot.
             tool_at_goal: The tool's pose in the goal's configuration; None: the goal is a pose.
         """
+        from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
+
         if tool_at_goal is not None:
             link = LinkGoal("", tool_at_goal, self.position_tolerance, self.angle_tolerance)
         else:

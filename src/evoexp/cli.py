@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
+from evoexp.commands.frame_memory import called_in_one_piece
 from evoexp.commands.interruption import Interrupted, Interruption
 from evoexp.commands.quick_end import leave, leave_at_once
 from evoexp.commands.standard_streams import (
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         try:
-            code = _run(words, is_process)
+            code = called_in_one_piece(lambda: _run(words, is_process))
         finally:
             sys.stdout.flush()  # here, where an error is explained
         if is_process:

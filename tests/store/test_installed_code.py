@@ -1,5 +1,6 @@
 """The hash of the code that kept results follow from."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -62,3 +63,23 @@ def test_code_that_is_written_while_it_runs_is_nobody_elses(copy: Path) -> None:
     ]
     assert found[0] != found[1] == found[2]
     assert found[0].startswith(found[1])
+
+
+def test_code_whose_files_have_the_same_sizes_and_times_is_read_once(
+    copy: Path, tmp_path: Path
+) -> None:
+    for path in (copy / "evoexp").rglob("*.py"):
+        os.utime(path, (1e9, 1e9))  # long ago
+    first = f"import sys; sys.path.insert(0, {str(copy)!r})\n"
+    refusing = f"{first}import evoexp.store.kept_facts as facts\nfacts.add_files = None\n"
+
+    def run(script: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", script + SCRIPT]
+        own = os.environ | {"EVOEXP_CACHE": str(tmp_path)}
+        return subprocess.run(command, capture_output=True, text=True, env=own)
+
+    read = run(first).stdout.split()
+    assert run(refusing).stdout.split() == read != []
+    os.utime(copy / "evoexp/report/style.py", (1e9, 1e9 + 1.0))
+    assert "TypeError" in run(refusing).stderr
+    assert run(first).stdout.split() == read, "the same content"

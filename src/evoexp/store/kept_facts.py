@@ -87,16 +87,32 @@ def installed_code(without: Collection[str] = ()) -> bytes:
     left_out = tuple(f"{own / folder}{os.sep}" for folder in without)
     found = _LOOKED.stamps(tuple(map(str, dict.fromkeys(code))))
     stamps = [stamp for stamp in found if not stamp[0].startswith(left_out)]
-    digest = _hash_of_code(json.dumps(components), tuple(stamps))
     newest = max((written for _, _, written in stamps), default=0)
-    return digest if newest < 1e9 * (LOADED_FROM - GRAIN_S) else digest + _OF_THIS_PROCESS
+    is_loaded = newest < 1e9 * (LOADED_FROM - GRAIN_S)
+    digest = _hash_of_code(json.dumps(components), tuple(stamps), is_loaded)
+    return digest if is_loaded else digest + _OF_THIS_PROCESS
 
 
 @functools.lru_cache(maxsize=2)
-def _hash_of_code(components: str, stamps: tuple[Stamp, ...]) -> bytes:
-    """Read all code, once per process as long as no file is written again."""
+def _hash_of_code(components: str, stamps: tuple[Stamp, ...], is_kept: bool) -> bytes:
+    """Read all code, once per process as long as no file is written again.
+
+    Args:
+        components: Enter the hash.
+        stamps: Of the files.
+        is_kept: Whether no file is so new that it may change and keep its stamp: then the hash is
+            kept under the stamps, as Python keeps what it compiles under sizes and times.
+    """
+    looked = hashlib.sha256(json.dumps([components, stamps]).encode()).hexdigest()
+    path = cache_root() / "facts" / f"code-{looked[:32]}"
+    if is_kept:
+        with contextlib.suppress(FileNotFoundError, Damaged):
+            return read_kept(path)
     digest = hashlib.sha256(components.encode())
     add_files(digest, (path for path, _, _ in stamps))
+    if is_kept:
+        with contextlib.suppress(OSError):
+            write_kept(path, digest.digest())
     return digest.digest()
 
 

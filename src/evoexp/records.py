@@ -66,10 +66,18 @@ class Stretch(NamedTuple):
     num_feasible: list[int]
     evaluations: list[int]
     collision_queries: list[int]
-    costs: list[FloatArray]  # (generations, individuals) of some generations after the other
+    costs: list[FloatArray]  # (generations, …, individuals) of some generations after the other
     states: list[bytes]  # of the generator, behind each generation
     times: list[float]  # [s] when each generation was there
     population: NDArray[Any] | None  # of the last generation, if it ends the run
+    criteria: FloatArray | None = None  # likewise, if its front is recorded
+
+    def copied(self) -> "Stretch":
+        """Return the same without views of the planner's memory."""
+        population, criteria = (
+            None if array is None else array.copy() for array in (self.population, self.criteria)
+        )
+        return self._replace(population=population, criteria=criteria)
 
     def last(self) -> Generation:
         """Return the last generation; without a population unless it ends the run."""
@@ -88,6 +96,7 @@ class Stretch(NamedTuple):
             standing.terms,
             self.costs[-1][-1],
             np.empty(0) if population is None else population,
+            self.criteria,
         )
 
 

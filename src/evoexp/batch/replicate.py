@@ -124,8 +124,7 @@ class _Replicate:
             if first_feasible is None and any(stretch.num_feasible):
                 feasible = (k for k, count in enumerate(stretch.num_feasible) if count > 0)
                 first_feasible = stretch.first + next(feasible)
-        if stretch.population is not None:  # the planner's memory
-            self._waiting = stretch = stretch._replace(population=stretch.population.copy())
+        self._waiting = stretch = stretch.copied()
         return _Evolved(stretch.last(), first_feasible, GENERATIONS)
 
     @property

@@ -43,7 +43,7 @@ def states_behind(bit_generator: Any, count: int, steps: int) -> list[bytes]:
     Raises:
         TypeError: If the generator is no PCG64.
     """
-    _demand_pcg64(bit_generator)
+    demand_pcg64(bit_generator)
     whole: Any = bit_generator.state
     state, increment = whole["state"]["state"], whole["state"]["inc"]
     factor, addend = _jump(count, increment)
@@ -75,11 +75,16 @@ def state_reader(bit_generator: Any) -> Callable[[], bytes]:
     Raises:
         TypeError: If the generator is no PCG64.
     """
-    _demand_pcg64(bit_generator)
+    demand_pcg64(bit_generator)
     return _read_memory(bit_generator) if layout_is_known() else lambda: state_bytes(bit_generator)
 
 
-def _demand_pcg64(bit_generator: Any) -> None:
+def demand_pcg64(bit_generator: Any) -> None:
+    """Refuse other bit generators, whose states have other layouts.
+
+    Raises:
+        TypeError: If it is another one.
+    """
     if not isinstance(bit_generator, np.random.PCG64):
         raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")
 

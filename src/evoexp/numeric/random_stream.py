@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
-from evoexp.numeric.generator_memory import states_behind
+from evoexp.numeric.generator_memory import state_reader, states_behind
 from evoexp.numeric.pcg64 import draw_uniforms, put_uniforms
 
 
@@ -122,6 +122,7 @@ class DrawnByNeed:
             most: Numbers that a step takes at most.
         """
         self._twin, self._pass, self._most = twin(rng), passer(rng), most
+        self._bits = rng.bit_generator
         self._left, self._taken = np.empty(0), deque[int]()
 
     def draw(self, steps: int) -> NDArray[np.float64]:
@@ -138,6 +139,14 @@ class DrawnByNeed:
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
         self._pass(self._taken.popleft())
+
+    def follow_all(self, steps: int) -> list[bytes]:
+        """Let the generator pass the numbers of some steps; return its state behind each."""
+        read, found = state_reader(self._bits), list[bytes]()
+        for _ in range(steps):
+            self.follow()
+            found.append(read())
+        return found
 
 
 @kernel

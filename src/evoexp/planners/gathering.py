@@ -114,7 +114,9 @@ class Gathered:
         self.costs.append(costs)
         self._size += costs.nbytes
 
-    def stretch(self, population: NDArray[Any] | None) -> Stretch:
+    def stretch(
+        self, population: NDArray[Any] | None, criteria: FloatArray | None = None
+    ) -> Stretch:
         """Return the generations gathered, the last one with its population; begin anew."""
         found = Stretch(
             self.first,
@@ -129,6 +131,7 @@ class Gathered:
             self.states,
             self.times,
             population,
+            criteria,
         )
         self.first += len(self.lowest)
         self._begin()

@@ -20,7 +20,7 @@ from evoexp.numeric.generator_memory import states_behind
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
 from evoexp.planners.gathering import Clock, Gathered, Run
 from evoexp.planners.planner import Candidate, Keeper
-from evoexp.records import FloatArray, Generation, Stretch
+from evoexp.records import FloatArray, Generation, IntArray, Stretch
 
 SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
 
@@ -58,7 +58,7 @@ class Stretches(ABC):
     Attributes:
         num_places: Generations computed per call, and the one before them.
         summaries: (places, SUMMARY).
-        costs: (places, individuals).
+        costs: (places, …, individuals).
         drawn: Numbers of the generations, where they are drawn ahead: the generator follows.
     """
 
@@ -93,6 +93,63 @@ class Stretches(ABC):
                 self.go_on(rng, index, self._known)
             index, evaluated = index + 1, ga.num_offspring
 
+    def run(self, rng: np.random.Generator) -> Run:
+        """Return the generations, for a search that keeps what costs least of each."""
+        return Run(partial(self.generations, rng), partial(self.stretches, rng))
+
+    def stretches(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
+        """Yield the initial population, then every other generation; see `Run.stretches`."""
+        self.begin(rng)
+        gathered, index, last = Gathered(), 0, self._ga.num_generations
+        self._gather(gathered, 0, 0, states_behind(rng.bit_generator, 0, 1), read_clock())
+        while index < last:
+            first, index = index, min(index + self.num_places - 1, last)
+            self.go_on(rng, first, index)
+            self._gather(gathered, first + 1, index, self.follow(rng, first, index), read_clock())
+            if gathered.is_full and index < last:
+                yield gathered.stretch(None)
+        place = last % self.num_places
+        yield gathered.stretch(self.population(place, True), self.criteria(place))
+
+    def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
+        """Let the generator follow from one generation to another.
+
+        Returns:
+            Its state behind each of those after the first, as it is recorded.
+        """
+        assert self.drawn is not None, "a search that draws otherwise writes its own `follow`"
+        return self.drawn.follow_all(last - first)
+
+    def _gather(
+        self, gathered: Gathered, first: int, last: int, states: list[bytes], time: float
+    ) -> None:
+        """Keep the best of some generations, and gather what is recorded of each of them."""
+        keeper, places = gathered.keeper, np.arange(first, last + 1) % self.num_places
+        lowest = self.lowest(places).tolist()
+        for k, cost in enumerate(lowest):
+            if keeper.improves(cost):
+                keeper.keep(cost, self.best(places.item(k)))
+                gathered.stand(k)
+            keeper.index += 1
+        _, means, deviations, num_feasible = self.summaries[places].T.tolist()
+        gathered.lowest += lowest
+        gathered.means += means
+        gathered.deviations += deviations
+        gathered.num_feasible += map(int, num_feasible)
+        evaluations, queries = self.counts(first)
+        steps = range(1, len(lowest) + 1)
+        gathered.evaluations += [keeper.evaluations + evaluations * k for k in steps]
+        gathered.collision_queries += [keeper.collision_queries + queries * k for k in steps]
+        keeper.evaluations += evaluations * len(lowest)
+        keeper.collision_queries += queries * len(lowest)
+        gathered.add_costs(self.costs[places])
+        gathered.states += states
+        gathered.times += [time] * len(states)
+
+    def criteria(self, place: int) -> FloatArray | None:
+        """Return the criteria of the last generation, if its front is recorded."""
+        return None
+
     @abstractmethod
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population, at place 0."""
@@ -112,6 +169,22 @@ class Stretches(ABC):
             is_last: Whether it ends the run.
         """
 
+    @abstractmethod
+    def lowest(self, places: IntArray) -> FloatArray:
+        """Return the lowest cost of each of the generations at some places."""
+
+    @abstractmethod
+    def best(self, place: int) -> Candidate:
+        """Return the solution that has the lowest cost of a generation."""
+
+    @abstractmethod
+    def counts(self, index: int) -> tuple[int, int]:
+        """Return evaluations and configurations asked for of a generation, 0 the initial one."""
+
+    @abstractmethod
+    def population(self, place: int, is_last: bool) -> NDArray[Any]:
+        """Return the population at a place; that of the last generation is hashed."""
+
 
 class IndividualStretches(Stretches):
     """Generations whose best is one individual.
@@ -120,69 +193,27 @@ class IndividualStretches(Stretches):
         queries_each: Configurations that judging an individual asks for.
     """
 
-    drawn: DrawnAhead | None = None
     queries_each = 0
 
-    def run(self, rng: np.random.Generator) -> Run:
-        """Return the generations, of a search whose `keep` is that of this class."""
-        return Run(partial(self.generations, rng), partial(self.stretches, rng))
+    def lowest(self, places: IntArray) -> FloatArray:
+        """Return the cost of the best individual of each generation."""
+        individuals = self.summaries[places, 0].astype(np.int64)
+        return np.asarray(self.costs[places, individuals])
 
-    def stretches(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
-        """Yield the initial population, then every other generation; see `Run.stretches`."""
-        self.begin(rng)
-        gathered, index, last = Gathered(), 0, self._ga.num_generations
-        self._gather(gathered, 0, 0, states_behind(rng.bit_generator, 0, 1), read_clock())
-        while index < last:
-            first, index = index, min(index + self.num_places - 1, last)
-            self.go_on(rng, first, index)
-            self._gather(gathered, first + 1, index, self.follow(rng, first, index), read_clock())
-            if gathered.is_full and index < last:
-                yield gathered.stretch(None)
-        yield gathered.stretch(self.population(last % self.num_places, True))
+    def best(self, place: int) -> Candidate:
+        """Return the best individual of a generation."""
+        return self.candidate(place, int(self.summaries[place, 0]))
 
-    def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
-        """Let the generator follow from one generation to another.
-
-        Returns:
-            Its state behind each of those after the first, as it is recorded.
-        """
-        assert self.drawn is not None, "a search that draws otherwise writes its own `follow`"
-        return self.drawn.follow_all(last - first)
-
-    def _gather(
-        self, gathered: Gathered, first: int, last: int, states: list[bytes], time: float
-    ) -> None:
-        """Keep the best of some generations, and gather what is recorded of each of them."""
-        generations, keeper = np.arange(first, last + 1), gathered.keeper
-        places = generations % self.num_places
-        costs, summaries = self.costs[places], self.summaries[places]
-        individuals = summaries[:, 0].astype(np.int64)
-        lowest = costs[generations - first, individuals].tolist()
-        for k, cost in enumerate(lowest):
-            if keeper.improves(cost):
-                keeper.keep(cost, self.candidate(places.item(k), individuals.item(k)))
-                gathered.stand(k)
-            keeper.index += 1
-        _, means, deviations, num_feasible = summaries.T.tolist()
-        gathered.lowest += lowest
-        gathered.means += means
-        gathered.deviations += deviations
-        gathered.num_feasible += map(int, num_feasible)
-        each = self._ga.num_offspring if first else self._ga.population_size
-        evaluations = [keeper.evaluations + each * (k + 1) for k in range(len(places))]
-        keeper.evaluations = evaluations[-1]
-        gathered.evaluations += evaluations
-        gathered.collision_queries += [count * self.queries_each for count in evaluations]
-        gathered.add_costs(costs)
-        gathered.states += states
-        gathered.times += [time] * len(states)
+    def counts(self, index: int) -> tuple[int, int]:
+        """Return the individuals that are evaluated, and configurations for each of them."""
+        count = self._ga.num_offspring if index else self._ga.population_size
+        return count, count * self.queries_each
 
     def keep(self, keeper: Keeper, place: int) -> None:
         """Keep the best individual of a generation if it is better than all before."""
-        individual = int(self.summaries[place, 0])
-        lowest = self.costs.item(place, individual)
+        lowest = self.costs.item(place, int(self.summaries[place, 0]))
         if keeper.improves(lowest):
-            keeper.keep(lowest, self.candidate(place, individual))
+            keeper.keep(lowest, self.best(place))
 
     def record(self, keeper: Keeper, place: int, evaluated: int, is_last: bool) -> Generation:
         """Keep the best individual, and return the record of its generation; see `Stretches`."""
@@ -202,10 +233,6 @@ class IndividualStretches(Stretches):
     @abstractmethod
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return an individual as it is recorded."""
-
-    @abstractmethod
-    def population(self, place: int, is_last: bool) -> NDArray[Any]:
-        """Return the population at a place; that of the last generation is hashed."""
 
 
 class BlockStretches(IndividualStretches):

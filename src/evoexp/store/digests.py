@@ -1,7 +1,8 @@
 """The chain of digests, which tells from which generation on two runs differ; that of a log."""
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cached_property
 from itertools import chain
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from evoexp.numeric.generator_memory import state_reader
+from evoexp.numeric.generator_memory import demand_pcg64, state_reader
 from evoexp.store.container_writer import Messages
 
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
@@ -30,12 +31,13 @@ class Chain:
         Raises:
             TypeError: Another bit generator: its state has another layout.
         """
-        self._state = state_reader(rng.bit_generator)
-        self.link = b""
+        demand_pcg64(rng.bit_generator)
+        self._rng, self.link = rng, b""
 
-    def state(self) -> bytes:
-        """Return the state of the generator now, for `extend`."""
-        return self._state()
+    @cached_property
+    def state(self) -> Callable[[], bytes]:
+        """Returns the state of the generator now, for `extend`."""
+        return state_reader(self._rng.bit_generator)
 
     def extend(
         self, costs: Iterable[bytes], best: Iterable[bytes], states: Iterable[bytes]

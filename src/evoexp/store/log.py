@@ -128,7 +128,6 @@ class Log:
         # column) of all terms; the bytes of the costs; whether these are floats, whose NaNs have
         # the bits that they had; `array_bytes` of the best; the generator's state; CPU time [ns].
         self._pending: list[tuple[Any, ...]] = []
-        self._state = self._chain.state
         self._best_bytes = b""  # array_bytes of the best so far
         self._best = self._written = (
             b""  # of the generation encoded last, and of the last solution written
@@ -176,7 +175,7 @@ class Log:
                 costs.tobytes() if are_floats else array_bytes(costs),
                 are_floats,
                 self._best_bytes,
-                self._state(),
+                self._chain.state(),
                 int(cpu_s * 1e9),
             )
         )
@@ -187,9 +186,7 @@ class Log:
             self._send()  # an attachment comes behind the chunks that end before it
             for name, array in sorted(generation.arrays.items()):
                 self._writer.add_attachment(name + ARRAY, array_file(array))
-        if generation.criteria is not None:
-            for population, criteria in enumerate(generation.criteria):
-                self.write_front(FrontRow(generation.index, population, criteria.T))
+        self._write_fronts(generation)
 
     def write_stretch(self, stretch: Stretch) -> None:
         """Append generations as `write` does one by one, in half the time.
@@ -213,6 +210,7 @@ class Log:
         self._append(data, indices, cpu, places, solutions, best_costs)
         self._last, self._best_bytes = stretch.last(), solutions[-1]
         self._send()
+        self._write_fronts(self._last)
 
     def _flush(self) -> None:
         """Encode the generations that wait; a better solution stands behind its generation."""
@@ -279,6 +277,12 @@ class Log:
         channels = map(identities.__getitem__, self._messages.channels)
         self._content.update_all(channels, self._messages)
         self._messages = Messages([], [], [], [], [])
+
+    def _write_fronts(self, generation: Generation) -> None:
+        """Append the fronts of a generation that has some."""
+        if generation.criteria is not None:
+            for population, criteria in enumerate(generation.criteria):
+                self.write_front(FrontRow(generation.index, population, criteria.T))
 
     def write_front(self, front: FrontRow) -> None:
         """Append the front of a population of the generation last written."""
@@ -374,7 +378,8 @@ def _rows_as_bytes(block: NDArray[Any]) -> Iterable[bytes]:
     is_plain = block.dtype.char == "d" and block.size > 0
     if not is_plain or np.isnan(block.item(block.argmin())):  # argmin finds a NaN first
         return map(array_bytes, block)
-    content, size = block.tobytes(), block.itemsize * block.shape[1]
+    content = block.tobytes()
+    size = len(content) // len(block)
     return [content[begin : begin + size] for begin in range(0, len(content), size)]
 
 

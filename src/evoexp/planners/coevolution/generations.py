@@ -18,7 +18,7 @@ from evoexp.planners.coevolution.breeder import Breeder, num_uniforms
 from evoexp.planners.coevolution.kernels import NOT_FINITE, Breeding, breed, evaluate_lines, renew
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.planners.coevolution.teams import Evaluated, Standing, survey
-from evoexp.planners.planner import Keeper
+from evoexp.planners.planner import Candidate, Keeper
 from evoexp.planners.stretches import Stretches, stretch_of
 from evoexp.records import BoolArray, FloatArray, Generation, IntArray
 
@@ -248,6 +248,7 @@ class TeamSearch(Stretches):
         self._most, self._rate = breeder.num_moving * int(numbers.max()), ga.mutation_rate_at
         self._blocked = np.zeros((robots, self._size), dtype=np.int64)
         self._table = Table.room(self.num_places, robots, genes, self._size)
+        self.costs = self._table.costs
         task = Task(
             problem.start,
             problem.goal,
@@ -278,17 +279,46 @@ class TeamSearch(Stretches):
 
     def record(self, keeper: Keeper, place: int, evaluated: int, is_last: bool) -> Generation:
         """Keep the best team of a generation, and return its record."""
-        populations, criteria, own, costs, collisions, teams, team_costs = self._table
-        found = Evaluated(
-            costs[place], criteria[place], own[place], collisions[place], self._blocked
-        )
         best, mean, std, num_feasible = self.summaries[place].tolist()
-        team, statistics = teams[place], CostStatistics(int(best), mean, std)
-        standing = Standing(BestTeam(team, team_costs.item(place)), statistics, int(num_feasible))
+        statistics = CostStatistics(int(best), mean, std)
+        standing = Standing(self._best_team(place), statistics, int(num_feasible))
         recorded: Generation = self._planner.recorded(
-            keeper, self._problem, populations[place], found, standing
+            keeper, self._problem, self._table.populations[place], self._evaluated(place), standing
         )
         return recorded
+
+    def lowest(self, places: IntArray) -> FloatArray:
+        """Return the costs of the best teams."""
+        return np.asarray(self._table.team_costs[places])
+
+    def best(self, place: int) -> Candidate:
+        """Return the best team of a generation."""
+        populations, found = self._table.populations[place], self._evaluated(place)
+        team = self._best_team(place)
+        candidate: Candidate = self._planner.candidate(self._problem, populations, found, team)
+        return candidate
+
+    def counts(self, index: int) -> tuple[int, int]:
+        """Return the individuals of all populations, and the configurations of all teams."""
+        evaluations = len(self._problem.start) * self._size
+        return evaluations, self._planner.queries(self._problem, self._size)
+
+    def population(self, place: int, is_last: bool) -> FloatArray:
+        """Return the populations."""
+        return np.asarray(self._table.populations[place])
+
+    def criteria(self, place: int) -> FloatArray | None:
+        """Return the criteria of all individuals."""
+        return np.asarray(self._table.criteria[place])
+
+    def _best_team(self, place: int) -> BestTeam:
+        return BestTeam(self._table.teams[place], self._table.team_costs.item(place))
+
+    def _evaluated(self, place: int) -> Evaluated:
+        _, criteria, own, costs, collisions, _, _ = self._table
+        return Evaluated(
+            costs[place], criteria[place], own[place], collisions[place], self._blocked
+        )
 
     def _evolve(self, uniforms: FloatArray, first: int, last: int) -> list[int]:
         """Compute generations after one, up to another; return how many numbers each took."""

@@ -20,6 +20,7 @@ from pydantic import model_validator
 from evoexp.collision.models.link_collision import LinkCrossings
 from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
+from evoexp.evolution.best_team import BestTeam
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
@@ -112,7 +113,7 @@ class Coevolution(PlannerDefaults, Component):
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
         at_once = problem.collision.is_lines and self.ga.restart_after is None
         if at_once and not self.answers_are_proven:
-            return TeamSearch(self, problem).generations(rng)
+            return TeamSearch(self, problem).run(rng)
         return self._step_by_step(problem, rng)
 
     def _step_by_step(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
@@ -157,9 +158,7 @@ class Coevolution(PlannerDefaults, Component):
         """
         (robots, _, count), best = populations.shape, standing.best
         if keeper.improves(best.cost):
-            team = best.individuals if best.found else found.costs.argmin(axis=1)
-            solution = self.team_solution(problem, populations, team)
-            keeper.keep(best.cost, Candidate(solution, found.terms_of(team), best.found))
+            keeper.keep(best.cost, self.candidate(problem, populations, found, best))
         return keeper.record(
             standing.statistics,
             found.costs,
@@ -170,6 +169,14 @@ class Coevolution(PlannerDefaults, Component):
             collision_queries=self.queries(problem, count),
             criteria=found.criteria if keeper.index + 1 == self.ga.num_generations else None,
         )
+
+    def candidate(
+        self, problem: Problem, populations: FloatArray, found: Evaluated, best: BestTeam
+    ) -> Candidate:
+        """Return the best team, or the best of every population where no team was found."""
+        team = best.individuals if best.found else found.costs.argmin(axis=1)
+        solution = self.team_solution(problem, populations, team)
+        return Candidate(solution, found.terms_of(team), best.found)
 
     def num_evaluations(self, index: int) -> int:
         """Return the size of each population: elites are judged again, by other collaborators."""

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import itertools
 import math
 import time
 import traceback
@@ -99,39 +100,34 @@ def run_jobs(
     outcomes: list[Outcome] = []
     begun, mean_s = time.perf_counter(), math.inf
     while (done := len(outcomes)) < len(jobs):
-        start = time.perf_counter()
-        if outcomes and start - begun > LONGEST_TASK_S:
+        if outcomes and time.perf_counter() - begun > LONGEST_TASK_S:
             break
-        found = None
-        if mean_s < SHORT_S and limits.timeout_s is None and curves is None:
-            found = _run_together(_alike(jobs[done - 1 :])[1:], limits, in_worker)
-        outcomes += found or [_run_one(jobs[done], limits, in_worker, curves)]
-        new = outcomes[done:]
+        are_short = mean_s < SHORT_S and limits.timeout_s is None and curves is None
+        some = _alike(jobs[done - 1], jobs[done:]) if are_short else []
+        new = _run_together(some, limits, in_worker) if some else None
+        new = new or [_run_one(job, limits, in_worker, curves) for job in some or [jobs[done]]]
+        outcomes += new
         mean_s = sum(each.wall_s for each in new) / len(new)
     return outcomes
 
 
-def _alike(jobs: Sequence[Job]) -> Sequence[Job]:
-    """Return the first jobs that are of one condition: the first one, and some more."""
-    count = 1
-    while count < min(len(jobs), TOGETHER + 1) and jobs[count].condition_id == jobs[0].condition_id:
-        count += 1
-    return jobs[:count]
+def _alike(before: Job, jobs: Sequence[Job]) -> list[Job]:
+    """Return the first jobs that may run together, behind one of the same condition."""
+    alike = itertools.takewhile(lambda job: job.condition_id == before.condition_id, jobs)
+    return list(itertools.islice(alike, TOGETHER))
 
 
 def _run_together(
     jobs: Sequence[Job], limits: ReplicateLimits, in_worker: bool
 ) -> list[Outcome] | None:
-    """Run short replicates of a condition step by step; None: there are none, or one failed."""
-    if not jobs:
-        return None
+    """Run short replicates of a condition step by step; None: one failed."""
     from evoexp.batch.replicate import run_together
 
     start, config_json = time.perf_counter(), jobs[0].condition_json
-    condition = _condition(config_json)
-    planner, problem = condition.prepare()
-    jobs = jobs[: max(1, int(MEMORY // max(planner.memory(problem), 1.0)))]
     try:
+        condition = _condition(config_json)
+        planner, problem = condition.prepare()
+        jobs = jobs[: max(1, int(MEMORY // max(planner.memory(problem), 1.0)))]
         with limited(limits, in_worker=in_worker):
             found = run_together(condition, [job.replicate for job in jobs], config_json)
     except Exception:  # then each runs by itself, and tells its own failure

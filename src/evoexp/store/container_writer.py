@@ -6,6 +6,7 @@ https://mcap.dev/spec: chunks compressed by zstd, indices of all kinds, checksum
 """
 
 import struct
+import threading
 import zlib
 from bisect import bisect_right
 from collections.abc import Mapping
@@ -26,6 +27,16 @@ _COMPRESSION = "zstd"
 LEVEL = 1  # logs take as little room as at zstd's default of 3, in two thirds of the time
 _MEDIA_TYPES = {".json": "application/json"}
 _OTHER = "application/octet-stream"
+
+
+class _OfThread(threading.local):
+    """A compressor that one thread uses for all its files: making one takes longer than a chunk."""
+
+    def __init__(self) -> None:
+        self.compressor = zstandard.ZstdCompressor(LEVEL)
+
+
+_OF_THREAD = _OfThread()
 
 
 class Messages(NamedTuple):
@@ -68,7 +79,6 @@ class ContainerWriter:
         }
         self._first_time, self._last_time = 0, 0
         self._counts: dict[int, int] = {}  # of messages, by channel
-        self._compressor = zstandard.ZstdCompressor(LEVEL)
         self._chunk: list[bytes] = []  # records and parts of records
         self._chunk_length = 0
         self._in_chunk: list[tuple[int, int, int]] = []  # channel, time, offset of messages
@@ -187,7 +197,7 @@ class ContainerWriter:
         if not self._in_chunk:
             return
         content = b"".join(self._chunk)
-        compressed = self._compressor.compress(content)
+        compressed = _OF_THREAD.compressor.compress(content)
         _, times, _ = zip(*self._in_chunk, strict=True)
         span = struct.pack("<QQ", min(times), max(times))
         body = struct.pack("<QI", len(content), zlib.crc32(content)) + _text(_COMPRESSION)

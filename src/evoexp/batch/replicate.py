@@ -115,7 +115,7 @@ class _Replicate:
         return Log(self._condition_id, config_json, self._index, self._rng, files, around)
 
     def _log_together(self, run: Run, begun_s: float) -> "_Evolved":
-        """Log generations many at a time; the last ones wait."""
+        """Log generations many at a time; those of the last stretch wait."""
         first_feasible: int | None = None
         for stretch in run.stretches(lambda: cpu_now() - begun_s):
             if self._waiting is not None:

@@ -5,6 +5,7 @@ if it costs no more. So a comparison with the genetic algorithm tells what selec
 add to this operator.
 """
 
+import functools
 from functools import partial
 from typing import Any, ClassVar
 
@@ -14,10 +15,7 @@ from evoexp.errors import SettingError
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import kernels
-from evoexp.planners.grid_path_ga.climbing_kernels import (
-    Ledger,
-    climb_generations,
-)
+from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_generations
 from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population, candidate_of
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import BLOCK, STRETCH, GridPathGa, Problem, trimmed
@@ -90,15 +88,8 @@ class _Climbing(BlockStretches):
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
         """Make the trials of generations; draw more numbers whenever they do not suffice."""
-        nodes = self._problem.fields.grid.num_nodes
-        arguments = (
-            self._problem.world,
-            self._planner.objective.weights,
-            not self._planner.revisits,
-            self._paths,
-            Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1))),
-            Scratch.of(nodes),
-        )
+        task = self._problem.world, self._planner.objective.weights, not self._planner.revisits
+        arguments = *task, self._paths, *self._scratch
         for generation in range(first + 1, last + 1):
             until = generation * self._ga.num_offspring
             while True:
@@ -107,6 +98,12 @@ class _Climbing(BlockStretches):
                     break
                 self.draw_for(rng, generation - 1)
             self._note(generation % self.num_places)
+
+    @functools.cached_property
+    def _scratch(self) -> tuple[Population, Scratch]:
+        nodes = self._problem.fields.grid.num_nodes
+        one = Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1)))
+        return one, Scratch.of(nodes)
 
     def _note(self, place: int) -> None:
         """Write to a place how the paths are now."""

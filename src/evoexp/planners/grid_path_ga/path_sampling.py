@@ -33,6 +33,28 @@ STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are dra
 FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 
 
+class Drawing(NamedTuple):
+    """Random walks, and what is written of them.
+
+    Attributes:
+        choices: See `walk_all`, as for `ends`, `blocks` and `exits`.
+        ends: Indices of start and goal.
+        blocks: Words of the first block, and of each further one.
+        tolls: Of moves and nodes.
+        exits: Written.
+        sums: Along each path, written.
+        paths: (paths, nodes + 1) written, see `follow_all`.
+    """
+
+    choices: Choices
+    ends: tuple[int, int]
+    blocks: tuple[int, int]
+    tolls: Tolls
+    exits: Exits
+    sums: Sums
+    paths: NodeArray
+
+
 class PathSampling:
     """Draws random paths without loops of one problem from one generator."""
 
@@ -103,15 +125,10 @@ class PathSampling:
             raise ValueError(f"count must be 1..{len(self._paths)}, was {count}")
         problem, paths = self._problem, self._paths[:count]
         self._twin.meet()
-        longest = kernel(
-            self._twin.words,
-            problem.choices,
-            problem.ends,
-            (first_words(count, self._fewest), FEW_WORDS),
-            problem.world.tolls,
-            Drawn(self._exits, self._sums, paths),
-            *arguments,
-        )
+        blocks = first_words(count, self._fewest), FEW_WORDS
+        task = problem.choices, problem.ends, blocks, problem.world.tolls
+        drawing = Drawing(*task, self._exits, self._sums, paths)
+        longest = kernel(self._twin.words, drawing, *arguments)
         self._twin.follow(self._twin.words)
         return paths[:, : longest + 1]
 
@@ -173,36 +190,15 @@ class RandomPaths(IndividualStretches):
         return self._paths
 
 
-class Drawn(NamedTuple):
-    """Random paths, written as they are drawn.
-
-    Attributes:
-        exits: See `walk_all`.
-        sums: Along each path.
-        paths: (paths, nodes + 1), see `follow_all`.
-    """
-
-    exits: Exits
-    sums: Sums
-    paths: NodeArray
-
-
 def first_words(count: int, fewest: int) -> int:
     """Return how many random words are drawn at first for walks of so many steps at least."""
     return WORDS * (int(STEPS_PER_WALK * count * fewest / LANES) + 1)
 
 
 @kernel
-def _draw(
-    words: Words,
-    choices: Choices,
-    ends: tuple[int, int],
-    blocks: tuple[int, int],
-    tolls: Tolls,
-    memory: Drawn,
-) -> int:
+def _draw(words: Words, drawing: Drawing) -> int:
     """Run the kernel of `PathSampling.draw`; return the number of nodes of the longest path."""
-    exits, sums, paths = memory
+    choices, ends, blocks, tolls, exits, sums, paths = drawing
     walk_all(words, choices, ends, blocks, len(paths), exits)
     longest: int = follow_all(exits, ends, tolls, paths, sums)
     return longest
@@ -211,11 +207,7 @@ def _draw(
 @kernel
 def _draw_generations(
     words: Words,
-    choices: Choices,
-    ends: tuple[int, int],
-    blocks: tuple[int, int],
-    tolls: Tolls,
-    memory: Drawn,
+    drawing: Drawing,
     weights: tuple[float, float],
     span: tuple[int, int],
     found: Population,
@@ -223,13 +215,12 @@ def _draw_generations(
     states: Words,
 ) -> int:
     """Run the kernel of `PathSampling.draw_generations`; return the same of the last generation."""
-    choices, tolls, memory, found = borrowed((choices, tolls, memory, found))
-    summaries, states = borrowed((summaries, states))
-    paths, sums, longest = memory.paths, memory.sums, 0
+    drawing, found, summaries, states = borrowed((drawing, found, summaries, states))
+    paths, sums, longest = drawing.paths, drawing.sums, 0
     results = np.empty((RESULTS, len(paths)))
     for generation in range(span[0], span[1] + 1):
         place = generation % len(summaries)
-        longest = _draw(words, choices, ends, blocks, tolls, memory)
+        longest = _draw(words, drawing)
         states[place, 0], states[place, 1] = words[0], words[1]
         for k in range(len(paths)):
             distance, mean = length_and_mean(paths[k, 0], sums.moves[k], sums.levels[k])

@@ -36,6 +36,7 @@ class Mask(Protocol):
     """Eight truth values, of a comparison of vectors."""
 
     def __and__(self, other: "Mask | bool") -> "Mask": ...
+    def __or__(self, other: "Mask") -> "Mask": ...
 
 
 class Vector(Protocol):
@@ -50,17 +51,22 @@ class Vector(Protocol):
     def __truediv__(self, other: "Vector | float") -> "Vector": ...
     def __rtruediv__(self, other: float) -> "Vector": ...
     def __lt__(self, other: "Vector | float") -> Mask: ...
+    def __le__(self, other: "Vector | float") -> Mask: ...
     def __gt__(self, other: "Vector | float") -> Mask: ...
+    def __ge__(self, other: "Vector | float") -> Mask: ...
 
 
 class Singles(Protocol):
     """Eight float32, for what may be rough: half the work of a `Vector`."""
 
-    def __add__(self, other: "Singles") -> "Singles": ...
-    def __sub__(self, other: "Singles") -> "Singles": ...
-    def __mul__(self, other: "Singles") -> "Singles": ...
+    def __add__(self, other: "Singles | np.float32") -> "Singles": ...
+    def __radd__(self, other: np.float32) -> "Singles": ...
+    def __sub__(self, other: "Singles | np.float32") -> "Singles": ...
+    def __rsub__(self, other: np.float32) -> "Singles": ...
+    def __mul__(self, other: "Singles | np.float32") -> "Singles": ...
     def __rmul__(self, other: np.float32) -> "Singles": ...
     def __lt__(self, other: "Singles | np.float32") -> Mask: ...
+    def __le__(self, other: "Singles | np.float32") -> Mask: ...
 
 
 class _VectorType(types.Type):
@@ -146,24 +152,20 @@ def _define_operators() -> None:
     for operation, instruction in of_words.items():
         _define(operation, word_type, types.int64, word_type, instruction)
 
-    def less(builder: Any, one: Any, two: Any) -> Any:
-        return builder.fcmp_ordered("<", one, two)
-
-    def greater(builder: Any, one: Any, two: Any) -> Any:
-        return builder.fcmp_ordered(">", one, two)
-
-    def equal(builder: Any, one: Any, two: Any) -> Any:
-        return builder.fcmp_ordered("==", one, two)
+    def comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
+        return lambda builder, one, two: builder.fcmp_ordered(sign, one, two)
 
     def unequal(builder: Any, one: Any, two: Any) -> Any:
         return builder.icmp_signed("!=", one, two)
 
-    _define(operator.lt, vector_type, types.float64, mask_type, less)
-    _define(operator.gt, vector_type, types.float64, mask_type, greater)
-    _define(operator.lt, single_type, types.float32, mask_type, less)
-    _define(operator.eq, vector_type, types.float64, mask_type, equal)
+    comparisons = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+    for sign, operation in comparisons.items():
+        _define(operation, vector_type, types.float64, mask_type, comparison(sign))
+        _define(operation, single_type, types.float32, mask_type, comparison(sign))
+    _define(operator.eq, vector_type, types.float64, mask_type, comparison("=="))
     _define(operator.ne, word_type, types.int64, mask_type, unequal)
     _define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
+    _define(operator.or_, mask_type, types.boolean, mask_type, ir.IRBuilder.or_)
 
 
 _define_operators()
@@ -257,15 +259,6 @@ def _select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
 
 
 @intrinsic
-def _any_lane(typing_context: Any, mask: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        word = builder.bitcast(arguments[0], ir.IntType(LANES))
-        return builder.icmp_unsigned("!=", word, ir.Constant(ir.IntType(LANES), 0))
-
-    return types.boolean(mask_type), generate
-
-
-@intrinsic
 def _mask_bits(typing_context: Any, mask: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = builder.bitcast(arguments[0], ir.IntType(LANES))
@@ -295,14 +288,18 @@ def _of_llvm(name: str) -> Any:
 
     @intrinsic
     def operation(typing_context: Any, vector: Any) -> Any:
+        single = vector == single_type
+        lanes, kind = (_SINGLES, single_type) if single else (_DOUBLES, vector_type)
+
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            kind = ir.FunctionType(_DOUBLES, [_DOUBLES])
             function = cgutils.get_or_insert_function(
-                builder.module, kind, f"llvm.{name}.v{LANES}f64"
+                builder.module,
+                ir.FunctionType(lanes, [lanes]),
+                f"llvm.{name}.v{LANES}f{32 if single else 64}",
             )
             return builder.call(function, arguments)
 
-        return vector_type(vector_type), generate
+        return kind(kind), generate
 
     return operation
 
@@ -353,9 +350,6 @@ spread_single: Callable[[np.float32], Singles] = _for_kernels(_spread_scalar)
 select: Callable[[Any, Any, Any], Any] = _for_kernels(_select)
 """Return the first value in lanes where a condition holds, the second in the others."""
 
-any_lane: Callable[[Mask], bool] = _for_kernels(_any_lane)
-"""Return whether a condition holds in any lane."""
-
 mask_bits: Callable[[Mask], int] = _for_kernels(_mask_bits)
 """Return the lanes in which a condition holds as the bits of a whole number, the first lowest."""
 
@@ -365,8 +359,8 @@ least_lane: Callable[[Vector], float] = _for_kernels(_least_lane)
 root: Callable[[Vector], Vector] = _of_llvm("sqrt")
 """Return the square root of every lane, correctly rounded."""
 
-magnitude: Callable[[Vector], Vector] = _of_llvm("fabs")
-"""Return the absolute value of every lane."""
+magnitude: Callable[[Any], Any] = _of_llvm("fabs")
+"""Return the absolute value of every lane of a vector or of singles."""
 
 ceiling: Callable[[Vector], Vector] = _of_llvm("ceil")
 """Return the least whole number not below the value of every lane."""
@@ -397,3 +391,9 @@ def upper(one: Vector, two: Vector) -> Vector:
     """Return the greater of two numbers, lane by lane; the first where either is NaN."""
     found: Vector = select(one < two, two, one)
     return found
+
+
+@inlined
+def any_lane(mask: Mask) -> bool:
+    """Return whether a condition holds in any lane."""
+    return mask_bits(mask) != 0

@@ -4,9 +4,8 @@ As in `link_crossing_kernels`, all follows from what each individual has on its 
 cross and four dot products of the arms' directions; here the directions are unit vectors, so that
 line functions are distances [length unit of the scene]. A pair's configuration takes some 260
 operations in single precision for its sixteen pairs of boundary lines, eight of a circle and a
-line, and one of two circles; cases that rounding leaves open are decided in double precision, the
-lines exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs,
-nearly all of them this loop, which no longer fits the registers.
+line, and one of two circles, for eight individuals at a time (`numeric.vectors`); cases that
+rounding leaves open are decided in double precision, the lines exactly.
 
 Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, of the second x, y.
 """
@@ -17,19 +16,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evoexp.collision.models.crossing_blocks import add_where, greater, lesser
 from evoexp.collision.models.envelope_contact import Envelope, colliding
 from evoexp.collision.models.link_crossing_kernels import Point, directions, sum_counts
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.vectors import LANES, Singles, load_singles, magnitude, spread_single
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
-LANES = 104
-
 ROWS = 8
-"""Rows of a table: direction of link 1 (x, y), of link 2 (x, y), and where the other's base lies
-across and along either link."""
+"""Vectors of a block in a configuration: direction of link 1 (x, y), of link 2 (x, y), and where
+the other's base lies across and along either link."""
 
-_ONE, _MANY, _NONE = np.int32(1), np.int32(65536), np.int32(0)
 _ZERO = np.float32(0.0)
 _UNIT = 2.0**-24
 _FLOOR = 2.0**-100
@@ -118,9 +116,9 @@ def _fill_table(
     scale: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Write the table of some individuals; (dx, dy) leads from their base to the other's.
+    """Write the blocks of some individuals; (dx, dy) leads from their base to the other's.
 
-    Lanes without an individual repeat the last one.
+    The last block is filled up by copies of the last individual.
     """
     num_configurations = outline.shape[0]
     first = lengths[0] * scale
@@ -129,7 +127,7 @@ def _fill_table(
         count = min(LANES, len(members) - block * LANES)
         for k in range(num_configurations):
             o = U((block * num_configurations + k) * ROWS * LANES)
-            for lane in range((count + 7) // 8 * 8):
+            for lane in range(LANES):
                 n, at = members[block * LANES + min(lane, count - 1)], o + U(lane)
                 c, s, d, t = outline[k, 4, n], outline[k, 5, n], outline[k, 6, n], outline[k, 7, n]
                 x, y = dx - first * c, dy - first * s  # from the elbow
@@ -143,25 +141,25 @@ def _fill_table(
                 out[at + U(7 * LANES)] = np.float32(d * x + t * y)
 
 
-@kernel
-def _apart(p: np.float32, q: np.float32, least: np.float32) -> np.float32:
+@inlined
+def _apart(p: Singles, q: Singles, least: Singles) -> Singles:
     """Return the lesser of `least` and the greater of two sign products."""
-    r = p if p > q else q
-    return r if r < least else least
+    found: Singles = lesser(least, greater(q, p))
+    return found
 
 
-@kernel
+@inlined
 def _lines(
-    across: np.float32,
-    turned: np.float32,
-    sine: np.float32,
-    cosine: np.float32,
+    across: Singles,
+    turned: Singles,
+    sine: Singles,
+    cosine: Singles,
     length_1: np.float32,
     half_1: np.float32,
     length_2: np.float32,
     half_2: np.float32,
-    least: np.float32,
-) -> np.float32:
+    least: Singles,
+) -> Singles:
     """Lower `least` to the greater sign product of each pair of two links' boundary lines.
 
     Args:
@@ -188,70 +186,73 @@ def _lines(
     return _apart(d * (d + step), h * (h - fall), least)
 
 
-@kernel
+@inlined
 def _circle(
-    across: np.float32,
-    along: np.float32,
+    across: Singles,
+    along: Singles,
     length: np.float32,
     half_width: np.float32,
     squared_radius: np.float32,
-    least: np.float32,
-) -> np.float32:
+    least: Singles,
+) -> Singles:
     """Lower `least` to distance² − radius² of a circle and a link's nearer boundary line."""
-    off, beyond = abs(across) - half_width, along - length
-    out = beyond if beyond > -along else -along
-    out = out if out > _ZERO else _ZERO
-    value = off * off + out * out - squared_radius
-    return value if value < least else least
+    off = magnitude(across) - half_width
+    out = greater(greater(_ZERO - along, along - length), spread_single(_ZERO))
+    return lesser(least, off * off + out * out - squared_radius)
 
 
-@kernel
-def _add_collisions(
+@inlined
+def _least_quantity(
     one: NDArray[np.float32],
     s: np.uint64,
     two: NDArray[np.float32],
     o: np.uint64,
-    lanes: int,
     sizes: Sizes,
-    tau: np.float32,
-    seen: NDArray[np.int32],
-) -> None:
-    """Add one configuration of an individual (at s) against a block (at o) to `seen`."""
-    low = -tau
+) -> Singles:
+    """Return the least of all that tells whether an arm collides with those of a block.
+
+    Args:
+        one: Blocks of arm 1.
+        s: Place of the individual there.
+        two: Blocks of arm 2.
+        o: Place of the block there.
+        sizes: Of both arms.
+
+    Returns:
+        Above 0 where arms are apart, below where they collide.
+    """
     l1, l2, m1, m2 = sizes.l1, sizes.l2, sizes.m1, sizes.m2
     half, wide, squared = sizes.half, sizes.wide, sizes.squared
     other_squared, both_squared = sizes.other_squared, sizes.both_squared
     ax, ay, bx, by = one[s], one[s + U(LANES)], one[s + U(2 * LANES)], one[s + U(3 * LANES)]
     p1, g1 = one[s + U(4 * LANES)], one[s + U(5 * LANES)]
     p2, g2 = one[s + U(6 * LANES)], one[s + U(7 * LANES)]
-    for n in range(lanes):
-        j = o + U(n)
-        vx, vy, wx, wy = two[j], two[j + U(LANES)], two[j + U(2 * LANES)], two[j + U(3 * LANES)]
-        r1, e1 = two[j + U(4 * LANES)], two[j + U(5 * LANES)]
-        r2, e2 = two[j + U(6 * LANES)], two[j + U(7 * LANES)]
-        # sines and cosines of the angles between links
-        c11, c12 = ax * vy - ay * vx, ax * wy - ay * wx
-        c21, c22 = bx * vy - by * vx, bx * wy - by * wx
-        d11, d12 = ax * vx + ay * vy, ax * wx + ay * wy
-        d21, d22 = bx * vx + by * vy, bx * wx + by * wy
-        p12, p22 = p1 + m1 * c11, p2 + m1 * c21  # the other's elbow from the lines of links 1 and 2
-        r12, r22 = r1 - l1 * c11, r2 - l1 * c12  # the own elbow from the other's lines
-        q1, q2 = p12 + m2 * c12, p22 + m2 * c22  # tips
-        t1, t2 = r12 - l2 * c21, r22 - l2 * c22
-        h1, h2 = g1 + m1 * d11 + m2 * d12, g2 + m1 * d21 + m2 * d22  # tips along the links
-        k1, k2 = e1 + l1 * d11 + l2 * d21, e2 + l1 * d12 + l2 * d22
-        # both circles, sixteen pairs of lines, eight pairs of a circle and a line
-        away = h2 - l2
-        least = away * away + q2 * q2 - both_squared
-        least = _lines(p1, r1, c11, d11, l1, half, m1, wide, least)
-        least = _lines(p12, r2, c12, d12, l1, half, m2, wide, least)
-        least = _lines(p2, r12, c21, d21, l2, half, m1, wide, least)
-        least = _lines(p22, r22, c22, d22, l2, half, m2, wide, least)
-        least = _circle(q1, h1, l1, half, other_squared, least)
-        least = _circle(q2, h2, l2, half, other_squared, least)
-        least = _circle(t1, k1, m1, wide, squared, least)
-        least = _circle(t2, k2, m2, wide, squared, least)
-        seen[U(n)] += (_ONE if least < low else _NONE) + (_MANY if least <= tau else _NONE)
+    vx, vy = load_singles(two, o), load_singles(two, o + U(LANES))
+    wx, wy = load_singles(two, o + U(2 * LANES)), load_singles(two, o + U(3 * LANES))
+    r1, e1 = load_singles(two, o + U(4 * LANES)), load_singles(two, o + U(5 * LANES))
+    r2, e2 = load_singles(two, o + U(6 * LANES)), load_singles(two, o + U(7 * LANES))
+    # sines and cosines of the angles between links
+    c11, c12 = ax * vy - ay * vx, ax * wy - ay * wx
+    c21, c22 = bx * vy - by * vx, bx * wy - by * wx
+    d11, d12 = ax * vx + ay * vy, ax * wx + ay * wy
+    d21, d22 = bx * vx + by * vy, bx * wx + by * wy
+    p12, p22 = p1 + m1 * c11, p2 + m1 * c21  # the other's elbow from the lines of links 1 and 2
+    r12, r22 = r1 - l1 * c11, r2 - l1 * c12  # the own elbow from the other's lines
+    q1, q2 = p12 + m2 * c12, p22 + m2 * c22  # tips
+    t1, t2 = r12 - l2 * c21, r22 - l2 * c22
+    h1, h2 = g1 + m1 * d11 + m2 * d12, g2 + m1 * d21 + m2 * d22  # tips along the links
+    k1, k2 = e1 + l1 * d11 + l2 * d21, e2 + l1 * d12 + l2 * d22
+    # both circles, sixteen pairs of lines, eight pairs of a circle and a line
+    away = h2 - l2
+    least = away * away + q2 * q2 - both_squared
+    least = _lines(spread_single(p1), r1, c11, d11, l1, half, m1, wide, least)
+    least = _lines(p12, r2, c12, d12, l1, half, m2, wide, least)
+    least = _lines(spread_single(p2), r12, c21, d21, l2, half, m1, wide, least)
+    least = _lines(p22, r22, c22, d22, l2, half, m2, wide, least)
+    least = _circle(q1, h1, l1, half, other_squared, least)
+    least = _circle(q2, h2, l2, half, other_squared, least)
+    least = _circle(t1, k1, m1, wide, squared, least)
+    return _circle(t2, k2, m2, wide, squared, least)
 
 
 @kernel
@@ -269,30 +270,30 @@ def _count_rows(
     counts: NDArray[np.int16],
 ) -> None:
     """Fill counts[rows, columns] from the tables `one` of population 1 and `two` of the columns."""
-    num_configurations = outline_1.shape[0]
-    seen = np.empty(LANES, dtype=np.int32)
+    one, two = borrowed((one, two))
+    num_configurations, num_columns = outline_1.shape[0], len(columns)
+    size, blocks = num_configurations * ROWS * LANES, (num_columns + LANES - 1) // LANES
+    found = np.empty(2 * LANES * blocks, dtype=np.float32)  # certain collisions, then possible ones
     for row in range(len(rows)):
         i = rows[row]
-        own = (i // LANES) * num_configurations * ROWS * LANES + i % LANES
-        for block in range((len(columns) + LANES - 1) // LANES):
-            first = block * LANES
-            count = min(LANES, len(columns) - first)
-            lanes = (count + 7) // 8 * 8
-            for n in range(lanes):
-                seen[U(n)] = _NONE
+        own = i // LANES * size + i % LANES
+        for n in range(len(found)):
+            found[U(n)] = _ZERO
+        for block in range(blocks):
+            certain, possible = U(block * LANES), U((blocks + block) * LANES)
             for k in range(num_configurations):
-                other = (block * num_configurations + k) * ROWS * LANES
-                _add_collisions(
-                    one, U(own + k * ROWS * LANES), two, U(other), lanes, sizes, tau, seen
-                )
-            # pairs that rounding leaves open are counted anew
-            for n in range(count):
-                j, total = columns[first + n], seen[U(n)] & 0xFFFF
-                if seen[U(n)] >> 16 != total:
-                    total = 0
-                    for k in range(num_configurations):
-                        total += colliding(arm_1, outline_1, i, arm_2, outline_2, j, k)
-                counts[i, j] = total
+                place = k * ROWS * LANES
+                least = _least_quantity(one, U(own + place), two, U(block * size + place), sizes)
+                add_where(least < -tau, found, certain)
+                add_where(least <= tau, found, possible)
+        # pairs that rounding leaves open are counted anew
+        for n in range(num_columns):
+            j, total = columns[n], int(found[U(n)])
+            if found[U(blocks * LANES + n)] != found[U(n)]:
+                total = 0
+                for k in range(num_configurations):
+                    total += colliding(arm_1, outline_1, i, arm_2, outline_2, j, k)
+            counts[i, j] = total
 
 
 @kernel

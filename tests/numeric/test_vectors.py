@@ -23,7 +23,6 @@ from evoexp.numeric.vectors import (
     root,
     select,
     spread,
-    spread_single,
     store,
     store_singles,
     upper,
@@ -124,6 +123,29 @@ def test_conditions_hold_together_in_the_lanes_of_both() -> None:
     assert below_if(x, 3.0, False) == 0
 
 
+COMPARISONS = [operator.lt, operator.le, operator.gt, operator.ge, operator.eq]
+
+
+@pytest.mark.parametrize("comparison", COMPARISONS)
+def test_comparisons_hold_as_those_of_scalars(comparison: Callable[..., Any]) -> None:
+    x, y = some_pairs()
+    x = np.where(np.arange(len(x)) % 3 == 0, y, x)
+    holds = over_lanes(kernel(lambda a, b: select(comparison(a, b), spread(1.0), spread(0.0))))
+    assert same(holds(x, y), comparison(x, y) * 1.0)
+    positive = over_lanes(kernel(lambda a, b: select(comparison(a, 0.0), spread(1.0), spread(0.0))))
+    assert same(positive(x, y), comparison(x, 0.0) * 1.0)
+
+
+def test_one_of_two_conditions_is_enough() -> None:
+    x, y = some_pairs()
+
+    @kernel
+    def outside(a: Any, b: Any) -> Any:
+        return select((a < -1.0) | (b > 1.0), spread(1.0), spread(0.0))
+
+    assert same(over_lanes(outside)(x, y), ((x < -1.0) | (y > 1.0)) * 1.0)
+
+
 def test_sines_and_cosines_have_the_bits_of_scalars() -> None:
     angles = np.concatenate(
         [
@@ -161,19 +183,20 @@ def rough(one: Any, two: Any, factor: np.float32, exact: FloatArray, out: Any) -
     for place in range(0, len(one), LANES):
         at = np.uint64(place)
         a, b = load_singles(one, at), load_singles(two, at)
-        lesser = select(a < b, factor * a - b, a * b + spread_single(factor))
-        store_singles(out, at, lesser)
+        chosen = select(a <= b, factor * a - b, magnitude(a * b) + factor)
+        store_singles(out, at, chosen)
         store_singles(out, np.uint64(len(one) + place), load(exact, at))
 
 
 def test_singles_have_the_bits_of_scalars_and_round_doubles() -> None:
     rng, factor = np.random.default_rng(3), np.float32(1.7)
     one, two = rng.normal(size=(2, 5 * LANES)).astype(np.float32)
+    two[::7] = one[::7]
     exact = rng.normal(size=len(one)) * 10.0 ** rng.integers(-50, 50, len(one))
     out = np.empty(2 * len(one), dtype=np.float32)
     rough(one, two, factor, exact, out)
     with np.errstate(all="ignore"):
-        expected = np.where(one < two, factor * one - two, one * two + factor)
+        expected = np.where(one <= two, factor * one - two, np.abs(one * two) + factor)
         assert np.array_equal(out, np.concatenate([expected, exact.astype(np.float32)]))
 
 

@@ -1,11 +1,12 @@
 """Tests of balls around bodies, parts and obstacles: which configurations must be measured exactly.
 
 Every unit has a ball around it. Obstacles are ruled out first by the ball around them, then by the
-box around them. Bounds are widened by `MARGIN`, so rounding rules out no contact.
+box around them. Bounds are widened by `MARGIN`, so rounding rules out no contact. Eight
+configurations are tested at a time, as vectors (`numeric.vectors`); the answers of up to 64 are the
+bits of a word.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.collision.models.center_kernels import spatial_point
 from evoexp.collision.models.obstacle_kernels import MARGIN
@@ -23,13 +24,29 @@ from evoexp.collision.models.packed_shapes import (
     Units,
 )
 from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.vectors import LANES as EIGHT
+from evoexp.numeric.vectors import (
+    Mask,
+    Vector,
+    load,
+    lower,
+    magnitude,
+    mask_bits,
+    root,
+    spread,
+    store,
+    upper,
+)
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
-LANES = 128
+BATCH = 128
 """Configurations that are judged together: encounters are gathered over all of them."""
 
-Bits = NDArray[np.uint64]  # (LANES,) a word of encounters per configuration
+WORD = 64
+"""Configurations whose answers fit a word of bits."""
+
+Point = tuple[Vector, Vector, Vector]
 
 
 @inlined
@@ -41,22 +58,46 @@ def middles_of_balls(
     Args:
         units: The units.
         frames: (joints + 1 · SPATIAL_FRAME,) frames of the joints and of the world.
-        first: First lane of the eight.
-        middles: (units · 3 · LANES,), written.
+        first: First of the eight in the batch.
+        middles: (units · 3 · BATCH,), written.
     """
     for b in range(len(units.whole)):
-        own, joint = U(b) * U(3 * LANES) + first, units.whole[b, JOINT]
-        spatial_point(frames, joint, units.ball[b], middles, own, U(LANES))
+        own, joint = U(b) * U(3 * BATCH) + first, units.whole[b, JOINT]
+        spatial_point(frames, joint, units.ball[b], middles, own, U(BATCH))
+
+
+@inlined
+def _middle(middles: FloatArray, unit: int, n: int) -> Point:
+    """Return the centres of a unit's ball in eight configurations from n on."""
+    m = U(unit) * U(3 * BATCH) + U(n)
+    return load(middles, m), load(middles, m + U(BATCH)), load(middles, m + U(2 * BATCH))
+
+
+@inlined
+def _height(obstacle: FloatArray, middle: Point) -> tuple[Vector, float]:
+    """Return how high points are above a half-space, and its level along its normal."""
+    nx, ny, nz = obstacle[5], obstacle[8], obstacle[11]
+    level = nx * obstacle[0] + ny * obstacle[1] + nz * obstacle[2]
+    return nx * middle[0] + ny * middle[1] + nz * middle[2] - level, level
+
+
+@inlined
+def _squared_distance(obstacle: FloatArray, middle: Point) -> Vector:
+    """Return the squared distance of points from an obstacle's centre."""
+    x, y, z = middle[0] - obstacle[0], middle[1] - obstacle[1], middle[2] - obstacle[2]
+    square: Vector = x * x + y * y + z * z
+    return square
+
+
+@inlined
+def _bound(distance: Vector, slack: float, scale: Vector) -> Vector:
+    """Return a little more than a distance and a slack."""
+    return distance + slack + scale * (MARGIN - 1.0)
 
 
 @kernel
 def bound_obstacles(
-    lanes: int,
-    units: Units,
-    obstacles: PackedObstacles,
-    middles: FloatArray,
-    least: FloatArray,
-    best: FloatArray,
+    lanes: int, units: Units, obstacles: PackedObstacles, middles: FloatArray, best: FloatArray
 ) -> None:
     """Lower `best` to a little more than an upper bound of the least clearance from obstacles.
 
@@ -65,47 +106,29 @@ def bound_obstacles(
     encounters.
 
     Args:
-        lanes: How many configurations.
+        lanes: How many configurations, a multiple of eight.
         units: The units.
         obstacles: The obstacles.
-        middles: (units · 3 · LANES,).
-        least: (≥ LANES,) scratch.
-        best: (3 · LANES,), the first row lowered.
+        middles: (units · 3 · BATCH,).
+        best: (3 · BATCH,), the first row lowered.
     """
     whole, ball = units.whole, units.ball
     data, listed = obstacles.data, obstacles.listed
     for b in range(len(whole)):
-        m, slack, reach = U(b) * U(3 * LANES), ball[b, SLACK], ball[b, REACH]
-        for n in range(lanes):
-            least[U(n)] = np.inf
-        for t in range(whole[b, FIRST_LISTED], whole[b, STOP_LISTED]):
-            o = listed[t, 0]
-            if listed[t, 1] == HALF_SPACES:
-                nx, ny, nz = data[o, 5], data[o, 8], data[o, 11]
-                level = nx * data[o, 0] + ny * data[o, 1] + nz * data[o, 2]
-                for n in range(lanes):
-                    k, lane = m + U(n), U(n)
-                    height = (
-                        nx * middles[k]
-                        + ny * middles[k + U(LANES)]
-                        + nz * middles[k + U(2 * LANES)]
-                        - level
-                    )
-                    bound = height + slack + (abs(height) + abs(level) + reach) * (MARGIN - 1.0)
-                    best[lane] = bound if bound < best[lane] else best[lane]
-            else:
-                cx, cy, cz = data[o, 0], data[o, 1], data[o, 2]
-                for n in range(lanes):
-                    k, lane = m + U(n), U(n)
-                    x, y = middles[k] - cx, middles[k + U(LANES)] - cy
-                    z = middles[k + U(2 * LANES)] - cz
-                    square = x * x + y * y + z * z
-                    least[lane] = square if square < least[lane] else least[lane]
-        # one square root for the nearest obstacle's centre
-        for n in range(lanes):
-            distance, before = np.sqrt(least[U(n)]), best[U(n)]
-            bound = distance + slack + (distance + reach) * (MARGIN - 1.0)
-            best[U(n)] = bound if bound < before else before
+        slack, reach = ball[b, SLACK], ball[b, REACH]
+        for n in range(0, lanes, EIGHT):
+            middle, square, found = _middle(middles, b, n), spread(np.inf), load(best, U(n))
+            for t in range(whole[b, FIRST_LISTED], whole[b, STOP_LISTED]):
+                obstacle = data[listed[t, 0]]
+                if listed[t, 1] == HALF_SPACES:
+                    height, level = _height(obstacle, middle)
+                    scale = magnitude(height) + abs(level) + reach
+                    found = lower(found, _bound(height, slack, scale))
+                else:
+                    square = lower(square, _squared_distance(obstacle, middle))
+            # one square root for the nearest obstacle's centre
+            distance = root(square)
+            store(best, U(n), lower(found, _bound(distance, slack, distance + reach)))
 
 
 @kernel
@@ -115,186 +138,118 @@ def bound_pairs(
     """Lower `best` to a little more than an upper bound of the clearances of all pairs of units."""
     ball = units.ball
     for p in range(len(pairs)):
-        one, two, row = pairs[p, 0], pairs[p, 1], U(pairs[p, 2]) * U(LANES)
+        one, two, row = pairs[p, 0], pairs[p, 1], U(pairs[p, 2]) * U(BATCH)
         slack, reach = ball[one, SLACK] + ball[two, SLACK], ball[one, REACH] + ball[two, REACH]
-        a, b = U(one) * U(3 * LANES), U(two) * U(3 * LANES)
-        for n in range(lanes):
-            i, j, k = a + U(n), b + U(n), row + U(n)
-            x, y = middles[i] - middles[j], middles[i + U(LANES)] - middles[j + U(LANES)]
-            z = middles[i + U(2 * LANES)] - middles[j + U(2 * LANES)]
-            distance = np.sqrt(x * x + y * y + z * z)
-            bound = distance + slack + (distance + reach) * (MARGIN - 1.0)
-            best[k] = bound if bound < best[k] else best[k]
+        for n in range(0, lanes, EIGHT):
+            distance = root(_squared_between(middles, one, two, n))
+            bound = _bound(distance, slack, distance + reach)
+            store(best, row + U(n), lower(load(best, row + U(n)), bound))
 
 
-@kernel
-def mark_obstacles(
-    lanes: int,
-    b: int,
+@inlined
+def _squared_between(middles: FloatArray, one: int, two: int, n: int) -> Vector:
+    """Return the squared distance of the centres of two units' balls."""
+    a, b = _middle(middles, one, n), _middle(middles, two, n)
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return x * x + y * y + z * z
+
+
+@inlined
+def near_obstacle(
     units: Units,
-    obstacles: PackedObstacles,
+    unit: int,
+    obstacle: FloatArray,
+    kind: int,
     first: int,
     stop: int,
     middles: FloatArray,
     best: FloatArray,
-    bits: Bits,
-) -> bool:
-    """Mark the configurations in which a body's ball may be nearer to obstacles than the best.
+) -> np.uint64:
+    """Return in which configurations a body's ball may be nearer to an obstacle than the best.
 
-    The obstacle's ball is tested first; where it is met in any lane, the box around the obstacle
-    decides.
+    The obstacle's ball is tested first; where it is met in any of the configurations, the box
+    around the obstacle decides.
 
     Args:
-        lanes: How many configurations.
-        b: The body.
         units: The units.
-        obstacles: The obstacles.
-        first: First entry of the obstacles' list.
-        stop: One past the last, at most 64 on.
-        middles: (units · 3 · LANES,).
-        best: Least clearances so far.
-        bits: Written: bit t − first of a lane's word for entry t.
+        unit: The body.
+        obstacle: Its row in `PackedObstacles.data`.
+        kind: Its class.
+        first: First configuration.
+        stop: One past the last, at most `WORD` on.
+        middles: (units · 3 · BATCH,).
+        best: (≥ BATCH,) least clearances so far.
 
     Returns:
-        Whether anything is marked.
+        Bit k for configuration first + k.
     """
-    data, listed = obstacles.data, obstacles.listed
-    reach, m = units.ball[b, REACH], U(b) * U(3 * LANES)
-    bits[:] = U(0)
-    for t in range(first, stop):
-        o, bit = listed[t, 0], U(1) << U(t - first)
-        if listed[t, 1] == HALF_SPACES:
-            _mark_half_space(lanes, data[o], reach, m, middles, best, bit, bits)
-        elif _meets_ball(lanes, data[o], reach, m, middles, best):
-            _mark_box(lanes, data[o], reach, m, middles, best, bit, bits)
-    return _any_marked(lanes, bits)
+    reach, word = units.ball[unit, REACH], U(0)
+    if kind == HALF_SPACES:
+        for n in range(first, stop, EIGHT):
+            height, level = _height(obstacle, _middle(middles, unit, n))
+            margin = reach * MARGIN + abs(level) * (MARGIN - 1.0)
+            word |= U(mask_bits(height < load(best, U(n)) + margin)) << U(n - first)
+        return word
+    around = (reach + obstacle[AROUND]) * MARGIN
+    for n in range(first, stop, EIGHT):
+        within = upper(spread(0.0), (load(best, U(n)) + around) * MARGIN)
+        square = _squared_distance(obstacle, _middle(middles, unit, n))
+        word |= U(mask_bits(square < within * within)) << U(n - first)
+    if word == U(0):
+        return word
+    met, word = word, U(0)
+    thickness = (reach + obstacle[BOX_THICKNESS]) * MARGIN
+    for n in range(first, stop, EIGHT):
+        within = (load(best, U(n)) + thickness) * MARGIN
+        meets = _meets_box(obstacle, _middle(middles, unit, n), within)
+        word |= U(mask_bits(meets)) << U(n - first)
+    return word & met
 
 
-@kernel
-def _any_marked(lanes: int, bits: Bits) -> bool:
-    count = 0
-    for n in range(lanes):
-        count += bits[U(n)] != U(0)
-    return count > 0
+@inlined
+def _meets_box(obstacle: FloatArray, middle: Point, within: Vector) -> Mask:
+    """Return whether points are nearer to the box around an obstacle than `within`."""
+    zero = spread(0.0)
+    x, y, z = middle[0] - obstacle[0], middle[1] - obstacle[1], middle[2] - obstacle[2]
+    u = magnitude(obstacle[3] * x + obstacle[6] * y + obstacle[9] * z) - obstacle[BOX]
+    v = magnitude(obstacle[4] * x + obstacle[7] * y + obstacle[10] * z) - obstacle[BOX + 1]
+    w = magnitude(obstacle[5] * x + obstacle[8] * y + obstacle[11] * z) - obstacle[BOX + 2]
+    deeper = upper(upper(u, v), w) < lower(zero, within)
+    within = upper(zero, within)
+    u, v, w = upper(u, zero), upper(v, zero), upper(w, zero)
+    return (u * u + v * v + w * w < within * within) | deeper
 
 
-@kernel
-def _mark_half_space(
-    lanes: int,
-    obstacle: FloatArray,
-    reach: float,
-    m: np.uint64,
-    middles: FloatArray,
-    best: FloatArray,
-    bit: np.uint64,
-    bits: Bits,
-) -> None:
-    """Mark the lanes in which a unit's ball is lower above a half-space than the best."""
-    nx, ny, nz = obstacle[5], obstacle[8], obstacle[11]
-    level = nx * obstacle[0] + ny * obstacle[1] + nz * obstacle[2]
-    margin = reach * MARGIN + abs(level) * (MARGIN - 1.0)
-    for n in range(lanes):
-        k, lane = m + U(n), U(n)
-        height = (
-            nx * middles[k] + ny * middles[k + U(LANES)] + nz * middles[k + U(2 * LANES)] - level
-        )
-        bits[lane] |= bit if height < best[lane] + margin else U(0)
-
-
-@kernel
-def _meets_ball(
-    lanes: int,
-    obstacle: FloatArray,
-    reach: float,
-    m: np.uint64,
-    middles: FloatArray,
-    best: FloatArray,
-) -> bool:
-    """Return whether a unit's ball meets the ball around an obstacle in any lane."""
-    cx, cy, cz, margin = obstacle[0], obstacle[1], obstacle[2], (reach + obstacle[AROUND]) * MARGIN
-    count = 0
-    for n in range(lanes):
-        k, lane = m + U(n), U(n)
-        x, y, z = middles[k] - cx, middles[k + U(LANES)] - cy, middles[k + U(2 * LANES)] - cz
-        within = (best[lane] + margin) * MARGIN
-        within = within if within > 0.0 else 0.0
-        count += x * x + y * y + z * z < within * within
-    return count > 0
-
-
-@kernel
-def _mark_box(
-    lanes: int,
-    obstacle: FloatArray,
-    reach: float,
-    m: np.uint64,
-    middles: FloatArray,
-    best: FloatArray,
-    bit: np.uint64,
-    bits: Bits,
-) -> None:
-    """Mark the lanes in which a unit's ball is nearer to an obstacle's box than the best."""
-    cx, cy, cz = obstacle[0], obstacle[1], obstacle[2]
-    xx, xy, xz = obstacle[3], obstacle[4], obstacle[5]
-    yx, yy, yz = obstacle[6], obstacle[7], obstacle[8]
-    zx, zy, zz = obstacle[9], obstacle[10], obstacle[11]
-    a, b, c = obstacle[BOX], obstacle[BOX + 1], obstacle[BOX + 2]
-    margin = (reach + obstacle[BOX_THICKNESS]) * MARGIN
-    for n in range(lanes):
-        k, lane = m + U(n), U(n)
-        x, y, z = middles[k] - cx, middles[k + U(LANES)] - cy, middles[k + U(2 * LANES)] - cz
-        u = abs(xx * x + yx * y + zx * z) - a
-        v = abs(xy * x + yy * y + zy * z) - b
-        w = abs(xz * x + yz * y + zz * z) - c
-        within = (best[lane] + margin) * MARGIN
-        inside = u if u > v else v
-        inside = inside if inside > w else w
-        deeper = inside < (within if within < 0.0 else 0.0)
-        within = within if within > 0.0 else 0.0
-        u = u if u > 0.0 else 0.0
-        v = v if v > 0.0 else 0.0
-        w = w if w > 0.0 else 0.0
-        near = u * u + v * v + w * w < within * within
-        bits[lane] |= bit if near | deeper else U(0)
-
-
-@kernel
-def mark_pairs(
-    lanes: int,
+@inlined
+def near_pair(
     units: Units,
-    pairs: IntArray,
+    one: int,
+    two: int,
+    row: int,
     first: int,
     stop: int,
     middles: FloatArray,
     best: FloatArray,
-    bits: Bits,
-) -> bool:
-    """Mark the configurations in which two units may be nearer than the best so far.
+) -> np.uint64:
+    """Return in which configurations two units may be nearer than the best so far.
 
     Args:
-        lanes: How many configurations.
         units: The units.
-        pairs: (pairs, 3).
-        first: First pair.
-        stop: One past the last, at most 64 on.
-        middles: (units · 3 · LANES,).
-        best: Least clearances so far.
-        bits: Written: bit p − first of a lane's word for pair p.
+        one: One of them.
+        two: The other.
+        row: Row of `best`.
+        first: First configuration.
+        stop: One past the last, at most `WORD` on.
+        middles: (units · 3 · BATCH,).
+        best: (3 · BATCH,) least clearances so far.
 
     Returns:
-        Whether anything is marked.
+        Bit k for configuration first + k.
     """
-    ball = units.ball
-    bits[:] = U(0)
-    for p in range(first, stop):
-        one, two, r = pairs[p, 0], pairs[p, 1], U(pairs[p, 2]) * U(LANES)
-        a, b = U(one) * U(3 * LANES), U(two) * U(3 * LANES)
-        margin, bit = (ball[one, REACH] + ball[two, REACH]) * MARGIN, U(1) << U(p - first)
-        for n in range(lanes):
-            i, j, lane = a + U(n), b + U(n), U(n)
-            x, y = middles[i] - middles[j], middles[i + U(LANES)] - middles[j + U(LANES)]
-            z = middles[i + U(2 * LANES)] - middles[j + U(2 * LANES)]
-            within = (best[r + lane] + margin) * MARGIN
-            within = within if within > 0.0 else 0.0
-            bits[lane] |= bit if x * x + y * y + z * z < within * within else U(0)
-    return _any_marked(lanes, bits)
+    margin, word = (units.ball[one, REACH] + units.ball[two, REACH]) * MARGIN, U(0)
+    for n in range(first, stop, EIGHT):
+        so_far = load(best, U(row * BATCH + n))
+        within = upper(spread(0.0), (so_far + margin) * MARGIN)
+        square = _squared_between(middles, one, two, n)
+        word |= U(mask_bits(square < within * within)) << U(n - first)
+    return word

@@ -1,12 +1,15 @@
 """Kernels of encounters: the shapes of a body against obstacles, or against another body's.
 
 An encounter is a configuration of the batch in which a body is near an obstacle or another body.
-Its frames are gathered here; its distances are measured by `primitive_distances` and
-`segment_distances`.
+Encounters are listed (`Encounters`) and measured eight at a time: their frames are gathered here;
+their distances come from `primitive_distances` and `segment_distances`.
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
-from numpy.typing import NDArray
+from numba.core import types
+from numba.extending import intrinsic
 
 from evoexp.collision.models.packed_shapes import (
     BOXES,
@@ -23,208 +26,261 @@ from evoexp.collision.models.packed_shapes import (
     Units,
 )
 from evoexp.collision.models.primitive_distances import (
-    AXES,
-    BASE,
-    CENTERS,
-    CORE,
-    FRAME,
-    MOTION,
-    STARTS,
-    VALUE,
-    W,
-    move,
+    Core,
+    Motion,
+    Row,
+    center_at,
+    move_spheres,
+    moved_point,
     spheres_to_boxes,
     spheres_to_cylinders,
     spheres_to_half_spaces,
     spheres_to_spheres,
+    turned,
 )
 from evoexp.collision.models.segment_distances import (
-    segment_to_boxes,
-    segment_to_cylinders,
-    segment_to_half_spaces,
+    Segments,
     segment_to_points,
     segment_to_segments,
+    segments_to_boxes,
+    segments_to_cylinders,
+    segments_to_half_spaces,
     segments_to_point,
 )
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import inlined
+from evoexp.numeric.vector_rows import Places, load_each, load_quads
+from evoexp.numeric.vectors import LANES, Vector, spread
 from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
-from evoexp.robots.kinematics import SPATIAL_ROWS, U
+from evoexp.robots.kinematics import U
 
 
-@kernel
+def _trailing_zeros() -> Any:
+    """Return a function for kernels: the index of the lowest bit that is set."""
+
+    @intrinsic
+    def lowest_bit(typing_context: Any, value: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.cttz(arguments[0], context.get_constant(types.boolean, True))
+
+        return types.uint64(types.uint64), generate
+
+    return lowest_bit
+
+
+_lowest_bit = _trailing_zeros()
+
+
+class Encounters(NamedTuple):
+    """Lists of encounters.
+
+    Attributes:
+        lanes: Configurations of the batch.
+        frames: Where their frames stand.
+        obstacles: Where their obstacles stand in `PackedObstacles.data`.
+    """
+
+    lanes: Places
+    frames: Places
+    obstacles: Places
+
+
+@inlined
+def listed_from(
+    word: np.uint64, first: int, size: np.uint64, obstacle: np.uint64, end: int, near: Encounters
+) -> int:
+    """List the encounters of a word of bits; see `ball_tests`.
+
+    Args:
+        word: Bit k for configuration first + k.
+        first: First configuration.
+        size: Numbers of the frames of eight configurations.
+        obstacle: Place of the obstacle; 0 for pairs of bodies.
+        end: One past the last encounter that is listed.
+        near: Written from there on.
+
+    Returns:
+        One past the last one now.
+    """
+    while word != U(0):
+        lane = U(first) + _lowest_bit(word)
+        word &= word - U(1)
+        near.lanes[U(end)] = lane
+        near.frames[U(end)] = lane // VECTOR * size + lane % VECTOR
+        near.obstacles[U(end)] = obstacle
+        end += 1
+    return end
+
+
+@inlined
+def filled_up(begin: int, end: int, near: Encounters) -> None:
+    """Repeat the last encounter of a list until their number is a multiple of eight."""
+    last, stop = U(end - 1), begin + (end - begin + LANES - 1) // LANES * LANES
+    for k in range(end, stop):
+        near.lanes[U(k)] = near.lanes[last]
+        near.frames[U(k)] = near.frames[last]
+        near.obstacles[U(k)] = near.obstacles[last]
+
+
+@inlined
 def body_meets_obstacles(
-    width: int,
-    c: int,
+    at: int,
+    kind: int,
     unit: int,
     units: Units,
     shapes: PackedShapes,
     obstacles: PackedObstacles,
-    lane_of: NDArray[np.uint64],
-    obstacle_of: NDArray[np.uint64],
+    near: Encounters,
     frames: FloatArray,
-    place: NDArray[np.uint64],
-    work: FloatArray,
-    best: FloatArray,
-) -> None:
-    """Lower `best` to the clearances of a body from obstacles of one class.
+) -> Vector:
+    """Return the clearances of a body from obstacles of one class, in eight encounters.
 
     Args:
-        width: Encounters.
-        c: Class of the obstacles.
+        at: First encounter of the list.
+        kind: Class of the obstacles.
         unit: The body.
         units: Bodies and parts.
         shapes: Their shapes.
         obstacles: The obstacles.
-        lane_of: (width,) lanes of the encounters.
-        obstacle_of: (width,) obstacles of the encounters.
+        near: The list.
         frames: Frames of all joints and blocks.
-        place: (lanes,) offset of each lane in `frames`.
-        work: Scratch.
-        best: Lowered.
     """
     runs, spheres, capsules = shapes.runs, shapes.spheres, shapes.capsules
-    whole = units.whole
-    # the body's frame and the obstacle's, and the motion from one to the other
-    _gather(width, whole[unit, JOINT], lane_of, frames, place, FRAME, work)
-    _gather_obstacles(width, obstacles.data, obstacle_of, work)
-    _relative(width, work)
+    whole, least = units.whole, spread(np.inf)
+    # the motion from the body's frame to the obstacle's
+    data, places, k = obstacles.data, near.obstacles, U(at)
+    x, y, z, xx = load_quads(data, places, k, U(0))
+    xy, xz, yx, yy = load_quads(data, places, k, U(TURN + 1))
+    yz, zx, zy, zz = load_quads(data, places, k, U(TURN + 5))
+    core: Core = load_quads(data, places, k, U(CORE_SIZE))
+    frame = _gathered(whole[unit, JOINT], frames, near, at)
+    motion = _relative((xx, xy, xz, x), (yx, yy, yz, y), (zx, zy, zz, z), frame)
     # spheres, then capsules
     first, stop = whole[unit, FIRST_RUN], whole[unit, STOP_RUN]
     if first < stop:
-        if c == BOXES:
-            spheres_to_boxes(width, runs, spheres, first, stop, work)
-        elif c == CYLINDERS:
-            spheres_to_cylinders(width, runs, spheres, first, stop, work)
+        if kind == BOXES:
+            least = spheres_to_boxes(motion, core, runs, spheres, first, stop, least)
+        elif kind == CYLINDERS:
+            least = spheres_to_cylinders(motion, core, runs, spheres, first, stop, least)
         else:
-            spheres_to_half_spaces(width, runs, spheres, first, stop, work)
+            least = spheres_to_half_spaces(motion, runs, spheres, first, stop, least)
     for i in range(whole[unit, FIRST_CAPSULE], whole[unit, STOP_CAPSULE]):
-        _move_segment(width, capsules[i], work)
-        if c == BOXES:
-            segment_to_boxes(width, capsules[i, 6], work)
-        elif c == CYLINDERS:
-            segment_to_cylinders(width, capsules[i, 6], work)
+        segments = _moved_axis(motion, capsules[i])
+        if kind == BOXES:
+            least = segments_to_boxes(segments, capsules[i, 6], core, least)
+        elif kind == CYLINDERS:
+            least = segments_to_cylinders(segments, capsules[i, 6], core, least)
         else:
-            segment_to_half_spaces(width, capsules[i, 6], work)
-    for n in range(width):
-        lane = lane_of[U(n)]
-        best[lane] = min(best[lane], work[VALUE + U(n)])
+            least = segments_to_half_spaces(segments, capsules[i, 6], least)
+    return least
 
 
-@kernel
+@inlined
 def body_meets_body(
-    width: int,
+    at: int,
     one: int,
     two: int,
     units: Units,
     shapes: PackedShapes,
-    lane_of: NDArray[np.uint64],
+    near: Encounters,
     frames: FloatArray,
-    place: NDArray[np.uint64],
-    work: FloatArray,
-) -> None:
-    """Write the clearances of two bodies to VALUE, as seen from the first one's frame.
+    centers: FloatArray,
+) -> Vector:
+    """Return the clearances of two bodies in eight encounters, as seen from the first one's frame.
 
     Args:
-        width: Encounters.
+        at: First encounter of the list.
         one: First unit, whose shapes are constants.
         two: Second unit.
         units: See `body_meets_obstacles`, as for the next.
         shapes: See there.
-        lane_of: (width,) lanes of the encounters.
+        near: The list.
         frames: Frames of all joints and blocks.
-        place: (lanes,) offset of each lane in `frames`.
-        work: Scratch.
+        centers: (≥ most · POINT,) scratch.
     """
     runs, spheres, capsules = shapes.runs, shapes.spheres, shapes.capsules
-    whole = units.whole
-    # both bodies' frames, and the motion from the second's to the first's
-    _gather(width, whole[one, JOINT], lane_of, frames, place, BASE, work)
-    _gather(width, whole[two, JOINT], lane_of, frames, place, FRAME, work)
-    _relative(width, work)
+    whole, least = units.whole, spread(np.inf)
+    # the motion from the second body's frame to the first's
+    x, y, z = _gathered(whole[one, JOINT], frames, near, at)
+    motion = _relative(x, y, z, _gathered(whole[two, JOINT], frames, near, at))
     first, stop = whole[two, FIRST_RUN], whole[two, STOP_RUN]
     begin, end = (runs[first, 0], runs[stop - 1, 1]) if first < stop else (0, 0)
     rods, own_rods = whole[two, FIRST_CAPSULE], whole[one, FIRST_CAPSULE]
-    for j in range(begin, end):
-        x, y, z = spheres[j, 0], spheres[j, 1], spheres[j, 2]
-        move(width, x, y, z, 1.0, CENTERS + U(j - begin) * U(3) * W, work)
+    move_spheres(motion, spheres, begin, end, centers)
     # the second's spheres against the first's spheres and capsules
     for run in range(whole[one, FIRST_RUN], whole[one, STOP_RUN]):
-        spheres_to_spheres(width, runs, spheres, run, first, stop, work)
+        least = spheres_to_spheres(runs, spheres, run, first, stop, centers, least)
     for i in range(own_rods, whole[one, STOP_CAPSULE]):
         for j in range(begin, end):
             both = capsules[i, 6] + spheres[j, 3]
-            segment_to_points(width, capsules[i], CENTERS + U(j - begin) * U(3) * W, both, work)
+            least = segment_to_points(capsules[i], center_at(centers, j - begin), both, least)
     # the second's capsules against both
     for j in range(rods, whole[two, STOP_CAPSULE]):
-        _move_segment(width, capsules[j], work)
+        segments = _moved_axis(motion, capsules[j])
         inverse, thickness = capsules[j, 7], capsules[j, 6]
         for run in range(whole[one, FIRST_RUN], whole[one, STOP_RUN]):
             for i in range(runs[run, 0], runs[run, 1]):
-                segments_to_point(width, spheres[i], inverse, thickness + spheres[i, 3], work)
+                both = thickness + spheres[i, 3]
+                least = segments_to_point(segments, spheres[i], inverse, both, least)
         for i in range(own_rods, whole[one, STOP_CAPSULE]):
-            segment_to_segments(width, capsules[i], inverse, capsules[i, 6] + thickness, work)
+            both = capsules[i, 6] + thickness
+            least = segment_to_segments(capsules[i], segments, inverse, both, least)
+    return least
 
 
-@kernel
-def _move_segment(width: int, capsule: FloatArray, work: FloatArray) -> None:
-    """Write a capsule's axis as MOTION sees it to STARTS and AXES."""
-    move(width, capsule[0], capsule[1], capsule[2], 1.0, STARTS, work)
-    move(width, capsule[3], capsule[4], capsule[5], 0.0, AXES, work)
+@inlined
+def _moved_axis(motion: Motion, capsule: FloatArray) -> Segments:
+    """Return a capsule's axis after a motion."""
+    x, y, z = capsule[3], capsule[4], capsule[5]
+    axis = turned(motion[0], x, y, z), turned(motion[1], x, y, z), turned(motion[2], x, y, z)
+    return Segments(moved_point(motion, capsule[0], capsule[1], capsule[2]), axis)
 
 
-@kernel
-def _gather(
-    width: int,
-    joint: int,
-    lane_of: NDArray[np.uint64],
-    frames: FloatArray,
-    place: NDArray[np.uint64],
-    target: np.uint64,
-    work: FloatArray,
-) -> None:
-    """Copy the frames of one joint in the encounters' configurations to rows at `target`."""
-    j = U(joint) * SPATIAL_FRAME
-    for n in range(width):
-        begin, o = place[lane_of[U(n)]] + j, target + U(n)
-        for row in range(SPATIAL_ROWS):
-            work[o + U(row) * W] = frames[begin + U(row) * VECTOR]
+@inlined
+def _gathered(joint: int, frames: FloatArray, near: Encounters, at: int) -> Motion:
+    """Return the frames of one joint in eight encounters."""
+    j, k, places = U(joint) * SPATIAL_FRAME, U(at), near.frames
+    x, y, z = j, j + U(3) * VECTOR, j + U(6) * VECTOR
+    return (
+        _gathered_row(frames, places, k, x, j + U(9) * VECTOR),
+        _gathered_row(frames, places, k, y, j + U(10) * VECTOR),
+        _gathered_row(frames, places, k, z, j + U(11) * VECTOR),
+    )
 
 
-@kernel
-def _gather_obstacles(
-    width: int, data: FloatArray, obstacle_of: NDArray[np.uint64], work: FloatArray
-) -> None:
-    """Copy the frames of the encounters' obstacles to BASE, and their cores' sizes to CORE."""
-    for n in range(width):
-        o, k = obstacle_of[U(n)], U(n)
-        for row in range(9):
-            work[BASE + U(row) * W + k] = data[o, TURN + row]
-        for row in range(3):
-            work[BASE + U(9 + row) * W + k] = data[o, row]
-        for row in range(4):
-            work[CORE + U(row) * W + k] = data[o, CORE_SIZE + row]
+@inlined
+def _gathered_row(
+    frames: FloatArray, places: Places, k: np.uint64, offset: np.uint64, origin: np.uint64
+) -> Row:
+    """Return a row of frames: three numbers of the rotation, one of the origin."""
+    return (
+        load_each(frames, places, k, offset),
+        load_each(frames, places, k, offset + VECTOR),
+        load_each(frames, places, k, offset + U(2) * VECTOR),
+        load_each(frames, places, k, origin),
+    )
 
 
-@kernel
-def _relative(width: int, work: FloatArray) -> None:
-    """Write MOTION, which is FRAME as seen from BASE, and begin VALUE with +inf."""
-    for row in range(3):
-        a, b, c = BASE + U(row) * W, BASE + U(3 + row) * W, BASE + U(6 + row) * W
-        for column in range(3):
-            o, x = MOTION + U(3 * row + column) * W, FRAME + U(column) * W
-            for n in range(width):
-                k = U(n)
-                y, z = x + U(3) * W + k, x + U(6) * W + k
-                work[o + k] = (
-                    work[a + k] * work[x + k] + work[b + k] * work[y] + work[c + k] * work[z]
-                )
-        o = MOTION + U(9 + row) * W
-        for n in range(width):
-            k = U(n)
-            x = work[FRAME + U(9) * W + k] - work[BASE + U(9) * W + k]
-            y = work[FRAME + U(10) * W + k] - work[BASE + U(10) * W + k]
-            z = work[FRAME + U(11) * W + k] - work[BASE + U(11) * W + k]
-            work[o + k] = work[a + k] * x + work[b + k] * y + work[c + k] * z
-    for n in range(width):
-        work[VALUE + U(n)] = np.inf
+@inlined
+def _relative(x: Row, y: Row, z: Row, frame: Motion) -> Motion:
+    """Return a frame as seen from the frame whose rows are x, y and z."""
+    dx, dy, dz = frame[0][3] - x[3], frame[1][3] - y[3], frame[2][3] - z[3]
+    return (
+        _relative_row(x[0], y[0], z[0], frame, dx, dy, dz),
+        _relative_row(x[1], y[1], z[1], frame, dx, dy, dz),
+        _relative_row(x[2], y[2], z[2], frame, dx, dy, dz),
+    )
+
+
+@inlined
+def _relative_row(
+    a: Vector, b: Vector, c: Vector, frame: Motion, dx: Vector, dy: Vector, dz: Vector
+) -> Row:
+    """Return what a frame's columns and a shift are along the direction (a, b, c)."""
+    x, y, z = frame
+    return (
+        a * x[0] + b * y[0] + c * z[0],
+        a * x[1] + b * y[1] + c * z[1],
+        a * x[2] + b * y[2] + c * z[2],
+        a * dx + b * dy + c * dz,
+    )

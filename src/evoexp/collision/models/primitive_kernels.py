@@ -1,41 +1,36 @@
 """Kernels of bodies made of spheres and capsules: least clearances of batches of configurations.
 
-Per block of `LANES` configurations: forward kinematics; the centres of balls around bodies and
-parts of bodies; balls against obstacles and against each other (`ball_tests`). An encounter that no
-ball rules out sets one bit of a word per configuration; encounters are listed per body and class of
-obstacle, or per pair of parts, gathered into dense rows, and measured exactly, as vectors again
-(`encounter_kernels`). The result does not depend on the encounters skipped, nor on the batch.
+Per batch of `BATCH` configurations: forward kinematics; the centres of balls around bodies and
+parts of bodies; balls against obstacles and against each other (`ball_tests`). Encounters that no
+ball rules out are listed, per body and class of obstacle or per pair of parts, and measured
+exactly, eight at a time (`encounter_kernels`). The result does not depend on the encounters
+skipped, nor on the batch.
 
-The number of encounters limits the speed, here for a 6R arm of 59 spheres and ten obstacles: random
-configurations have 0.7 with obstacles and 4 between parts of the arm (fewer where only collisions
-are asked for), each some 40 ns of gathering and arithmetic, in lists of some ten per batch of 128
-that vectors do not fill; they take two thirds of the time. In a population, whose configurations
-are alike, encounters are rare: then forward kinematics, the balls, and the call itself, which
-unpacks the tables' arrays, take about a third each. A single configuration costs as much as eight,
-and the call.
-
-Where robots are made of spheres alone and only yes or no is asked for, `contact_kernels` answers,
-in half the time.
+Where robots are made of spheres alone and only yes or no is asked for, `contact_kernels` answers.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core import types
-from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from evoexp.collision.models.ball_tests import (
-    LANES,
-    Bits,
+    BATCH,
+    WORD,
     bound_obstacles,
     bound_pairs,
-    mark_obstacles,
-    mark_pairs,
     middles_of_balls,
+    near_obstacle,
+    near_pair,
 )
+from evoexp.collision.models.center_kernels import POINT
 from evoexp.collision.models.contact_kernels import find_contacts
-from evoexp.collision.models.encounter_kernels import body_meets_body, body_meets_obstacles
+from evoexp.collision.models.encounter_kernels import (
+    Encounters,
+    body_meets_body,
+    body_meets_obstacles,
+    filled_up,
+    listed_from,
+)
 from evoexp.collision.models.flat_primitives import named_primitives
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
@@ -43,11 +38,10 @@ from evoexp.collision.models.packed_shapes import (
     ContactTables,
     PrimitiveTables,
 )
-from evoexp.collision.models.primitive_distances import FIXED_ROWS, VALUE, WIDTH
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import LANES as EIGHT
-from evoexp.numeric.vectors import spread, store
-from evoexp.records import FloatArray, IntArray
+from evoexp.numeric.vectors import Vector, load, select, spread, store
+from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import (
     SPATIAL_FRAME,
     VECTOR,
@@ -56,57 +50,34 @@ from evoexp.robots.forward_kinematics import (
 )
 from evoexp.robots.kinematics import SPATIAL_ROWS, U
 
-WORD = 64
-"""Encounters of one configuration that fit a word of bits."""
-
-GROUP = 8
-"""Pairs that are marked together where only collisions are asked for: one found spares the next."""
-
 CLASSES = 3
+
+ROOM = 4 * BATCH
+"""Encounters with obstacles of one class that are listed at most before they are measured."""
 
 OBSTACLES, BETWEEN, SELF = range(3)
 """Rows of the result: clearance to obstacles, between arms, between parts of one arm."""
 
 
-def _trailing_zeros() -> Any:
-    """Return a function for kernels: the index of the lowest bit that is set."""
-
-    @intrinsic
-    def lowest_bit(typing_context: Any, value: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return builder.cttz(arguments[0], context.get_constant(types.boolean, True))
-
-        return types.uint64(types.uint64), generate
-
-    return lowest_bit
-
-
-_lowest_bit = _trailing_zeros()
-
-
 class Memory(NamedTuple):
-    """Scratch for a batch of `LANES` configurations.
+    """Scratch for a batch of `BATCH` configurations.
 
     Attributes:
         q: (nq · 8,) the last ones of a batch, padded.
-        frames: (LANES / 8 · (joints + 1) · SPATIAL_FRAME,): eight configurations behind eight; the
+        frames: (BATCH / 8 · (joints + 1) · SPATIAL_FRAME,): eight configurations behind eight; the
             last frame is the world's.
-        place: (LANES,) offset of each lane in `frames`.
-        middles: (units · 3 · LANES,) centres of the balls.
-        best: (3 · LANES,) least clearances so far.
-        bits: (LANES,) the word of encounters.
-        lists: Encounters, gathered.
-        work: Rows of `primitive_distances`.
+        middles: (units · 3 · BATCH,) centres of the balls.
+        best: (3 · BATCH,) least clearances so far.
+        near: (CLASSES · ROOM,) encounters, listed.
+        centers: (most + 1 · POINT,) moved spheres, and clearances to be handed out.
     """
 
     q: FloatArray
     frames: FloatArray
-    place: NDArray[np.uint64]
     middles: FloatArray
     best: FloatArray
-    bits: Bits
-    lists: NDArray[np.uint64]
-    work: FloatArray
+    near: Encounters
+    centers: FloatArray
 
 
 @kernel
@@ -127,15 +98,18 @@ def primitive_clearances(
     if decide and len(named.contacts.indices) > 0 and _decide(named.contacts, limit, q, out):
         return
     num_joints, num_units = len(named.chain.parent), len(named.units.whole)
+    room = CLASSES * ROOM
     memory = Memory(
         np.zeros(U(q.shape[0]) * VECTOR),
-        np.empty(U(LANES * (num_joints + 1)) * SPATIAL_FRAME // VECTOR),
-        np.empty(LANES, dtype=np.uint64),
-        np.empty(num_units * 3 * LANES),
-        np.empty(3 * LANES),
-        np.empty(LANES, dtype=np.uint64),
-        np.empty(_room(named.units.whole, named.pairs), dtype=np.uint64),
-        np.empty((FIXED_ROWS + 3 * named.shapes.most) * WIDTH),
+        np.empty(U(BATCH * (num_joints + 1)) * SPATIAL_FRAME // VECTOR),
+        np.empty(num_units * 3 * BATCH),
+        np.empty(3 * BATCH),
+        Encounters(
+            np.empty(room, dtype=np.uint64),
+            np.empty(room, dtype=np.uint64),
+            np.empty(room, dtype=np.uint64),
+        ),
+        np.empty(U(named.shapes.most + 1) * POINT),
     )
     _clearances(named, limit, decide, q.reshape(-1), q.shape[1], out, memory)
 
@@ -168,15 +142,13 @@ def _clearances(
     frames, middles, best = memory.frames, memory.middles, memory.best
     # the world's frame, behind the joints'
     size = U(len(tables.chain.parent) + 1) * SPATIAL_FRAME
-    blocks = min(U(LANES), U(total) + VECTOR - U(1)) // VECTOR
+    blocks = min(U(BATCH), U(total) + VECTOR - U(1)) // VECTOR
     for block in range(blocks):
         world = U(block + 1) * size - SPATIAL_FRAME
         for row in range(SPATIAL_ROWS):
             store(frames, world + U(row) * VECTOR, spread(1.0 if row in (0, 4, 8) else 0.0))
-    for lane in range(LANES):
-        memory.place[lane] = U(lane) // VECTOR * size + U(lane) % VECTOR
-    for first in range(0, total, LANES):
-        count = min(LANES, total - first)
+    for first in range(0, total, BATCH):
+        count = min(BATCH, total - first)
         # frames of the joints, centres of the balls, for eight configurations at a time
         lanes = 0
         while lanes < count:
@@ -190,127 +162,102 @@ def _clearances(
         # upper bounds, then exact distances where they are in doubt
         _begin(len(units.whole), limit, count, lanes, middles, best)
         if not decide:
-            bound_obstacles(lanes, units, obstacles, middles, memory.work, best)
+            bound_obstacles(lanes, units, obstacles, middles, best)
             bound_pairs(lanes, units, pairs, middles, best)
-        _judge_obstacles(lanes, decide, tables, memory)
-        _judge_pairs(lanes, decide, tables, memory)
+        _judge_obstacles(lanes, decide, tables, memory, size)
+        _judge_pairs(lanes, decide, tables, memory, size)
         for row in range(3):
             for lane in range(count):
-                out[row, first + lane] = best[row * LANES + lane]
+                out[row, first + lane] = best[row * BATCH + lane]
 
 
-@kernel
-def _room(whole: IntArray, pairs: IntArray) -> int:
-    """Return the room for the lists of all encounters that one word of bits can hold."""
-    longest = 1
-    for b in range(len(whole)):
-        longest = max(longest, min(whole[b, STOP_LISTED] - whole[b, FIRST_LISTED], WORD))
-    return max(2 * CLASSES * longest, min(len(pairs), WORD)) * LANES
-
-
-@kernel
+@inlined
 def _begin(
     num_units: int, limit: float, count: int, lanes: int, middles: FloatArray, best: FloatArray
 ) -> None:
     """Begin `best`: the limit, NaN where q is NaN, and −inf, which skips a lane, in padding."""
-    best[:lanes] = 0.0
-    for b in range(3 * num_units):
-        for lane in range(lanes):
-            best[U(lane)] += middles[U(b * LANES) + U(lane)] * 0.0
-    for lane in range(lanes):
-        k = U(lane)
-        best[k] = limit + best[k] if lane < count else -np.inf
-        best[k + U(LANES)] = best[k]
-        best[k + U(2 * LANES)] = best[k]
+    for n in range(0, lanes, EIGHT):
+        nothing = spread(0.0)
+        for row in range(3 * num_units):
+            nothing = nothing + load(middles, U(row * BATCH + n)) * 0.0
+        for row in range(3):
+            store(best, U(row * BATCH + n), limit + nothing)
+    for lane in range(count, lanes):
+        for row in range(3):
+            best[U(row * BATCH + lane)] = -np.inf
 
 
 @kernel
-def _judge_obstacles(lanes: int, decide: bool, tables: PrimitiveTables, memory: Memory) -> None:
+def _judge_obstacles(
+    lanes: int, decide: bool, tables: PrimitiveTables, memory: Memory, size: np.uint64
+) -> None:
     """Lower `best` to the clearances of all bodies from the obstacles on their lists."""
     tables, memory = borrowed((tables, memory))
     units, shapes, obstacles = tables.units, tables.shapes, tables.obstacles
-    listed, whole, lists, bits = obstacles.listed, units.whole, memory.lists, memory.bits
-    frames, place, work, best = memory.frames, memory.place, memory.work, memory.best
-    capacity = len(lists) // (2 * CLASSES)
-    filled = np.empty(CLASSES, dtype=np.int64)
+    listed, whole, data, near = obstacles.listed, units.whole, obstacles.data, memory.near
+    ends = np.empty(CLASSES, dtype=np.int64)
     # from the tip, which is nearest to most obstacles, to the base
     for b in range(len(whole) - 1, -1, -1):
-        for first in range(whole[b, FIRST_LISTED], whole[b, STOP_LISTED], WORD):
-            stop = min(first + WORD, whole[b, STOP_LISTED])
-            if not mark_obstacles(
-                lanes, b, units, obstacles, first, stop, memory.middles, best, bits
-            ):
-                continue
-            # the marked encounters, listed by class: lanes, then obstacles
-            for c in range(CLASSES):
-                filled[c] = 2 * c * capacity
-            for lane in range(lanes):
-                word = bits[U(lane)]
-                while word != U(0):
-                    t = U(first) + _lowest_bit(word)
-                    word &= word - U(1)
-                    at = filled[listed[t, 1]]
-                    lists[at], lists[at + capacity] = U(lane), U(listed[t, 0])
-                    filled[listed[t, 1]] = at + 1
-            # measured in rows of `WIDTH`
-            for c in range(CLASSES):
-                for at in range(2 * c * capacity, filled[c], WIDTH):
-                    width = min(WIDTH, filled[c] - at)
-                    lane_of = lists[at : at + width]
-                    obstacle_of = lists[at + capacity : at + capacity + width]
-                    body_meets_obstacles(
-                        width, c, b, units, shapes, obstacles, lane_of, obstacle_of, frames, place,
-                        work, best,
-                    )  # fmt: skip
-        if decide:
-            _drop_collided(lanes, best)
+        for kind in range(CLASSES):
+            ends[kind] = kind * ROOM
+        for t in range(whole[b, FIRST_LISTED], whole[b, STOP_LISTED]):
+            o, own = listed[t, 0], listed[t, 1]
+            for first in range(0, lanes, WORD):
+                stop = min(first + WORD, lanes)
+                word = near_obstacle(
+                    units, b, data[o], own, first, stop, memory.middles, memory.best
+                )
+                place = U(o) * U(data.shape[1])
+                ends[own] = listed_from(word, first, size, place, ends[own], near)
+            # measured where no other obstacle's would find room, and behind the last obstacle
+            for kind in range(CLASSES):
+                begin, end = kind * ROOM, ends[kind]
+                if end > begin and (t + 1 == whole[b, STOP_LISTED] or end > begin + ROOM - BATCH):
+                    ends[kind] = begin
+                    filled_up(begin, end, near)
+                    for at in range(begin, end, EIGHT):
+                        found = body_meets_obstacles(
+                            at, kind, b, units, shapes, obstacles, near, memory.frames
+                        )
+                        _hand_out(found, at, 0, decide, memory)
 
 
 @kernel
-def _judge_pairs(lanes: int, decide: bool, tables: PrimitiveTables, memory: Memory) -> None:
+def _judge_pairs(
+    lanes: int, decide: bool, tables: PrimitiveTables, memory: Memory, size: np.uint64
+) -> None:
     """Lower `best` to the clearances of all pairs of units."""
     tables, memory = borrowed((tables, memory))
-    units, shapes, pairs = tables.units, tables.shapes, tables.pairs
-    lists, bits, work, best = memory.lists, memory.bits, memory.work, memory.best
-    filled = np.empty(WORD, dtype=np.int64)
-    group = GROUP if decide else WORD
-    for first in range(0, len(pairs), group):
-        stop = min(first + group, len(pairs))
-        if not mark_pairs(lanes, units, pairs, first, stop, memory.middles, best, bits):
-            continue
-        # the marked encounters, listed by pair
-        for t in range(stop - first):
-            filled[t] = t * LANES
-        for lane in range(lanes):
-            word = bits[U(lane)]
-            while word != U(0):
-                t = _lowest_bit(word)
-                word &= word - U(1)
-                lists[filled[t]] = U(lane)
-                filled[t] += 1
-        # measured in rows of `WIDTH`
-        for p in range(first, stop):
-            one, two, end = pairs[p, 0], pairs[p, 1], filled[p - first]
-            for at in range((p - first) * LANES, end, WIDTH):
-                width = min(WIDTH, end - at)
-                near = lists[at : at + width]
-                body_meets_body(
-                    width, one, two, units, shapes, near, memory.frames, memory.place, work
+    units, shapes, pairs, near = tables.units, tables.shapes, tables.pairs, memory.near
+    for p in range(len(pairs)):
+        one, two, row, end = pairs[p, 0], pairs[p, 1], pairs[p, 2], 0
+        for first in range(0, lanes, WORD):
+            stop = min(first + WORD, lanes)
+            word = near_pair(units, one, two, row, first, stop, memory.middles, memory.best)
+            end = listed_from(word, first, size, U(0), end, near)
+        if end > 0:
+            filled_up(0, end, near)
+            for at in range(0, end, EIGHT):
+                found = body_meets_body(
+                    at, one, two, units, shapes, near, memory.frames, memory.centers
                 )
-                base = U(pairs[p, 2] * LANES)
-                for n in range(width):
-                    k = base + near[U(n)]
-                    best[k] = min(best[k], work[VALUE + U(n)])
-        if decide:
-            _drop_collided(lanes, best)
+                _hand_out(found, at, row, decide, memory)
 
 
-@kernel
-def _drop_collided(lanes: int, best: FloatArray) -> None:
-    """Set the clearances of configurations that collide to −inf, so that they are skipped."""
-    for lane in range(lanes):
-        k = U(lane)
-        drop = best[k] < 0.0 or best[k + U(LANES)] < 0.0 or best[k + U(2 * LANES)] < 0.0
-        best[k] = -np.inf if drop else best[k]
-        best[k + U(LANES)] = -np.inf if drop else best[k + U(LANES)]
-        best[k + U(2 * LANES)] = -np.inf if drop else best[k + U(2 * LANES)]
+@inlined
+def _hand_out(found: Vector, at: int, row: int, decide: bool, memory: Memory) -> None:
+    """Lower `best` to what was found in eight encounters.
+
+    Where only yes or no is asked for, a collision sets all rows to −inf: nothing else of that
+    configuration is measured.
+    """
+    if decide:
+        found = select(found < 0.0, spread(-np.inf), found)
+    best, own = memory.best, U(len(memory.centers)) - VECTOR
+    store(memory.centers, own, found)
+    for n in range(EIGHT):
+        lane, value = memory.near.lanes[U(at + n)], memory.centers[own + U(n)]
+        if value < best[U(row * BATCH) + lane]:
+            best[U(row * BATCH) + lane] = value
+            if decide:
+                best[lane] = best[lane + U(BATCH)] = best[lane + U(2 * BATCH)] = value

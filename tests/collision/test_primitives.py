@@ -378,6 +378,14 @@ def test_more_obstacles_and_pairs_than_a_word_has_bits() -> None:
             model, geometry, table, pairs, [0] * model.njoints, q[:, sample]
         )
         agree([row[sample] for row in found], expected, -np.inf)
+    # more encounters at once than are listed: of equal obstacles, all are near
+    equal = obstacle_table(random_obstacles(rng) * 21)
+    collision = PrimitiveCollision.from_geometry(model, geometry, equal)
+    crowd = q[:, :1] + rng.normal(size=(14, 130)) * 1e-3
+    together = collision.clearance(crowd)
+    for sample in range(crowd.shape[1]):
+        alone = collision.clearance(np.ascontiguousarray(crowd[:, sample : sample + 1]))
+        assert [row[sample] for row in together] == [row[0] for row in alone]
 
 
 @pytest.mark.parametrize(

@@ -276,7 +276,7 @@ def _relative(x: Row, y: Row, z: Row, frame: Motion) -> Motion:
 def _relative_row(
     a: Vector, b: Vector, c: Vector, frame: Motion, dx: Vector, dy: Vector, dz: Vector
 ) -> Row:
-    """Return what a frame's columns and a shift are along the direction (a, b, c)."""
+    """Return a frame's columns and a shift, along the direction (a, b, c)."""
     x, y, z = frame
     return (
         a * x[0] + b * y[0] + c * z[0],

@@ -113,7 +113,7 @@ def listed_from(
 
 
 @inlined
-def filled_up(begin: int, end: int, near: Encounters) -> None:
+def fill_up(begin: int, end: int, near: Encounters) -> None:
     """Repeat the last encounter of a list until their number is a multiple of eight."""
     last, stop = U(end - 1), begin + (end - begin + LANES - 1) // LANES * LANES
     for k in range(end, stop):

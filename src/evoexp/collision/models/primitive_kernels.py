@@ -28,7 +28,7 @@ from evoexp.collision.models.encounter_kernels import (
     Encounters,
     body_meets_body,
     body_meets_obstacles,
-    filled_up,
+    fill_up,
     listed_from,
 )
 from evoexp.collision.models.flat_primitives import named_primitives
@@ -214,7 +214,7 @@ def _judge_obstacles(
                 begin, end = kind * ROOM, ends[kind]
                 if end > begin and (t + 1 == whole[b, STOP_LISTED] or end > begin + ROOM - BATCH):
                     ends[kind] = begin
-                    filled_up(begin, end, near)
+                    fill_up(begin, end, near)
                     for at in range(begin, end, EIGHT):
                         found = body_meets_obstacles(
                             at, kind, b, units, shapes, obstacles, near, memory.frames
@@ -236,7 +236,7 @@ def _judge_pairs(
             word = near_pair(units, one, two, row, first, stop, memory.middles, memory.best)
             end = listed_from(word, first, size, U(0), end, near)
         if end > 0:
-            filled_up(0, end, near)
+            fill_up(0, end, near)
             for at in range(0, end, EIGHT):
                 found = body_meets_body(
                     at, one, two, units, shapes, near, memory.frames, memory.centers

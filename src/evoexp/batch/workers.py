@@ -29,6 +29,7 @@ LEFT_EARLY = "A worker stopped while some jobs were given to the executor"
 
 _OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
 _RARE_SEARCHES, _PRELOADED = "evoexp.batch.rare_searches", "evoexp.batch.preloaded"
+_LEAN_TRACKER = "evoexp.batch.lean_tracker"
 _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
@@ -52,6 +53,7 @@ def start_server(modules: Iterable[str] = ()) -> None:
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
     cache_root()  # settled here, for the server and the workers too
+    loky_tracker.main.__module__ = _LEAN_TRACKER  # from which its process imports it
     multiprocessing.set_forkserver_preload([_RARE_SEARCHES, *modules, _PRELOADED])
     resource_tracker.ensure_running()  # lets signals through when it starts
     # The path of its socket may be too long, or its folder full.

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
+from typing import Any
 
 
 @contextmanager
@@ -13,7 +15,14 @@ def one_thread() -> Iterator[None]:
     where numpy was loaded with all of them: `reproduce`, `runner=serial`, a notebook.
     """
     import scipy.linalg  # noqa: F401  # it brings a BLAS of its own, limited once it is loaded
-    from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1, "blas"):
+    with _libraries().limit(limits=1, user_api="blas"):
         yield
+
+
+@cache
+def _libraries() -> Any:
+    """Look once for the libraries that are loaded; it takes some milliseconds."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import optimize
 
 from evoexp.records import FloatArray
 from evoexp.references.placement_programme import HEIGHT, MARGINS, OBJECTIVE, Programme
@@ -27,8 +28,6 @@ class End(NamedTuple):
 
 def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:
     """Minimise E from x by sequential quadratic programming (SLSQP), a minimax term by t."""
-    from scipy import optimize  # takes long to load
-
     minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
     found = minimize(
         lambda z: float(programme.measured(z)[0][OBJECTIVE]),

@@ -43,11 +43,10 @@ def states_behind(bit_generator: Any, count: int, steps: int) -> list[bytes]:
     Raises:
         TypeError: If the generator is no PCG64.
     """
-    demand_pcg64(bit_generator)
-    whole: Any = bit_generator.state
-    state, increment = whole["state"]["state"], whole["state"]["inc"]
+    content = state_reader(bit_generator)()
+    first, rest = content[:STATE_SIZE], content[STATE_SIZE:]
+    state, increment = (int.from_bytes(each[:STATE_SIZE], "little") for each in (first, rest))
     factor, addend = _jump(count, increment)
-    rest = state_bytes(bit_generator)[STATE_SIZE:]
     found = []
     for _ in range(steps):
         state = (state * factor + addend) & _MASK
@@ -89,10 +88,12 @@ def demand_pcg64(bit_generator: Any) -> None:
         raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")
 
 
+@lru_cache(maxsize=32)
 def words_of(bit_generator: "np.random.PCG64") -> NDArray[np.uint64]:
     """Return state and increment of a generator, lower halves first, in its own memory.
 
-    Only where the layout is known, and while the generator lives.
+    Only where the layout is known. Finding it takes as long as some hundred numbers, so it is kept,
+    and the generator with it.
     """
     words: Any = (ctypes.c_uint64 * 4).from_address(_address_of_words(bit_generator))
     return np.asarray(words)

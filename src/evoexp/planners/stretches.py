@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
-from evoexp.numeric.generator_memory import states_behind
+from evoexp.numeric.generator_memory import state_reader
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
 from evoexp.planners.gathering import Clock, Gathered, Run
 from evoexp.planners.planner import Candidate, Keeper
@@ -101,7 +101,7 @@ class Stretches(ABC):
         """Yield the initial population, then every other generation; see `Run.stretches`."""
         self.begin(rng)
         gathered, index, last = Gathered(), 0, self._ga.num_generations
-        self._gather(gathered, 0, 0, states_behind(rng.bit_generator, 0, 1), read_clock())
+        self._gather(gathered, 0, 0, [state_reader(rng.bit_generator)()], read_clock())
         while index < last:
             first, index = index, min(index + self.num_places - 1, last)
             self.go_on(rng, first, index)
@@ -257,11 +257,11 @@ class BlockStretches(IndividualStretches):
         # Of the generator, where generations are recorded together: its state behind the round
         # recorded last; states further ahead, each with the generation that was reached without.
         self._state, self._ahead = b"", deque[tuple[int, bytes]]()
-        self._are_noted = False
+        self._read_state: Callable[[], bytes] | None = None
 
     def stretches(self, rng: np.random.Generator, read_clock: Clock) -> Iterator[Stretch]:
         """Yield the generations, and note the generator's states; see `Run.stretches`."""
-        self._are_noted = True
+        self._read_state = state_reader(rng.bit_generator)
         return super().stretches(rng, read_clock)
 
     def draw_for(self, rng: np.random.Generator, reached: int) -> None:
@@ -271,17 +271,19 @@ class BlockStretches(IndividualStretches):
             rng: The generator.
             reached: The last generation that is complete.
         """
-        if not self._are_noted:
+        read = self._read_state
+        if read is None:
             self._draws.extend(rng)
             return
-        self._state = self._state or states_behind(rng.bit_generator, 0, 1)[0]
+        self._state = self._state or read()
         self._draws.extend(rng)
-        self._ahead += ((reached, state) for state in states_behind(rng.bit_generator, 0, 1))
+        self._ahead.append((reached, read()))
 
     def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
         """Return the generator's states as they are recorded; it is already ahead."""
         found: list[bytes] = []
-        self._state = self._state or states_behind(rng.bit_generator, 0, 1)[0]
+        assert self._read_state is not None, "generations are recorded together"
+        self._state = self._state or self._read_state()
         for begin in range(first, last, self._round):
             end = min(begin + self._round, last)
             while self._ahead and self._ahead[0][0] < end:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.generator_memory import STATE_SIZE, states_behind
+from evoexp.numeric.generator_memory import STATE_SIZE, state_reader
 from evoexp.numeric.pcg64 import Twin, Words
 from evoexp.paths.erased_walks import Exits, Sums, follow_all, room_for_exits, walk_all
 from evoexp.paths.grid_choices import Choices
@@ -177,7 +177,7 @@ class RandomPaths(IndividualStretches):
 
     def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
         """Return the generator's states; it followed at once. See `IndividualStretches`."""
-        rest = states_behind(rng.bit_generator, 0, 1)[0][STATE_SIZE:]
+        rest = state_reader(rng.bit_generator)()[STATE_SIZE:]
         places = np.arange(first + 1, last + 1) % self.num_places
         return [state.tobytes() + rest for state in self._states[places, ::-1]]
 

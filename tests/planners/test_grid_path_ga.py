@@ -67,10 +67,10 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     problem = solvable(shape, share, seed, own)
     paths = own.sample(problem, rng(seed), 12)
     size = problem.fields.grid.num_nodes
-    place, sites = np.zeros(size, dtype=np.int32), np.zeros(size + 1, dtype=np.int64)
+    seen, sites = (np.zeros(size + 1, dtype=np.int64) for _ in range(2))
     pair = np.zeros((2, size + 1), dtype=np.int32)
     for one, two in zip(paths[:-1], paths[1:], strict=True):
-        count = path_operators.coincident_sites(one, two, place, sites)
+        count = path_operators.coincident_sites(one, two, seen, sites)
         common = set(nodes_of(one)[1:-1]) & set(nodes_of(two)[1:-1])
         assert count == len(common)
         for site, (i, j) in enumerate(map(places_of, sites[:count].tolist())):

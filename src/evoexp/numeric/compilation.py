@@ -113,6 +113,30 @@ view_rows: Callable[..., Any] = _viewing(1)
 """Return rows in a flat array: as `view_part`, the width of a row as fourth argument."""
 
 
+def _copy(typing_context: Any, source: Any, first: Any, out: Any, at: Any, count: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source, first, out, at, count = arguments
+        here = context.make_array(signature.args[0])(context, builder, source).data
+        there = context.make_array(signature.args[2])(context, builder, out).data
+        size = context.get_abi_sizeof(context.get_data_type(signature.args[0].dtype))
+        cgutils.raw_memcpy(
+            builder, builder.gep(there, [at]), builder.gep(here, [first]), count, size
+        )
+        return context.get_dummy_value()
+
+    index = types.intp
+    return types.none(source, index, out, index, index), generate
+
+
+copy_part: Callable[..., None] = intrinsic(_copy)
+"""Copy some items of a flat contiguous array into another one of the same type.
+
+Its arguments: the array, the place of the first item, the other array, the place there, how many.
+Nothing is checked; the parts must not overlap. A loop that copies some dozen items one by one, or
+as vectors with a rest, takes several times as long.
+"""
+
+
 class _Borrowing(Protocol):
     def __call__(self, value: Value, /) -> Value: ...
 

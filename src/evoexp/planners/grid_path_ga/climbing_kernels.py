@@ -12,7 +12,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
-from evoexp.paths.grid_measures import Tolls, length_and_mean
+from evoexp.paths.grid_measures import POSITIVE, Tolls, length_and_mean
 from evoexp.paths.grid_walks import walk_to_exits
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.kernels import (
@@ -195,33 +195,44 @@ def _regenerated(
         ledger: With the last exits of the walk; `walked` is written.
     """
     place, moves, levels = ledger.place[k], ledger.moves[k], ledger.levels[k]
-    node, target = np.uint64(ends[0]), np.uint64(ends[1])
-    walked, num, moved, level = ledger.walked, 1, 0, 0
-    head, begin, moved_before, level_before = low, 1, 0, 0
-    tail, end, moved_until, level_until = 0, 1, 0, 0
+    node, target, walked = np.uint64(ends[0]), np.uint64(ends[1]), ledger.walked
+    # where the walk meets the path: no processor can foresee it, so there is no branch
+    num, head, begin, tail, end = 1, low, 1, 0, 1
     walked[1] = node
     while node != target:
-        # the next node of the walk, and sums up to it
-        following = np.uint64(ledger.exits[node])
-        moved += ledger.tolls.of_move[np.uint64(abs(np.int64(following) - np.int64(node)))]
-        level += ledger.tolls.of_node[following]
-        node = following
+        node = np.uint64(ledger.exits[node])
         num += 1
         walked[num] = node
-        own = place[node]
-        if own > 0:
-            if own < head:  # the head ends sooner
-                head, begin, moved_before, level_before, tail = own, num, moved, level, 0
-            elif own >= high and tail == 0:  # the tail begins
-                tail, end, moved_until, level_until = own, num, moved, level
+        own = int(np.int64(place[node]))
+        ends_head, begins_tail = (own > 0) & (own < head), (own >= high) & (tail == 0)
+        head, begin = own if ends_head else head, num if ends_head else begin
+        tail, end = own if begins_tail else tail, num if begins_tail else end
+        tail = 0 if ends_head else tail
+    # sums along what is left of it
+    moved, level = _tolls_between(walked, begin, end, ledger.tolls)
     return Piece(
         head,
         begin,
         end,
         tail,
-        moves[head] + (moved_until - moved_before) + (moves[count] - moves[tail]),
-        levels[head] + (level_until - level_before) + (levels[count] - levels[tail]),
+        moves[head] + moved + (moves[count] - moves[tail]),
+        levels[head] + level + (levels[count] - levels[tail]),
     )
+
+
+@inlined
+def _tolls_between(nodes: NodeArray, first: int, last: int, tolls: Tolls) -> tuple[int, int]:
+    """Return tolls of the moves between two places of a path, and of the nodes behind the first.
+
+    The masks change no number, see `grid_measures.measure_by_tolls`.
+    """
+    moved, level, before = np.int64(0), np.int64(0), np.int64(nodes[first])
+    for at in range(first + 1, last + 1):
+        node = np.int64(nodes[at])
+        moved = (moved + tolls.of_move[np.uint64(abs(node - before))]) & POSITIVE
+        level = (level + tolls.of_node[np.uint64(node)]) & POSITIVE
+        before = node
+    return int(moved), int(level)
 
 
 @kernel

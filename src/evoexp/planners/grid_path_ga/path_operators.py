@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.compilation import copy_part, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_choices import Choices
 from evoexp.paths.grid_measures import Tolls
@@ -70,7 +70,9 @@ class Scratch(NamedTuple):
     Attributes:
         place: (nodes,) places in a path.
         joined: (3 nodes + 3,) a path of several pieces.
-        sites: (nodes + 1,) places where two paths meet, see `coincident_sites`.
+        seen: (nodes + 1,) of `coincident_sites`: the search in which a node was last seen, and its
+            place then, as one number; the last entry is that of the last search, place 0.
+        sites: (nodes + 1,) places where two paths meet, see there.
         steps: (nodes,) of a front.
         queue: (nodes,) of a front.
         walked: (nodes + 1,) a walk.
@@ -78,6 +80,7 @@ class Scratch(NamedTuple):
 
     place: NodeArray
     joined: NodeArray
+    seen: IntArray
     sites: IntArray
     steps: NodeArray
     queue: NodeArray
@@ -90,14 +93,14 @@ class Scratch(NamedTuple):
             np.zeros(size, dtype=np.int32)
             for size in (nodes, 3 * nodes + 3, nodes, nodes, nodes + 1)
         )
-        return cls(place, joined, np.zeros(nodes + 1, dtype=np.int64), steps, queue, walked)
+        seen, sites = (np.zeros(nodes + 1, dtype=np.int64) for _ in range(2))
+        return cls(place, joined, seen, sites, steps, queue, walked)
 
 
 @kernel
 def copy_path(path: NodeArray, out: NodeArray) -> None:
     """Copy a path; the rest of the row stays as it is."""
-    for k in range(path[0] + 1):
-        out[k] = path[k]
+    copy_part(path, 0, out, 0, path[0] + 1)
 
 
 @kernel
@@ -130,15 +133,15 @@ def cross(
     one, two = parents
     place, joined, sites, erase = scratch.place, scratch.joined, scratch.sites, breeding.erase
     # at a common node
-    count = coincident_sites(one, two, place, sites)
+    count = coincident_sites(one, two, scratch.seen, sites)
     if count > 0:
         site = draw_index(draws, count)
         if erase:
             exchange_without_loops(one, two, sites[:count], site, children)
         else:
             i, j = places_of(sites[site])
-            settle(joined, _join(one, i, -1, two, j + 1, joined), False, children[0], place)
-            settle(joined, _join(two, j, -1, one, i + 1, joined), False, children[1], place)
+            _exchange(one, i, two, j, children[0], scratch)
+            _exchange(two, j, one, i, children[1], scratch)
         return True
     # at two near nodes
     i, j = near_sites(draws, world.coordinates, one, two, breeding.reach)
@@ -193,15 +196,24 @@ def exchange_without_loops(
     _splice(two, j, one, i, children[1])
 
 
+@kernel
+def _exchange(
+    head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray, scratch: Scratch
+) -> None:
+    """Write a path's head up to a place, and another's tail behind a place; erase loops if full."""
+    if i + tail[0] - j < len(child):
+        _splice(head, i, tail, j, child)
+    else:
+        count = _join(head, i, -1, tail, j + 1, scratch.joined)
+        settle(scratch.joined, count, False, child, scratch.place)
+
+
 @inlined
 def _splice(head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray) -> None:
     """Write a path's head up to a place, and another's tail behind a place."""
-    for k in range(1, i + 1):
-        child[k] = head[k]
-    shift = i - j
-    for k in range(j + 1, tail[0] + 1):
-        child[k + shift] = tail[k]
-    child[0] = tail[0] + shift
+    copy_part(head, 1, child, 1, i)
+    copy_part(tail, j + 1, child, i + 1, tail[0] - j)
+    child[0] = tail[0] - j + i
 
 
 @kernel
@@ -211,38 +223,41 @@ def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: N
     Returns:
         The number of nodes written.
     """
-    count = i
-    for k in range(1, i + 1):
-        joined[k] = head[k]
+    count, left = i, int(tail[0] - j + 1)
+    copy_part(head, 1, joined, 1, i)
     if link >= 0:
         count += 1
         joined[count] = link
-    for k in range(j, tail[0] + 1):
-        count += 1
-        joined[count] = tail[k]
-    return count
+    copy_part(tail, j, joined, count + 1, left)
+    return count + left
 
 
 @kernel
-def coincident_sites(one: NodeArray, two: NodeArray, place: NodeArray, sites: IntArray) -> int:
+def coincident_sites(one: NodeArray, two: NodeArray, seen: IntArray, sites: IntArray) -> int:
     """Write the places of common nodes but start and goal into `sites` (nodes + 1,).
 
     Of a node that the first path passes several times, the last time counts. A site is one number:
     the place in the first path is in front of the lowest `PLACE_BITS`, that in the second in them.
     Sites ascend by the latter.
 
+    Args:
+        one: The first path.
+        two: The second path.
+        seen: See `Scratch`; of all paths before, nothing needs to be cleared.
+        sites: Written.
+
     Returns:
         The number of sites.
     """
+    search = seen[-1] + (1 << PLACE_BITS)
+    seen[-1] = search
     for k in range(2, one[0]):
-        place[np.uint64(one[k])] = k
-    count, last = np.uint64(0), one[0]
+        seen[np.uint64(one[k])] = search | k
+    count = np.uint64(0)
     for k in range(2, two[0]):
-        node = two[k]
-        known = place[np.uint64(node)]
-        known = known if (known >= 2) & (known < last) else 0
-        sites[count] = np.int64(known) << PLACE_BITS | k  # kept by counting it, without a branch
-        count += np.uint64((known > 0) & (one[np.uint64(known)] == node))
+        known = seen[np.uint64(two[k])]
+        sites[count] = known << PLACE_BITS | k  # kept by counting it, without a branch
+        count += np.uint64((known >> PLACE_BITS) == (search >> PLACE_BITS))
     return int(np.int64(count))
 
 
@@ -356,14 +371,11 @@ def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Sc
         return
     # head, walk and tail
     last = low - 1
-    for k in range(1, low):
-        joined[k] = path[k]
-    for k in range(1, walked[0] + 1):
-        last += 1
-        joined[last] = walked[k]
-    for k in range(high + 1, count + 1):
-        last += 1
-        joined[last] = path[k]
+    copy_part(path, 1, joined, 1, last)
+    copy_part(walked, 1, joined, last + 1, walked[0])
+    last += walked[0]
+    copy_part(path, high + 1, joined, last + 1, count - high)
+    last += count - high
     settle(joined, last, erase, path, place)
 
 
@@ -373,6 +385,5 @@ def settle(nodes: NodeArray, count: int, erase: bool, path: NodeArray, place: No
     if erase or count > len(path) - 1:
         erase_loops(nodes, count, path, place)
     else:
-        for k in range(1, count + 1):
-            path[k] = nodes[k]
+        copy_part(nodes, 1, path, 1, count)
         path[0] = count

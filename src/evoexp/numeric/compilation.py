@@ -23,6 +23,7 @@ _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "nogil": True,
     "boundscheck": False,
+    "_nrt": True,  # else inherited from whichever kernel is compiled when this one is first called
 }
 
 
@@ -35,6 +36,16 @@ def kernel(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """Compile like `kernel`, and have LLVM inline every call: a loop around a call stays scalar."""
     compiled: Function = _kept(numba.njit(forceinline=True, **_OPTIONS)(function))
+    return compiled
+
+
+def uncounted(function: Function) -> Function:
+    """Compile like `kernel`, without counting references to arrays; it creates none.
+
+    A `kernel` that another one calls counts a reference to every array of its arguments, in tuples
+    too, when it begins and when it ends: with the tuples of a search that is fifty calls.
+    """
+    compiled: Function = _kept(numba.njit(**_OPTIONS | {"_nrt": False})(function))
     return compiled
 
 

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import copy_part, kernel, uncounted
@@ -27,6 +28,13 @@ def test_parts_are_copied_and_nothing_else(kind: type) -> None:
         expected[at : at + count] = source[first : first + count]
         copy(source, first, out, at, count)
         np.testing.assert_array_equal(out, expected)
+
+
+def test_only_contiguous_items_of_one_type_are_copied() -> None:
+    whole, single = np.zeros((2, 8)), np.zeros(8, dtype=np.float32)
+    for source, out in ((single, whole[0]), (whole[0, ::2], whole[1]), (whole[0], whole[:, 1])):
+        with pytest.raises(TypingError):
+            copy(source, 0, out, 0, 1)  # type: ignore[arg-type]
 
 
 @kernel

@@ -125,6 +125,9 @@ view_rows: Callable[..., Any] = _viewing(1)
 
 
 def _copy(typing_context: Any, source: Any, first: Any, out: Any, at: Any, count: Any) -> Any:
+    if {source.layout, out.layout} != {"C"} or source.dtype != out.dtype:
+        return None  # numba says that there is no such function
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, first, out, at, count = arguments
         here = context.make_array(signature.args[0])(context, builder, source).data
@@ -143,7 +146,7 @@ copy_part: Callable[..., None] = intrinsic(_copy)
 """Copy some items of a flat contiguous array into another one of the same type.
 
 Its arguments: the array, the place of the first item, the other array, the place there, how many.
-Nothing is checked; the parts must not overlap. A loop that copies some dozen items one by one, or
+No place is checked; the parts must not overlap. A loop that copies some dozen items one by one, or
 as vectors with a rest, takes several times as long.
 """
 

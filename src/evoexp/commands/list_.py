@@ -1,6 +1,7 @@
 """`evoexp list`: the experiments that can be run, and the runs that are stored."""
 
 import argparse
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from evoexp.errors import EvoexpError, printable
 from evoexp.store.damage import listed
 from evoexp.store.mending import damaged_files
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import damaged_logs, summary_table
+from evoexp.store.summaries import summary_rows
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
 FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
@@ -124,7 +125,7 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     try:
         if isinstance(run, EvoexpError):
             raise run
-        rows = summary_table(run).select(["status", "solved", "best_cost"]).to_pylist()
+        rows, damaged = summary_rows(run, ["status", "solved", "best_cost"])
     except EvoexpError as error:
         return row | {"damage": str(error)}
     except OSError as error:
@@ -136,13 +137,12 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
         | {"solved": sum(bool(each["solved"]) for each in done)}
         | {"median_best_cost": np.median([each["best_cost"] for each in done]) if done else None}
         | origin_of(run)
-        | {"damage": _damage(run)}
+        | {"damage": _damage(damaged_files(run) | damaged)}
     )
 
 
-def _damage(run: RunDirectory) -> str | None:
+def _damage(damaged: Mapping[str, str]) -> str | None:
     """Return the names of damaged files in a run that can be read; None if there are none."""
-    damaged = damaged_files(run) | damaged_logs(run)
     return f"damaged: {listed(damaged)}" if damaged else None
 
 

@@ -9,7 +9,7 @@ import functools
 import json
 import os
 import stat
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -110,17 +110,30 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
     directories = distinct(runs)
     summaries = [_current(run, thorough) for run in directories]
     for run, summary in zip(directories, summaries, strict=True):
-        if summary.damaged:
-            warn(
-                f"run {run.hash12}: left out, damaged: {listed(summary.damaged)}; run again by: "
-                f"{run.command}"
-            )
+        _tell_damage(run, summary)
     tables = [table_of([], pa.schema(BASE)), *(summary.table for summary in summaries)]
     table = pa.concat_tables(tables, promote_options="default")
     names = [field.name for field in BASE]
     return table.select(
         names + sorted(set(table.column_names) - set(names))
     ).replace_schema_metadata(None)
+
+
+def summary_rows(
+    run: RunDirectory, names: Sequence[str]
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Return some columns of `summary_table` of one run, row by row, and its `damaged_logs`."""
+    summary = _current(run)
+    _tell_damage(run, summary)
+    return summary.table.select(list(names)).to_pylist(), summary.damaged
+
+
+def _tell_damage(run: RunDirectory, summary: _Summary) -> None:
+    if summary.damaged:
+        warn(
+            f"run {run.hash12}: left out, damaged: {listed(summary.damaged)}; run again by: "
+            f"{run.command}"
+        )
 
 
 def damaged_logs(run: RunDirectory) -> dict[str, str]:
@@ -271,7 +284,7 @@ def _stored(run: RunDirectory) -> _Summary | None:
         if known is not None and known[0] == stamp:
             return known[1]
         with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
-            table = file.read()
+            table = file.read(use_threads=False)  # starting them takes longer than most tables
         notes = json.loads(table.schema.metadata[_KEY])
         table = table.select(notes["columns"])
         valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id

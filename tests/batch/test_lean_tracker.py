@@ -22,7 +22,7 @@ def test_the_tracker_is_that_of_loky_without_the_rest_of_joblib() -> None:
 
 
 KILLED = """
-import os, signal, sys
+import os, signal, sys, time
 from pathlib import Path
 from joblib.externals.loky.backend import resource_tracker
 from evoexp.batch import workers
@@ -30,8 +30,11 @@ from evoexp.batch import workers
 workers.num_cores = lambda: 2
 workers.start_server()
 resource_tracker.register(sys.argv[1], "folder")
-tracker = resource_tracker._resource_tracker._pid
-print(Path(f"/proc/{tracker}/cmdline").read_bytes().split(b"\\0")[-2].decode(), flush=True)
+tracker, until = resource_tracker._resource_tracker._pid, time.monotonic() + 30.0
+command = b""
+while b"tracker" not in command and time.monotonic() < until:  # it has just begun
+    command = Path(f"/proc/{tracker}/cmdline").read_bytes()
+print(command, flush=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
 

@@ -18,6 +18,7 @@ from evoexp.configuration import compose
 from evoexp.paths.redistribution import redistribute
 from evoexp.paths.relaxation import relax
 from evoexp.paths.workspace import prepare_redistribution
+from evoexp.planners.via_point_ga.strings import STRETCH
 from evoexp.store.log import Log
 from references import rana_numpy
 
@@ -104,8 +105,8 @@ def bench_generation(beside: Any) -> None:
         lambda: next(ours),
         {"numpy + scipy": (lambda: next(theirs), 1, 2)},
         unit="generation",
-        repeat=20,
-        rounds=100,
+        repeat=5 * STRETCH,  # whole calls of the kernel in every round
+        rounds=25,
     )
 
 

@@ -40,7 +40,7 @@ def inlined(function: Function) -> Function:
 
 
 def uncounted(function: Function) -> Function:
-    """Compile like `kernel`, without counting references to arrays; it creates none.
+    """Compile a kernel that creates no array like `kernel`, but without counts of references.
 
     A `kernel` that another one calls counts a reference to every array of its arguments, in tuples
     too, when it begins and when it ends: with the tuples of a search that is fifty calls.

@@ -1,12 +1,8 @@
-"""The version of evoexp, when this process began to load it, and versions of other libraries."""
+"""The version of evoexp, and versions of other libraries."""
 
 import functools
-import time
 
 __version__ = "0.1.0"
-
-LOADED_FROM = time.time()
-"""[s] No module of evoexp was read before, but this one and the package itself."""
 
 
 @functools.cache

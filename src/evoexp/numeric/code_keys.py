@@ -4,25 +4,25 @@ That is its code and the code of every module that it imports, down to the last 
 comments, docstrings and annotations. So no stale kernel can be loaded, an edit recompiles only what
 depends on it, an edit of words recompiles nothing, and two checkouts share what is alike in them.
 
-The key tells what the files hold, and kernels are made of what was loaded. Where a file is written
-while a process runs, the two may differ: `written_since` names such a file.
+The key is that of the files, and kernels are made of the code that a process loaded. Where a file
+is edited while the process runs, the two differ: `loaded_key` is the key of the loaded code.
 """
 
 import ast
 import contextlib
 import functools
 import hashlib
+import inspect
 import json
 import os
 import sys
+import types
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
-from evoexp.version import LOADED_FROM, version_of
-
-GRAIN_S = 0.02  # [s] that a file's time may be behind the clock
+from evoexp.version import version_of
 
 _PACKAGE = "evoexp"
 # Modules that keep kernels and change none; their own format is named by the folder `kernels`.
@@ -66,24 +66,75 @@ def module_key(module: str) -> str:
     return digest.hexdigest()
 
 
-def written_since(module: str, since: float = LOADED_FROM) -> Path | None:
-    """Return a file of a module's key that was written while this process ran; None: there is none.
+@functools.cache
+def loaded_key(module: str) -> str:
+    """Return the hash of the code that this process loaded, of a module and of all its imports.
+
+    It is made of the functions, classes and constants themselves, so it needs no file: the code of
+    a process whose files were edited meanwhile has another key than the edited code.
 
     Args:
-        module: Dotted name.
-        since: When this process began to load code [s].
+        module: Dotted name of a loaded module.
     """
-    for name in _reached(module):
-        path = _file_of(name)
-        if path is None:
-            continue
-        try:
-            found = path.stat()
-        except OSError:  # removed meanwhile
-            return path
-        if max(found.st_mtime, found.st_ctime) >= since - GRAIN_S:
-            return path
-    return None
+    packages = {_PACKAGE, module.split(".")[0]}
+    described, waiting = dict[str, Any](), {module}
+    while waiting:
+        name = waiting.pop()
+        loaded = sys.modules.get(name)
+        described[name] = None if loaded is None else _members(loaded, name)
+        origins = {_origin(value) for value in vars(loaded).values()} if loaded else set()
+        waiting |= {
+            origin
+            for origin in origins - described.keys() - _KEEPERS
+            if origin.split(".")[0] in packages and not hasattr(sys.modules.get(origin), "__path__")
+        }
+    return hashlib.sha256(repr(sorted(described.items())).encode()).hexdigest()
+
+
+def _origin(value: Any) -> str:
+    """Return the name of the module that a value comes from, or is; none for constants."""
+    origin = getattr(value, "__name__" if isinstance(value, types.ModuleType) else "__module__", "")
+    return origin if isinstance(origin, str) else ""
+
+
+def _members(owner: Any, module: str) -> list[tuple[str, Any]]:
+    """Describe what a module or a class defines, ordered by name."""
+    members = sorted(vars(owner).items())
+    return [(name, _described(value, module)) for name, value in members if name[:2] != "__"]
+
+
+def _described(value: Any, module: str) -> Any:
+    """Describe a value of a module as far as a compiled kernel can depend on it."""
+    function = inspect.unwrap(getattr(value, "py_func", value))  # of a kernel or an intrinsic
+    if isinstance(function, types.FunctionType):
+        return code_of(function.__code__, function.__doc__), repr(function.__defaults__)
+    if isinstance(value, type):
+        return _members(value, module) if value.__module__ == module else value.__qualname__
+    if isinstance(value, tuple):
+        return type(value).__name__, [_described(item, module) for item in value]
+    if isinstance(value, bool | int | float | complex | None):
+        return repr(value)
+    if type(value).__name__ == "ndarray":
+        return str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()
+    return type(value).__name__
+
+
+def code_of(code: types.CodeType, docstring: str | None = None) -> Any:
+    """Describe the instructions, names and constants of a code object, without its docstring."""
+    constants = [
+        _constant(value)
+        for k, value in enumerate(code.co_consts)
+        if not (k == 0 and docstring is not None and value == docstring)
+    ]
+    return code.co_code, code.co_names, code.co_varnames, constants
+
+
+def _constant(value: Any) -> Any:
+    if isinstance(value, types.CodeType):
+        return code_of(value)
+    if isinstance(value, frozenset):  # its order is another one in every process
+        return sorted(map(repr, value))
+    return type(value).__name__, repr(value)
 
 
 def is_kernel_module(module: str) -> bool:

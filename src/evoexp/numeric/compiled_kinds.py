@@ -14,7 +14,7 @@ from pathlib import Path
 
 import llvmlite.binding
 
-from evoexp.numeric.code_keys import module_key, written_since
+from evoexp.numeric.code_keys import module_key
 from evoexp.numeric.kept_files import Damaged, cache_root, is_kept, read_kept, write_kept
 
 CERTIFIER = "evoexp.collision.certifier.certificate"  # judges the motions of every planner
@@ -45,11 +45,8 @@ def note_compiled(kind: str, modules: Iterable[str]) -> None:
     """Note that every kernel that something of this kind needs is kept; silent where it cannot.
 
     All files that this process used are noted: kernels that it had loaded before may be among those
-    that are needed. Nothing is noted of code that was written meanwhile: its kernels are not kept.
+    that are needed.
     """
-    modules = tuple(modules)
-    if any(map(written_since, modules)):
-        return
     root = cache_root()
     names = sorted(str(path.relative_to(root)) for path in _used() if path.is_relative_to(root))
     with contextlib.suppress(OSError):

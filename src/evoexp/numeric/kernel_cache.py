@@ -19,7 +19,7 @@ import numba
 from numba.core import caching
 from numba.core.runtime.nrt import rtsys
 
-from evoexp.numeric.code_keys import is_kernel_module, module_key, written_since
+from evoexp.numeric.code_keys import code_of, is_kernel_module, loaded_key, module_key
 from evoexp.numeric.kept_files import MESSAGES, cache_root
 from evoexp.numeric.kept_libraries import FORMAT, LibraryFiles, use_kept_libraries
 from evoexp.numeric.kept_runtime import use_kept_runtime
@@ -65,7 +65,7 @@ class ContentLocator(caching._CacheLocator):
         return ""
 
     def get_disambiguator(self) -> str:
-        """Return a hash of the code: several functions may have one qualified name."""
+        """Return a hash of the loaded code: several functions may have one qualified name."""
         return self._code
 
 
@@ -138,21 +138,8 @@ class SharedCache:
     def __getattr__(self, name: str) -> Any:
         """Open the cache, and return its attribute of this name."""
         if self._opened is None:
-            self._opened = _opened(self._function)
+            self._opened = _OpenedCache(self._function)
         return getattr(self._opened, name)
-
-
-def _opened(function: Any) -> Any:
-    """Return a kernel's cache; one that keeps nothing where its code was written meanwhile.
-
-    What is loaded may be older than the files then, whose content would name it.
-    """
-    path = written_since(function.__module__)
-    if path is None:
-        return _OpenedCache(function)
-    text = f"{path}: written while this process ran; kernels of this code are not kept"
-    MESSAGES.say("written", text)
-    return caching.NullCache()
 
 
 def use_content_cache() -> None:
@@ -182,25 +169,14 @@ def _spare_blas() -> None:
 
 
 def code_key(function: Any) -> str:
-    """Return a hash of a function's own code: instructions, names and constants.
+    """Return a hash of a function's own code and of all code that its module loaded.
 
     Functions in one place of the source, such as two lambdas, share their qualified name. numba
     tells them apart by their line, which an edit above would change; or by their instructions,
     which are alike where only a name or a constant differs.
     """
-    return hashlib.sha256(repr(_code(function.__code__, function.__doc__)).encode()).hexdigest()[
-        :12
-    ]
-
-
-def _code(code: Any, docstring: str | None = None) -> Any:
-    """Return instructions, names and constants of a code object, without its docstring."""
-    constants = [
-        _code(one) if hasattr(one, "co_code") else (type(one).__name__, repr(one))
-        for k, one in enumerate(code.co_consts)
-        if not (k == 0 and docstring is not None and one == docstring)
-    ]
-    return code.co_code, code.co_names, code.co_varnames, constants
+    parts = code_of(function.__code__, function.__doc__), loaded_key(function.__module__)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:12]
 
 
 def _remove_old(current: Path) -> None:

@@ -16,10 +16,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evoexp.numeric.code_keys import GRAIN_S
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.registry import COMPONENTS, Registration, registrations
-from evoexp.version import LOADED_FROM, version_of
+from evoexp.version import version_of
 
 Stamp = tuple[str, int, int]  # path, size and time of a file
 
@@ -27,6 +26,7 @@ LOOK_S = 0.05  # [s] for which code that was looked at is taken to stay; a fact 
 
 _LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
 _OF_THIS_PROCESS = os.urandom(16)
+_FIRST = dict[tuple[Path | str, ...], bytes]()  # hashes of code when this process first asked
 _LOADED_HERE = set[str]()  # modules that were loaded only to find a fact
 
 
@@ -75,8 +75,8 @@ def kept_answer(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
 def installed_code(without: Collection[str] = ()) -> bytes:
     """Return the hash of the code of evoexp and of all guests, as it is now.
 
-    Where a file was written while this process ran, what it loaded may be another code: the hash is
-    then one that no other process has.
+    Where a file changed since this process first asked, the loaded code may be another one: the
+    hash is then one that no other process has.
 
     Args:
         without: Folders of evoexp that do not count.
@@ -87,32 +87,16 @@ def installed_code(without: Collection[str] = ()) -> bytes:
     left_out = tuple(f"{own / folder}{os.sep}" for folder in without)
     found = _LOOKED.stamps(tuple(map(str, dict.fromkeys(code))))
     stamps = [stamp for stamp in found if not stamp[0].startswith(left_out)]
-    newest = max((written for _, _, written in stamps), default=0)
-    is_loaded = newest < 1e9 * (LOADED_FROM - GRAIN_S)
-    digest = _hash_of_code(json.dumps(components), tuple(stamps), is_loaded)
-    return digest if is_loaded else digest + _OF_THIS_PROCESS
+    digest = _hash_of_code(json.dumps(components), tuple(stamps))
+    is_unchanged = digest == _FIRST.setdefault((*code, *without), digest)
+    return digest if is_unchanged else digest + _OF_THIS_PROCESS
 
 
 @functools.lru_cache(maxsize=2)
-def _hash_of_code(components: str, stamps: tuple[Stamp, ...], is_kept: bool) -> bytes:
-    """Read all code, once per process as long as no file is written again.
-
-    Args:
-        components: Enter the hash.
-        stamps: Of the files.
-        is_kept: Whether no file is so new that it may change and keep its stamp: then the hash is
-            kept under the stamps, as Python keeps what it compiles under sizes and times.
-    """
-    looked = hashlib.sha256(json.dumps([components, stamps]).encode()).hexdigest()
-    path = cache_root() / "facts" / f"code-{looked[:32]}"
-    if is_kept:
-        with contextlib.suppress(FileNotFoundError, Damaged):
-            return read_kept(path)
+def _hash_of_code(components: str, stamps: tuple[Stamp, ...]) -> bytes:
+    """Read all code, once per process as long as no file is written again."""
     digest = hashlib.sha256(components.encode())
     add_files(digest, (path for path, _, _ in stamps))
-    if is_kept:
-        with contextlib.suppress(OSError):
-            write_kept(path, digest.digest())
     return digest.digest()
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from evoexp.collision.box_support import EXACT, coal
 from evoexp.collision.models.body_covers import Cover, sphere_cover
-from evoexp.numeric.code_keys import module_key, written_since
+from evoexp.numeric.code_keys import loaded_key
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.version import version_of
 
@@ -33,7 +33,7 @@ def kept_sphere_cover(item: Any, inflation: float) -> Cover:
     Raises:
         UnsupportedShape: As `sphere_cover`.
     """
-    if isinstance(item.geometry, coal.Sphere | coal.Capsule) or written_since(_CODE):
+    if isinstance(item.geometry, coal.Sphere | coal.Capsule):
         return sphere_cover(item, inflation)
     digest = hashlib.sha256(_code())
     for part in (*_shape(item.geometry), item.placement.homogeneous, inflation):
@@ -69,4 +69,4 @@ def _corners(triangle: Any) -> list[int]:
 @functools.cache
 def _code() -> bytes:
     versions = [*map(version_of, _LIBRARIES)]
-    return hashlib.sha256(json.dumps([*versions, EXACT, module_key(_CODE)]).encode()).digest()
+    return hashlib.sha256(json.dumps([*versions, EXACT, loaded_key(_CODE)]).encode()).digest()

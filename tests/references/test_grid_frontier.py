@@ -117,6 +117,10 @@ def test_walks_of_the_last_number_of_nodes_count(most: int) -> None:
     walks, walk = best_walk(network, *weights, 1e3, most)
     assert walks[-1] == pytest.approx((most, expected[-1]))
     assert len(walk) == most
+    rows, _ = GridFrontier(planner=own, **SETTINGS | {"max_nodes": most})._bounds(
+        network, 1e3, walks
+    )
+    assert rows[-1] == pytest.approx((most, expected[-1]))
 
 
 def test_the_bound_holds_for_paths_through_every_node() -> None:

@@ -109,10 +109,12 @@ def test_multiples_of_15_degrees_collide_as_in_exact_arithmetic() -> None:
     check(counts[drawn[:, 0], drawn[:, 1]], expected)
 
 
-@pytest.mark.parametrize(("half_width", "radius"), [(0, RADIUS), (100, 200)])
-def test_envelopes_collide_as_in_exact_arithmetic(half_width: int, radius: int) -> None:
+@pytest.mark.parametrize(("half_width", "radius", "distance"), [(20, 0, 240), (100, 200, 400)])
+def test_envelopes_collide_as_in_exact_arithmetic(
+    half_width: int, radius: int, distance: int
+) -> None:
     """Widths and radii at which boundary lines lie on one line, and circles touch them."""
-    chosen, distance = postures(45), 400
+    chosen = postures(45)
     enveloped = [EnvelopedArm(arm_at(x), half_width * UNIT, radius * UNIT) for x in (0, distance)]
     exact = [
         [

@@ -1,17 +1,19 @@
-"""Files that somebody else wrote: read whole, up to a size; arrays only as large as their file.
+"""Files that somebody else wrote: read whole, up to a size; tables and arrays of numbers.
 
 Whatever such a file claims, reading it takes memory in proportion to its size, and its size is
 limited.
 """
 
 import ast
+import csv
 import errno
+import io
 import math
 import os
 import re
 import stat
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,11 @@ MAX_INPUT = 64 * MEGABYTE
 
 _NPY = b"\x93NUMPY"
 _MAX_HEADER = 10_000  # [B] of an array file, as numpy has it
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
+"""A number in the cell of a table."""
+
+_DECIMAL_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]{1,3})?")
+_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 _NUMBERS = re.compile(r"[<>|=]?[biuf]\d{1,2}")  # kinds of plain numbers, as numpy names them
 
 
@@ -49,6 +56,78 @@ def read_bounded(path: str | Path, limit: int = MAX_INPUT) -> bytes:
         raise OSError(errno.EFBIG, reason, name)
     with open(path, "rb") as file:
         return file.read(status.st_size)
+
+
+class TableError(ValueError):
+    """A table that cannot be read: its line, what that must be, and what it was."""
+
+    def __init__(self, line: int, must: str, was: object) -> None:
+        super().__init__(f"line {line}: must be {must}, was {was!r}")
+        self.line, self.must, self.was = line, must, was
+
+
+class TableRow(NamedTuple):
+    """A row of a table.
+
+    Attributes:
+        line: Number of its line, from 1.
+        cells: Without blanks around them.
+    """
+
+    line: int
+    cells: list[str]
+
+
+def read_table(content: bytes) -> list[TableRow]:
+    """Return the rows of a CSV file in UTF-8, all as long as the first; blank lines are left out.
+
+    Cells are separated by semicolons or tabs if the first line has some, else by commas. Between
+    semicolons or tabs, `1,5` is the number 1.5; it is refused where other numbers of the file have
+    points, or where it may be one of thousands.
+
+    Raises:
+        TableError: If it is no such file.
+    """
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise TableError(line, "text in UTF-8", error.object[error.start]) from None
+    first = text.lstrip().partition("\n")[0]
+    mark = next((mark for mark in (";", "\t") if mark in first), ",")
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark, strict=True)
+    rows: list[TableRow] = []
+    try:
+        for cells in reader:
+            if not any(cell.strip() for cell in cells):
+                continue
+            rows.append(TableRow(reader.line_num, [cell.strip() for cell in cells]))
+            if len(cells) != len(rows[0].cells):
+                must = f"{len(rows[0].cells)} cells, as in the first line"
+                if mark == "," and len(cells) > len(rows[0].cells):
+                    must += " (decimal commas need semicolons between cells)"
+                raise TableError(reader.line_num, must, len(cells))
+    except csv.Error as error:
+        raise TableError(reader.line_num, "a line of CSV", str(error)) from None
+    return rows if mark == "," else _with_points(rows)
+
+
+def _with_points(rows: list[TableRow]) -> list[TableRow]:
+    """Return rows with points for decimal commas, if these cannot be taken for anything else."""
+    with_point = [any("." in c and NUMBER.fullmatch(c) for c in row.cells) for row in rows]
+    changed = [row._replace(cells=list(row.cells)) for row in rows]
+    for column in range(len(rows[0].cells) if rows else 0):
+        cells = [row.cells[column] for row in rows]
+        commas = [k for k, cell in enumerate(cells) if _DECIMAL_COMMA.fullmatch(cell)]
+        if commas and any(with_point):
+            must = f"a number with a point, as in line {rows[with_point.index(True)].line}"
+            raise TableError(rows[commas[0]].line, must, cells[commas[0]])
+        if commas and all(_THOUSANDS.fullmatch(cells[k]) for k in commas):
+            must = "a number with a decimal point: this comma may part thousands"
+            raise TableError(rows[commas[0]].line, must, cells[commas[0]])
+        for k in commas:
+            changed[k].cells[column] = cells[k].replace(",", ".")
+    return changed
 
 
 def read_npy(content: bytes) -> NDArray[Any]:

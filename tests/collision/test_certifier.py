@@ -189,6 +189,7 @@ def test_the_security_margin(margin: float, expected: str) -> None:
         ((0.1, 0.4), "certified"),
         ((0.1000001, 0.4), "refuted"),
         ((0.1, 0.4000001), "refuted"),  # of the pair that does not come closest
+        ((0.05, 0.4000001), "refuted"),  # nor is its clearance the least that is proven
         ((0.0, 0.3), "certified"),
         ((0.4, 0.1), "refuted"),
     ],

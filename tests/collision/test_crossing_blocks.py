@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from evoexp.collision.models.link_crossings import Arm, count_crossings
+from collision.exact_crossings import count_exactly
 from evoexp.records import FloatArray
 
 NUM = 9  # individuals: a block of eight, and one more
@@ -33,9 +33,8 @@ def test_what_touches_at_its_outermost_point_is_counted(
         centre = np.where(along != 0, np.nextafter(tip, along * 1e300), tip) if gap else tip
         below, above = centre - 0.25 * scale * across, centre + 0.25 * scale * across
         two = points(tuple(centre), tuple(above))
-        arms = Arm(tuple(base), (1.0, 1.0)), Arm(tuple(below), (1.0, 1.0))
-        found = count_crossings(arms[0], one, arms[1], two)
-        mirrored = count_crossings(arms[1], two, arms[0], one)
+        found = count_exactly(tuple(base), one, tuple(below), two)
+        mirrored = count_exactly(tuple(below), two, tuple(base), one)
         expected = int(not gap or not apart(tip, below, centre, above, along))
         assert np.array_equal(found.counts, np.full((NUM, NUM), expected))
         assert np.array_equal(mirrored.counts, found.counts)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from collision.exact_crossings import count_exactly
 from evoexp.collision.models.link_crossings import (
     Arm,
     Crossings,
@@ -117,7 +118,7 @@ def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, 
 def test_counts_are_exact_where_links_touch(kind: str) -> None:
     rng = np.random.default_rng(11)
     base_1, points_1, base_2, points_2 = random_points(kind, rng, 30)
-    found = count_crossings(Arm(base_1, (1.0, 1.0)), points_1, Arm(base_2, (1.0, 1.0)), points_2)
+    found = count_exactly(base_1, points_1, base_2, points_2)
     exact = plain.exact_counts(base_1, points_1, base_2, points_2)
     assert np.array_equal(found.counts, exact)
     assert 0 < exact.mean() < 5
@@ -140,7 +141,7 @@ def test_right_angles_are_exact() -> None:
     arms = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.25, 0.0), (0.25, 0.25))
     grid = np.array(np.meshgrid(*[np.arange(7)] * 2)).reshape(1, 2, -1) * (np.pi / 6.0)
     points = [arm.points(grid) for arm in arms]
-    found = count_crossings(arms[0], points[0], arms[1], points[1])
+    found = count_exactly(arms[0].base, points[0], arms[1].base, points[1])
     assert np.array_equal(
         found.counts, plain.exact_counts(arms[0].base, points[0], arms[1].base, points[1])
     )
@@ -155,7 +156,7 @@ def test_a_link_between_two_others_by_the_last_place() -> None:
     points_1 = np.array([[[0.9], [0.3], [1.0], [0.3]]])
     points_2 = np.array([[[0.3] * 41, [0.5] * 41, [0.3] * 41, tips[::-1]]])
     points_2[0, 3] += 0.3 * (0.3 / 0.9) - 0.1 - 20 * 2.0**-56
-    found = count_crossings(one, points_1, two, points_2)
+    found = count_exactly(one.base, points_1, two.base, points_2)
     exact = plain.exact_counts(one.base, points_1, two.base, points_2)
     assert np.array_equal(found.counts, exact)
     assert 0 < exact.sum() < 41
@@ -200,11 +201,10 @@ def test_mirror_and_exchange_change_nothing(kind: str) -> None:
         points_1, points_2 = populations(rng, SCENE_A, 70, 61)
     else:
         base_1, points_1, base_2, points_2 = random_points(kind, rng, 64)
-    one, two = Arm(base_1, (1.0, 1.0)), Arm(base_2, (1.0, 1.0))
-    found = count_crossings(one, points_1, two, points_2)
+    found = count_exactly(base_1, points_1, base_2, points_2)
     flip = np.array([-1.0, 1.0, -1.0, 1.0])[:, None]
-    left, right = (Arm((-arm.base[0], arm.base[1]), arm.lengths) for arm in (one, two))
-    exchanged = count_crossings(right, points_2 * flip, left, points_1 * flip)
+    left, right = ((-x, y) for x, y in (base_1, base_2))
+    exchanged = count_exactly(right, points_2 * flip, left, points_1 * flip)
     assert np.array_equal(exchanged.counts.T, found.counts)
     assert np.array_equal(exchanged.sums_1, found.sums_2)
     assert np.array_equal(exchanged.sums_2, found.sums_1)

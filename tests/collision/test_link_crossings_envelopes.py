@@ -189,9 +189,9 @@ def test_links_without_length_leave_the_circles() -> None:
         EnvelopedArm(Arm((0.5, 0.0), (0.0, 0.0)), 0.0, 0.25),
     )
     drawn = [arm.outlines(np.zeros((1, 2, 1))) for arm in arms]
-    assert count_collisions(arms[0], drawn[0], arms[1], drawn[1]).counts[0, 0] == 0  # circles touch
-    wider = arms[1]._replace(tcp_radius=0.2500001)
-    assert count_collisions(arms[0], drawn[0], wider, drawn[1]).counts[0, 0] == 1
+    assert count_collisions(arms[0], drawn[0], arms[1], drawn[1]).counts[0, 0] == 1  # circles touch
+    narrower = arms[1]._replace(tcp_radius=0.2499999)
+    assert count_collisions(arms[0], drawn[0], narrower, drawn[1]).counts[0, 0] == 0
 
 
 def test_what_does_not_fit_is_refused() -> None:

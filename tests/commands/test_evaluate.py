@@ -182,7 +182,11 @@ def spoiled(value: Any) -> list[Any]:
         ("missing.json", None, "cannot be read: No such file or directory"),
         ("missing.npy", None, "cannot be read: No such file or directory"),
         ("directory.json", lambda p: p.mkdir(), "cannot be read: Is a directory"),
-        ("motion.txt", lambda p: p.write_text("[]"), "a motion file ends in .json or .npy"),
+        (
+            "motion.txt",
+            lambda p: p.write_text("[]"),
+            "a motion file ends in .json, .npy, .csv, .yaml or .yml",
+        ),
         ("cut.json", lambda p: p.write_text("[[[0,"), "is no json of numbers: Expecting value"),
         ("empty.json", lambda p: p.write_text(""), "is no json of numbers: Expecting value"),
         (
@@ -221,7 +225,7 @@ def spoiled(value: Any) -> list[Any]:
         (
             "object.json",
             lambda p: p.write_text('{"motion": []}'),
-            "must hold nested lists of finite numbers, was {'mot",
+            "must have joint_names and points, as a JointTrajectory, has motion",
         ),
         (
             "number.json",

@@ -218,11 +218,11 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         (("report", "rana_planar"), "rana_planar: nothing stored in"),
         (
             ("evaluate", "experiment=rana_planar"),
-            "motion file: one is needed (.json or .npy), got 0: none",
+            "motion file: one is needed (.json, .npy, .csv, .yaml or .yml), got 0: none",
         ),
         (
             ("evaluate", "a.json", "b.json", "experiment=rana_planar"),
-            "motion file: one is needed (.json or .npy), got 2: a",
+            "motion file: one is needed (.json, .npy, .csv, .yaml or .yml), got 2: a",
         ),
         (("reproduce", "no/such.mcap"), "no/such.mcap: cannot be read: No such file or directory"),
         (

@@ -1,6 +1,7 @@
 """`view`, `play` and `export` on stored runs, logs, and motions of one's own."""
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -105,7 +106,7 @@ def test_what_cannot_be_shown_is_said(refused: Refused, runs: list[str], tmp_pat
     assert "hash: no run 'ffffffff' among the 3 in " in refused("view", "ffffffff")
     assert refused("view", *runs * 3) == "motions: at most 4 go together, got 9"
     assert refused("view", "experiment=rana_planar") == (
-        "motion file: one is needed (.json or .npy), got 0: none"
+        "motion file: one is needed (.json, .npy, .csv, .yaml or .yml), got 0: none"
     )
     short = tmp_path / "short.json"
     short.write_text(json.dumps(STRAIGHT))
@@ -136,6 +137,76 @@ def test_export_writes_trajectories(evoexp: Evoexp, stored: Path, runs: list[str
     assert evoexp("export", runs[0]).code == 0
     assert evoexp("export", runs[0], "--format", "csv", "--timing", "optimal").code == 0
     assert {path.suffix for path in (stored / "motions").iterdir()} == {".csv", ".json"}
+
+
+@pytest.mark.parametrize("timing", ["rest", "uniform", "optimal"])
+@pytest.mark.parametrize("form", ["csv", "json", "ros", "yaml"])
+def test_an_exported_trajectory_is_judged_as_the_motion_was(
+    evoexp: Evoexp, stored: Path, runs: list[str], tmp_path: Path, form: str, timing: str
+) -> None:
+    path = tmp_path / f"exported.{'csv' if form == 'csv' else 'json'}"
+    words = ("--format", "ros" if form == "yaml" else form, "--timing", timing, "--no-blend")
+    assert evoexp("export", runs[0], *words, "-o", str(path)).code == 0
+    if form == "yaml":  # JSON is YAML
+        path = path.rename(path.with_suffix(".yaml"))
+    before = json.loads(evoexp("evaluate", runs[0], "--json").out)
+    found = json.loads(evoexp("evaluate", *SCENE, str(path), "--json").out)
+    rounded = form in ("ros", "yaml")  # whole nanoseconds
+    for name in ("certified", "certified_margin", "clearance_pair", "refuted_pair"):
+        assert found[name] == before[name], name
+    # at rest where lines meet, or along the very lines
+    assert found["clearance"] == pytest.approx(before["clearance"], abs=1e-3 if rounded else 2e-4)
+    assert found["remarks"][0].startswith("a joint trajectory: judged by its bodies")
+    assert "fitness" not in found and found["departures"] == []
+
+
+SCENE = ("experiment=rana_planar", "budget=smoke", "--only", "via-point GA")
+
+
+def test_a_trajectory_of_others_is_shown_and_played(
+    evoexp: Evoexp, outputs: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text(
+        "time;arm_1_joint_1_deg;arm_1_joint_0_deg;arm_0_joint_0_deg;arm_0_joint_1_deg;gripper\n"
+        "0;10,5;10;180;90;1\n1;0;0;90;90;2\n"
+    )
+    said = evoexp("evaluate", *SCENE, str(path))
+    assert said.code == 0 and "straight lines between the points" in said.out
+    assert "not read: gripper" in said.out
+    for command, ending in (("view", ".html"), ("play", ".mcap"), ("export", ".json")):
+        said = evoexp(command, *SCENE, str(path))
+        assert said.code == 0, said
+        assert "theirs.csv: not read: gripper" in said.out
+        assert (outputs / "motions" / f"theirs{ending}").exists()
+    points = json.loads((outputs / "motions" / "theirs.json").read_text())
+    assert points["joint_names"][0] == "arm_0_joint_0"
+    assert points["points"][0]["positions"][3] == pytest.approx(0.0174532925199 * 10.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,turn\n0,0\n1,1\n", "lacks joints arm_0_joint_0, .* arm_0_joint_0_rad.; has turn"),
+        (
+            "arm_0_joint_0,arm_0_joint_1,arm_1_joint_0,arm_1_joint_1\n0,0,0,90\n0,0,0,0\n",
+            "arm_1_joint_1: 90 without a unit is hardly in rad: name its column arm_1_joint_1_deg",
+        ),
+        ("a,b\n0,x\n", "line 2: must be a number in column b, was 'x'"),
+    ],
+)
+def test_a_trajectory_that_does_not_fit_is_refused(
+    refused: Refused, tmp_path: Path, text: str, said: str
+) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_text(text)
+    for command in ("evaluate", "view", "play", "export"):
+        assert re.search(said, refused(command, *SCENE, str(path)))
+    written = str(tmp_path / "out.json")
+    path.write_text("arm_0_joint_0,arm_0_joint_1,arm_1_joint_0,arm_1_joint_1\n0,0,0,0\n0,0,0,1\n")
+    assert refused("evaluate", *SCENE, str(path), "--write", written) == (
+        "--write: must go with a solution, was given with a trajectory"
+    )
 
 
 def test_export_refuses_what_cannot_be(refused: Refused, runs: list[str]) -> None:

@@ -10,10 +10,8 @@ import numpy as np
 
 from evoexp.records import FloatArray
 
-Point = tuple[Fraction, Fraction]
 
-
-def side(a: Point, b: Point, c: Point) -> int:
+def side(a: Any, b: Any, c: Any) -> int:
     """Return 1, 0 or −1: on which side of the line ab c lies."""
     value = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     return (value > 0) - (value < 0)
@@ -24,13 +22,17 @@ def segments_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
 
     Ends are pairs of floats, taken as the rational numbers they are.
     """
-    a, b, c, d = (tuple(map(Fraction, point)) for point in (a, b, c, d))
+    return exact_touch(*(tuple(map(Fraction, point)) for point in (a, b, c, d)))
+
+
+def exact_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
+    """Whether two segments have a common point; ends are pairs of exact numbers."""
     if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
         return True
     return on_segment(a, b, c) or on_segment(a, b, d) or on_segment(c, d, a) or on_segment(c, d, b)
 
 
-def on_segment(a: Point, b: Point, c: Point) -> bool:
+def on_segment(a: Any, b: Any, c: Any) -> bool:
     within = min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(
         a[1], b[1]
     )

@@ -97,6 +97,56 @@ def test_the_best_walk_is_the_best_of_all_walks(weights: tuple[float, float]) ->
     ).cost == pytest.approx(min(expected))
 
 
+def dear_ends(problem: Any) -> Any:
+    """Return the moves of a grid whose start and goal alone are unsafe: long paths dilute them."""
+    network = network_of(problem)
+    unsafeness = np.zeros(len(network.unsafeness))
+    unsafeness[list(network.ends)] = 1.0
+    return network._replace(unsafeness=unsafeness)
+
+
+@pytest.mark.parametrize("most", [11, 13, 15])
+def test_walks_of_the_last_number_of_nodes_count(most: int) -> None:
+    """The best walk has as many nodes as are searched, no multiple of those bounded together."""
+    weights, own = (1e-4, 2.0), planner(revisits=True)
+    network = dear_ends(own.prepare(robot(), scenario(np.zeros((3, 3), dtype=bool))))
+    expected = [
+        slow_walk_costs(network, weights[0], weights[1] / n, n)[n] for n in range(2, most + 1)
+    ]
+    assert int(np.argmin(expected)) + 2 == most
+    walks, walk = best_walk(network, *weights, 1e3, most)
+    assert walks[-1] == pytest.approx((most, expected[-1]))
+    assert len(walk) == most
+    rows, _ = GridFrontier(planner=own, **SETTINGS | {"max_nodes": most})._bounds(
+        network, 1e3, walks
+    )
+    assert rows[-1] == pytest.approx((most, expected[-1]))
+
+
+def test_the_bound_holds_for_paths_through_every_node() -> None:
+    """Of all paths those of the last number of nodes, all there are, are the cheapest."""
+    weights = (1e-4, 2.0)
+    own = planner(weights)
+    problem = own.prepare(robot(), scenario(np.zeros((3, 3), dtype=bool)))
+    network, least = dear_ends(problem), dict.fromkeys(range(2, 10), np.inf)
+    lengths = dict(
+        zip(zip(network.tails, network.heads, strict=True), network.lengths, strict=True)
+    )
+    for path in all_simple_paths(problem):
+        unsafe = weights[1] / len(path) * network.unsafeness[path].sum()
+        cost = unsafe + weights[0] * sum(lengths[move] for move in pairwise(path))
+        least[len(path)] = min(cost, least[len(path)])
+    assert min(least, key=lambda number: least[number]) == 9
+    # where no path is known, the bound is that of numbers of nodes alone
+    reference = GridFrontier(planner=own, **SETTINGS)
+    walks, _ = best_walk(network, *weights, 1e3, SETTINGS["max_nodes"])
+    rows, bound = reference._bounds(network, 1e3, walks)
+    assert rows[:, 0].tolist() == list(range(2, 10))
+    for number, floor in rows:
+        assert floor <= least[int(number)] + 1e-12
+    assert 0.9 * least[9] < bound <= least[9] + 1e-12
+
+
 def slow_walk_costs(network: Any, epsilon: float, mu: float, most: int) -> list[float]:
     """Return the least ε D + μ ΣS of walks of 0 … most nodes.
 

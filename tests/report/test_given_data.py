@@ -15,7 +15,7 @@ from evoexp.report.planner_runs import MULTIPLES, of_results
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
 
-HEAD = ",".join(COLUMNS)
+HEAD, SEMICOLONS = ",".join(COLUMNS), ";".join(COLUMNS)
 
 
 @pytest.fixture
@@ -98,16 +98,24 @@ REFUSED = {
     "planner,problem,seed,queries": "line 1, cost: must be there once, was '0 times'",
     "planner,problem,seed,querys,cost": "line 1: must be the columns .*did you mean 'queries'",
     "planner,problem,seed,queries,cost,cost": "line 1, cost: must be there once, was '2 times'",
-    "planner;problem;seed;queries;cost": "line 1: must be the columns",
+    "planner;problem;seed;querys;cost": "line 1: must be the columns .*did you mean 'queries'",
     HEAD: "must be a file with a row per improvement of a run",
     f"{HEAD}\nA,p,1,10": "line 2: must be 5 cells, as in the first line, was 4",
     f"{HEAD}\n,p,1,10,2.0": "line 2, planner: must be a name, was ''",
     f"{HEAD}\nA,\x1bp,1,10,2.0": "line 2, problem: must be a name",
     f"{HEAD}\nA,p,one,10,2.0": "line 2, seed: must be a whole number",
     f"{HEAD}\nA,p,1,10,2.0\n\nA,p,1,-3,1.0": "line 4, queries: must be a whole number",
-    f"{HEAD}\nA,p,1,1e3,2.0": "line 2, queries: must be a whole number",
+    f"{HEAD}\nA,p,1,12.5,2.0": "line 2, queries: must be a whole number",
+    f"{HEAD}\nA,p,1,1e-3,2.0": "line 2, queries: must be a whole number",
+    f"{HEAD}\nA,p,1,1e18,2.0": "line 2, queries: must be a whole number",
+    f"{HEAD}\nA,p,1,inf,2.0": "line 2, queries: must be a whole number",
+    f"{HEAD}\nA,p,nan,10,2.0": "line 2, seed: must be a whole number",
+    f"{HEAD}\nA,p,0x1,10,2.0": "line 2, seed: must be a whole number",
+    f"{HEAD}\nA,p,1,10,1,5": "line 2: must be 5 cells, .* (decimal commas need semicolons",
+    f"{SEMICOLONS}\nA;p;0;10;1,5\nA;p;1;20;2.5": "line 2: must be a number with a point, as in",
+    f"{SEMICOLONS}\nA;p;0;1,000;1,5": "line 2: must be a number with a decimal point: .* thousands",
     f"{HEAD}\nA,p,1,10,0": "line 2, cost: must be a length above 0, or empty .*, was '0'",
-    f"{HEAD}\nA,p,1,10,inf": "line 2, cost: must be a length above 0",
+    f"{HEAD}\nA,p,1,10,-inf": "line 2, cost: must be a length above 0",
     f"{HEAD}\nA,p,1,10,nan": "line 2, cost: must be a length above 0",
     f"{HEAD}\nA,p,1,10,1_0": "line 2, cost: must be a length above 0",
     f"{HEAD}\nA,p,1,10,1e999": "line 2, cost: must be a length above 0",
@@ -122,9 +130,30 @@ REFUSED = {
 def test_a_bad_row_is_named_by_line_and_column(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "bad.csv"
     path.write_text(text, newline="")
-    with pytest.raises(SettingError, match=f"^bad.csv.*{said}") as caught:
+    with pytest.raises(SettingError, match=f"^bad.csv.*{said.replace('(', '[(]')}") as caught:
         read_given(str(path))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "queries", "costs"),
+    [
+        (f"{HEAD}\nA,p,0,1e3,1.5\nA,p,1.0,12.0,inf\nA,p,2,1.5e1,Inf\n", [1000, 12, 15], 1),
+        (f"{SEMICOLONS}\nA;p;0;10;1,5\nA;p;1;20;2,125\n", [10, 20], 2),
+        (f"{SEMICOLONS}\nA;p;0;10;1.5\n", [10], 1),
+        (HEAD.replace(",", "\t") + "\nA\tp\t0\t10\t1,5\n", [10], 1),
+    ],
+)
+def test_numbers_may_be_written_as_spreadsheets_do(
+    tmp_path: Path, text: str, queries: list[int], costs: int
+) -> None:
+    path = tmp_path / "theirs.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    answers = read_given(str(path)).answers
+    assert [row.queries for row in answers] == queries
+    assert [row.seed for row in answers] == list(range(len(queries)))
+    assert answers[0].cost == 1.5
+    assert sum(not math.isnan(row.cost) for row in answers) == costs
 
 
 def test_other_bytes_than_text_are_refused(tmp_path: Path) -> None:

@@ -4,9 +4,10 @@ import math
 import numpy as np
 import pytest
 import scipy
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from evoexp.report import markdown
 from evoexp.report.statistics import (
     EXACT_PAIRS,
     EXACT_VALUES,
@@ -115,6 +116,56 @@ def test_signed_rank_beyond_the_exact_distribution_agrees_with_it() -> None:
     x, y = rng.normal(size=EXACT_PAIRS + 20), rng.normal(0.15, size=EXACT_PAIRS + 20)
     exact = scipy.stats.wilcoxon(x, y, method="exact").pvalue
     assert signed_rank(x, y).p_value == pytest.approx(exact, rel=0.02)
+
+
+@pytest.mark.parametrize("size", [60, EXACT_PAIRS, EXACT_PAIRS + 50])
+def test_the_farthest_signed_ranks_have_a_p_value_in_either_order(size: int) -> None:
+    x = np.arange(1.0, size + 1.0)
+    one, other = signed_rank(x, -x), signed_rank(-x, x)
+    assert one.p_value == other.p_value > 0.0
+    assert (one.direction, other.direction, one.share, other.share) == (1, -1, 1.0, 0.0)
+    if size <= EXACT_PAIRS:
+        assert one.p_value == 2.0 * 0.5**size
+    assert markdown.p_value(one.p_value) not in ("0", "0.0e+00")
+
+
+@given(st.lists(st.sampled_from([-9.0, -2.0, -1.0, 0.0, 1.0, 2.0, 5.0, np.inf]), max_size=11))
+@settings(max_examples=100)
+def test_signed_rank_is_that_of_all_signs_counted(differences: list[float]) -> None:
+    """With and without ties, infinities and zeros: whole numbers, counted one by one."""
+    x, y = np.array(differences), np.zeros(len(differences))
+    differing = x[x != 0.0]
+    twice = np.rint(2.0 * scipy.stats.rankdata(np.abs(differing))).astype(int).tolist()
+    positive = sum(rank for rank, value in zip(twice, differing, strict=True) if value > 0.0)
+    least = min(positive, sum(twice) - positive)
+    sums = [
+        sum(itertools.compress(twice, signs))
+        for signs in itertools.product((0, 1), repeat=len(twice))
+    ]
+    expected = min(1.0, 2.0 * sum(total <= least for total in sums) / len(sums))
+    found = signed_rank(x, y)
+    assert found.p_value == pytest.approx(expected, rel=1e-12)
+    assert signed_rank(y, x).p_value == found.p_value
+    assert found.direction == -signed_rank(y, x).direction == np.sign(2 * positive - sum(twice))
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 1.0, 2.0, 5.0, 7.5, np.inf]), min_size=1, max_size=60),
+    st.integers(1, 59),
+)
+@settings(max_examples=100, deadline=None)
+def test_rank_sum_is_the_same_in_either_order(drawn: list[float], size: int) -> None:
+    x, y = np.array(drawn[:size]), np.array(drawn[size:])
+    one, other = rank_sum(x, y), rank_sum(y, x)
+    assert one.p_value == pytest.approx(other.p_value, rel=1e-9)
+    assert one.u + other.u == len(x) * len(y)
+
+
+def test_the_farthest_rank_sum_has_a_p_value_in_either_order() -> None:
+    for size in (50, 400):
+        x = np.arange(1.0, size + 1.0)
+        one, other = rank_sum(x, -x), rank_sum(-x, x)
+        assert one.p_value == other.p_value > 0.0
 
 
 def test_equal_pairs_say_nothing_also_where_both_are_infinite() -> None:

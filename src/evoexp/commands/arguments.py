@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-MOTION_ENDINGS = (".json", ".npy")
+MOTION_ENDINGS = (".json", ".npy", ".csv", ".yaml", ".yml")
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> argparse.Action:

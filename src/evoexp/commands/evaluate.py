@@ -26,6 +26,7 @@ from evoexp.planners.proofs import judge_motion
 from evoexp.store.chosen_logs import CHOICES, chosen_log
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
+REMARKS = "remarks"  # of a row: how a trajectory was read
 HEX = re.compile("[0-9a-fA-F]{1,64}")  # a prefix of a hash
 _Judged = tuple[dict[str, Any], Listing | None]  # a row, and its table of configurations
 HEAD = ("label", "condition", "length_unit")  # of a row; its other entries are terms and verdict
@@ -36,9 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = add_experiment_arguments(parser)
     words.metavar, words.nargs = "HASH | LOG.mcap | MOTION KEY=VALUE", "+"
     words.help = (
-        "any unique prefix of a run's hash, or a replicate's log; or a motion file (.json: nested "
-        "lists, .npy: an array) in the planner's documented shape, start and goal included, and an "
-        "experiment with overrides as for run"
+        "any unique prefix of a run's hash, or a replicate's log; or a motion file, and an "
+        "experiment with overrides as for run. A motion file is a solution in the planner's "
+        "documented shape, start and goal included (.json: nested lists, .npy: an array), or a "
+        "joint trajectory as export writes it (.csv, .json, .yaml), judged by its bodies alone"
     )
     parser.add_argument(
         "--replicate", type=int, metavar="K", help="of a hash: this one, not that of least cost"
@@ -59,15 +61,21 @@ def main(arguments: argparse.Namespace) -> int:
     """Print terms and exact verdict of the motion; conditions that say the same share a column."""
     fitting = _motions(arguments)
     if arguments.write is not None:
-        _, _, planner, problem, solution = fitting[0]
+        _, _, planner, problem, solution, *_ = fitting[0]
+        if fitting[0].is_trajectory:
+            raise MotionFileError("--write: must go with a solution, was given with a trajectory")
         lists = nested(solution, planner.shape(problem))
         write(arguments.write, json.dumps(lists).encode(), is_said=not arguments.json)
     rows: list[dict[str, Any]] = []
     listings: list[Listing | None] = []
-    for label, condition, planner, problem, solution in fitting:
+    for label, condition, planner, problem, solution, motion, remarks in fitting:
         head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
+        verdict = judge_motion(planner, problem, motion)._asdict()
+        if remarks:  # of a trajectory a planner knows neither terms nor departures
+            rows.append(head | verdict | {DEPARTURES: [], REMARKS: list(remarks)})
+            listings.append(None)
+            continue
         terms = planner.evaluate(problem, solution)
-        verdict = judge_motion(planner, problem, planner.motion(problem, solution))._asdict()
         departures = list(planner.departures(problem, solution))
         of_task = {"solution_of_the_task": not departures}
         rows.append(head | terms | of_task | verdict | {DEPARTURES: departures})
@@ -86,6 +94,8 @@ def main(arguments: argparse.Namespace) -> int:
     for group in groups:
         for departure in group[0][0][DEPARTURES]:
             console.print(f"{_labels(group)} – no solution of the task: {departure}")
+    for remark in dict.fromkeys(remark for row in rows for remark in row.get(REMARKS, ())):
+        console.print(remark)
     return 0
 
 
@@ -147,7 +157,7 @@ def _listing(label: str, listing: Listing) -> Table:
 
 def _tables(columns: list[list[dict[str, Any]]], width: int) -> list[Table]:
     """Return a table with one column per group of conditions; more in a narrow terminal."""
-    apart, rows = (*HEAD, DEPARTURES), [row for group in columns for row in group]
+    apart, rows = (*HEAD, DEPARTURES, REMARKS), [row for group in columns for row in group]
     names = list(dict.fromkeys(name for row in rows for name in row if name not in apart))
     longest_word = max(len(word) for row in rows for word in row["label"].split())
     column = min(max(12, longest_word), 40) + 3

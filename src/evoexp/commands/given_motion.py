@@ -1,6 +1,5 @@
 """A motion out of a file or a log: recognised among the words, read, fitted to a condition."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,13 +12,26 @@ from evoexp.commands.arguments import MOTION_ENDINGS, is_motion
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.errors import MotionFileError, printable
-from evoexp.input_files import MEGABYTE, read_bounded, read_npy
+from evoexp.input_files import MEGABYTE, TableError, read_bounded, read_npy
+from evoexp.paths.motion import Motion
+from evoexp.playback.recording import joints_of
+from evoexp.playback.trajectory_files import (
+    LARGEST,
+    Columns,
+    JointTrajectory,
+    fitted,
+    parse_message,
+    read_columns,
+    read_message,
+)
 from evoexp.records import FloatArray
+from evoexp.robots.assembly import Robot
 from evoexp.store.log_reader import read_log
 
-LARGEST = 1e7  # as of the numbers of robots and scenarios, in any unit
 MAX_MOTION = 8 * MEGABYTE
 MOST_VALUES = 200_000  # numbers of a motion; the longest of a shipped experiment has 4,000
+ENDINGS = f"{', '.join(MOTION_ENDINGS[:-1])} or {MOTION_ENDINGS[-1]}"
+JUDGED = "a joint trajectory: judged by its bodies, not by where it begins and ends"
 MAX_DEPTH = 16  # nested lists; no planner's shape comes near
 
 
@@ -31,7 +43,9 @@ class FittingMotion(NamedTuple):
         condition: The condition.
         planner: Its planner.
         problem: Its problem.
-        solution: The motion as a flat solution.
+        solution: The motion as a flat solution; empty: the file holds a joint trajectory.
+        motion: The motion; None: the solution has none.
+        remarks: On how a trajectory was read.
     """
 
     label: str
@@ -39,6 +53,13 @@ class FittingMotion(NamedTuple):
     planner: Any
     problem: Any
     solution: FloatArray
+    motion: Motion | None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def is_trajectory(self) -> bool:
+        """Whether the file holds a joint trajectory, of which a planner knows no terms."""
+        return not self.solution.size
 
 
 def fitting_motions(
@@ -61,21 +82,27 @@ def fitting_motions(
     overrides = [word for word in words if word not in files]
     if len(files) != 1:
         found = " ".join(files) or "none"
-        raise MotionFileError(
-            f"motion file: one is needed (.json or .npy), got {len(files)}: {found}"
-        )
+        raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
     path = Path(files[0])
     values = read_motion(path)
     fitting, misfits = [], []
     for experiment in expansions.expand(overrides, multirun=multirun, only=only):
         for label, condition in experiment.conditions:
             planner, problem = condition.prepare()
+            if isinstance(values, Columns | JointTrajectory):
+                try:
+                    fitting.append(_trajectory(label, condition, values))
+                except ValueError as error:
+                    misfits.append(str(error))
+                continue
             shape = planner.shape(problem)
             solution = flatten(values, shape)
             if solution is None:
                 misfits.append(f"{label}: {shape_text(shape)}")
             else:
-                fitting.append(FittingMotion(label, condition, planner, problem, solution))
+                fitting.append(_solved(label, condition, planner, problem, solution))
+    if not fitting and isinstance(values, Columns | JointTrajectory):
+        raise MotionFileError(f"{path}: {'; '.join(dict.fromkeys(misfits))}")
     if not fitting:
         plain = all("numbers" in text for text in misfits)
         included = "" if plain else " (start and goal included)"
@@ -84,6 +111,28 @@ def fitting_motions(
             f"was {_shape_of(values)}"
         )
     return path, fitting
+
+
+def _trajectory(
+    label: str, condition: Condition, given: Columns | JointTrajectory
+) -> FittingMotion:
+    """Return a trajectory as a motion of a condition's robot.
+
+    Raises:
+        ValueError: If it does not fit.
+    """
+    planner, problem = condition.prepare()
+    if not isinstance(condition.robot, Robot):
+        raise ValueError(f"{label}: its robot has no joints for a trajectory")
+    joints = joints_of(condition.robot.build())
+    motion, remarks = fitted(given, joints, condition.length_unit)
+    if len(planner.parts(problem, motion)) > 1:
+        raise ValueError(
+            f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
+            "tell; give the solution (evaluate HASH --write FILE.json)"
+        )
+    remarks = (JUDGED, *remarks)
+    return FittingMotion(label, condition, planner, problem, np.empty(0), motion, remarks)
 
 
 def stored_motion(log: Path) -> FittingMotion:
@@ -97,7 +146,7 @@ def stored_motion(log: Path) -> FittingMotion:
     keep_all(data for name, data in contents.attachments.items() if name.startswith(PREFIX))
     condition = Condition.from_json(contents.config_json)
     label = f"{contents.condition_id[:12]} #{contents.replicate}"
-    return FittingMotion(label, condition, *condition.prepare(), contents.solutions[-1].values)
+    return _solved(label, condition, *condition.prepare(), contents.solutions[-1].values)
 
 
 def initial_motion(
@@ -122,7 +171,14 @@ def initial_motion(
         )
     (label, condition), (planner, problem) = chosen[0], prepared[0]
     first = next(planner.evolve(problem, condition.rng(0)))
-    return FittingMotion(label, condition, planner, problem, first.best)
+    return _solved(label, condition, planner, problem, first.best)
+
+
+def _solved(
+    label: str, condition: Condition, planner: Any, problem: Any, solution: FloatArray
+) -> FittingMotion:
+    motion = planner.motion(problem, solution)
+    return FittingMotion(label, condition, planner, problem, solution, motion)
 
 
 def nested(solution: FloatArray, shape: Any) -> list[Any]:
@@ -136,7 +192,7 @@ def nested(solution: FloatArray, shape: Any) -> list[Any]:
 
 
 def read_motion(path: Path) -> Any:
-    """Read a motion as nested lists, or as an array from `.npy`.
+    """Read a motion as nested lists (an array from `.npy`), or a joint trajectory.
 
     Raises:
         MotionFileError: If the file is missing, of another kind, or holds anything but finite
@@ -144,15 +200,28 @@ def read_motion(path: Path) -> Any:
     """
     try:
         if path.suffix not in MOTION_ENDINGS:
-            raise MotionFileError(f"{path}: a motion file ends in .json or .npy")
+            raise MotionFileError(f"{path}: a motion file ends in {ENDINGS}")
         content = read_bounded(path, MAX_MOTION)
-        is_array = path.suffix == ".npy"
-        values: Any = read_npy(content).tolist() if is_array else json.loads(content.decode())
+        if path.suffix == ".csv":
+            return read_columns(content)
+        is_array, is_yaml = path.suffix == ".npy", path.suffix != ".json"
+        values: Any = (
+            read_npy(content).tolist()
+            if is_array
+            else parse_message(content.decode("utf-8-sig"), is_yaml)
+        )
+    except TableError as error:
+        raise MotionFileError(f"{path}, {error}") from None
     except OSError as error:
         raise MotionFileError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, EOFError, RecursionError, MemoryError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
+    if isinstance(values, dict):
+        try:
+            return read_message(values)
+        except ValueError as error:
+            raise MotionFileError(f"{path}: {error}") from None
     if (count := _num_values(values)) > MOST_VALUES:
         must = f"{path}: must hold at most {MOST_VALUES:,} numbers"
         raise MotionFileError(f"{must}, was {count:,}")

@@ -5,7 +5,7 @@ import math
 
 from evoexp.commands.motion_words import MANY, ChosenLog, check_speeds, chosen_logs
 from evoexp.errors import MotionFileError, RevisionMismatch
-from evoexp.playback.recording import Heading, Recording, record
+from evoexp.playback.recording import Heading, Recording, record_motion
 from evoexp.playback.stored import stored_recording
 from evoexp.playback.timing import SpeedLimits
 
@@ -65,7 +65,9 @@ def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
     from evoexp.commands.given_motion import fitting_motions  # Hydra's words, of no stored run
 
     path, fitting = fitting_motions(words, only=(only,) if only else ())
+    for remark in fitting[0].remarks[1:]:
+        print(f"{path.name}: {remark}")
     return [
-        record(each.condition, each.solution, Heading(f"{path.name} · {each.label}"), limits)
+        record_motion(each.condition, each.motion, Heading(f"{path.name} · {each.label}"), limits)
         for each in fitting[:MANY]
     ]

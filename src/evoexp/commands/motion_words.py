@@ -50,8 +50,8 @@ def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
         "what",
         nargs="+",
         metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
-        help="any unique prefix of a run's hash, or a replicate's log; or a motion file (.json, "
-        ".npy) in the planner's documented shape, as for evaluate, with an experiment",
+        help="any unique prefix of a run's hash, or a replicate's log; or a motion file, as for "
+        "evaluate, with an experiment",
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")

@@ -138,7 +138,27 @@ def record(
         NoMotion: If the planner gives no motion for the solution, or no bodies.
     """
     planner, problem = condition.prepare()
-    motion = planner.motion(problem, solution)
+    return record_motion(condition, planner.motion(problem, solution), heading, limits)
+
+
+def record_motion(
+    condition: Condition,
+    motion: Motion | None,
+    heading: Heading,
+    limits: SpeedLimits | None = None,
+) -> Recording:
+    """Return the recording of a motion among the bodies of a condition.
+
+    Args:
+        condition: The condition.
+        motion: Of its robot; None: there is none.
+        heading: Title and origin.
+        limits: Speed limits of the joints, for the timing.
+
+    Raises:
+        NoMotion: If there is no motion, or there are no bodies.
+    """
+    planner, problem = condition.prepare()
     parts = [] if motion is None else list(planner.parts(problem, motion))
     if motion is None or not parts:
         raise NoMotion(
@@ -150,7 +170,7 @@ def record(
     assembly = robot.build()
     margin = planner.security_margin(problem)
     model, size = parts[0].scene.model, parts[0].scene.size
-    joints = _joints(assembly)
+    joints = joints_of(assembly)
     prismatic = np.array([joint.prismatic for joint in joints])
     carried = _carried(parts)
     times = ticks(motion, prismatic, size)
@@ -184,7 +204,7 @@ def record(
     )
 
 
-def _joints(assembly: Assembly) -> tuple[Joint, ...]:
+def joints_of(assembly: Assembly) -> tuple[Joint, ...]:
     """Return the joints in the order of their coordinates."""
     table, names = assembly.table, assembly.model.names
     own = np.flatnonzero(table.free)

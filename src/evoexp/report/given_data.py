@@ -3,12 +3,10 @@
 Nobody here judges them: their answers count as given, and are marked so wherever they stand.
 """
 
-import csv
 import hashlib
-import io
 import math
-import re
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,13 +14,13 @@ import numpy as np
 import pandas as pd
 
 from evoexp.errors import SettingError, nearest, printable
-from evoexp.input_files import read_bounded
+from evoexp.input_files import NUMBER, TableError, TableRow, read_bounded, read_table
 from evoexp.report.planner_runs import PlannerRuns, Problem
 
 COLUMNS = ("planner", "problem", "seed", "queries", "cost")
 MARK = " (given)"  # behind the names of planners that were not run here
-_WHOLE = re.compile("[0-9]{1,18}")
-_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
+UNANSWERED = ("inf", "+inf", "infinity")  # costs of runs without an answer, as well as none
+MOST = 10**18  # seeds and queries stay below
 
 
 class GivenAnswer(NamedTuple):
@@ -69,36 +67,23 @@ def read_given(path: str) -> GivenData:
     content = read_bounded(path)
     name = printable(Path(path).name)
     try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise SettingError(
-            f"{name}, line {line}", "text in UTF-8", error.object[error.start]
-        ) from None
-    answers = tuple(_rows(name, text))
+        answers = tuple(_rows(name, read_table(content)))
+    except TableError as error:
+        raise SettingError(f"{name}, line {error.line}", error.must, error.was) from None
     if not answers:
         raise SettingError(name, "a file with a row per improvement of a run", "no row")
     _check_runs(name, answers)
     return GivenData(name, hashlib.sha256(content).hexdigest(), answers)
 
 
-def _rows(name: str, text: str) -> Iterator[GivenAnswer]:
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+def _rows(name: str, table: list[TableRow]) -> Iterator[GivenAnswer]:
     order: list[str] = []
-    try:
-        for cells in reader:
-            where = f"{name}, line {reader.line_num}"
-            if not cells or not any(cell.strip() for cell in cells):
-                continue
-            if not order:
-                order = _header(where, [cell.strip() for cell in cells])
-                continue
-            if len(cells) != len(COLUMNS):
-                raise SettingError(where, f"{len(COLUMNS)} cells, as in the first line", len(cells))
-            yield _row(where, reader.line_num, dict(zip(order, cells, strict=True)))
-    except csv.Error as error:
-        where = f"{name}, line {reader.line_num}"
-        raise SettingError(where, "a line of CSV", str(error)) from None
+    for line, cells in table:
+        where = f"{name}, line {line}"
+        if not order:
+            order = _header(where, cells)
+        else:
+            yield _row(where, line, dict(zip(order, cells, strict=True)))
 
 
 def _header(where: str, names: list[str]) -> list[str]:
@@ -114,22 +99,25 @@ def _header(where: str, names: list[str]) -> list[str]:
 
 
 def _row(where: str, line: int, cells: dict[str, str]) -> GivenAnswer:
-    given = {name: cell.strip() for name, cell in cells.items()}
     for name in ("planner", "problem"):
-        if not given[name] or not given[name].isprintable():
-            raise SettingError(f"{where}, {name}", "a name", given[name])
-    for name in ("seed", "queries"):
-        if not _WHOLE.fullmatch(given[name]):
-            must = "a whole number, at least 0, of 18 digits at most"
-            raise SettingError(f"{where}, {name}", must, given[name])
+        if not cells[name] or not cells[name].isprintable():
+            raise SettingError(f"{where}, {name}", "a name", cells[name])
+    seed, queries = (_whole(f"{where}, {name}", cells[name]) for name in ("seed", "queries"))
     cost = math.nan
-    if given["cost"]:
-        cost = float(given["cost"]) if _NUMBER.fullmatch(given["cost"]) else math.nan
+    if cells["cost"] and cells["cost"].lower() not in UNANSWERED:
+        cost = float(cells["cost"]) if NUMBER.fullmatch(cells["cost"]) else math.nan
         if not 0.0 < cost < math.inf:
-            must = "a length above 0, or empty where the run has no answer"
-            raise SettingError(f"{where}, cost", must, given["cost"])
-    seed, queries = int(given["seed"]), int(given["queries"])
-    return GivenAnswer(line, given["planner"], given["problem"], seed, queries, cost)
+            must = "a length above 0, or empty or inf where the run has no answer"
+            raise SettingError(f"{where}, cost", must, cells["cost"])
+    return GivenAnswer(line, cells["planner"], cells["problem"], seed, queries, cost)
+
+
+def _whole(where: str, text: str) -> int:
+    """Return a whole number, which may be written as `1e3` or `12.0`."""
+    value = Decimal(text) if NUMBER.fullmatch(text) else Decimal(-1)
+    if not 0 <= value < MOST or value != value.to_integral_value():
+        raise SettingError(where, "a whole number, at least 0, of 18 digits at most", text)
+    return int(value)
 
 
 def _by_run(answers: Sequence[GivenAnswer]) -> dict[tuple[str, str, int], list[GivenAnswer]]:

@@ -165,15 +165,15 @@ def not_judged(results: Results) -> str:
 
 
 def evidence(comparison: Comparison, better: str) -> str:
-    """Return a comparison in words: "lower in 80 % of pairs of runs (…)".
+    """Return a comparison in words: "lower by 97 % of the signed ranks (…), in 80 % of all …".
 
-    It gives the p-values of both tests, first that of the test which the verdict follows. The two
-    differ where more runs are better, but those that are worse are worse by more.
+    The signed ranks come first: the verdict follows them. The two may differ where more runs are
+    better, but those that are worse are worse by more.
     """
     low, high = comparison.better.interval
     return (
-        f"{better} in {100 * comparison.better.a12:.0f} % of pairs of runs (A12 "
-        f"{comparison.better.a12:.3f} [{low:.3f}, {high:.3f}]), p = "
-        f"{markdown.p_value(comparison.p_adjusted)} by seeds (signed rank), "
-        f"{markdown.p_value(comparison.unpaired_adjusted)} unpaired (rank sum)"
+        f"{better} by {100 * comparison.test.share:.0f} % of the signed ranks of seeds (p = "
+        f"{markdown.p_value(comparison.p_adjusted)}), in {100 * comparison.better.a12:.0f} % of "
+        f"all pairs of runs (A12 {comparison.better.a12:.3f} [{low:.3f}, {high:.3f}], rank-sum "
+        f"p = {markdown.p_value(comparison.unpaired_adjusted)})"
     )

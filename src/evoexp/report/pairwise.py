@@ -150,8 +150,8 @@ def matrix_drawing(results: Results, settings: ReportSettings) -> tuple[Drawing,
             "matrix",
             "How often one condition is better than another one",
             "Vargha and Delaney's A12 of the best cost: the share of pairs of runs in which the "
-            "condition of the row has the lower cost, ties count half. Bold: Wilcoxon's "
-            "signed-rank test on common seeds, adjusted by Holm over all pairs.",
+            "condition of the row has the lower cost, ties count half. Bold: Mann and Whitney's "
+            "test, adjusted by Holm over all pairs.",
             partial(matrix.matrix_table, labels, tested, settings.significance),
             matrix.draw_matrix,
             results.evolved,

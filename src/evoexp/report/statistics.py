@@ -5,6 +5,7 @@ medians, ranks and effect sizes are defined all the same, and nothing here takes
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -16,7 +17,6 @@ from evoexp.records import FloatArray
 
 EXACT_PAIRS = 200  # up to here the signed-rank distribution is exact, beyond it approximated
 EXACT_VALUES = 100  # of both samples together: the same of the rank-sum distribution
-MOST_SIGNED = 8  # tied differences whose signs are all permuted: 256 ways
 MOST_CHOSEN = 9  # tied values of both samples that are all permuted: at most 126 ways
 MOST_AT_ONCE = 50_000  # weights of resamples that are worked on at a time
 BOOTSTRAP_SEED = 20_250_419  # of the report's own generator; any fixed number
@@ -57,6 +57,17 @@ class SignedRank(NamedTuple):
     num_pairs: int
     positive_ranks: float
     p_value: float
+
+    @property
+    def share(self) -> float:
+        """W+ over the sum of all ranks, in [0, 1]; 1/2 without a difference."""
+        return 2.0 * self.positive_ranks / (self.num_pairs * (self.num_pairs + 1) or 1)
+
+    @property
+    def direction(self) -> int:
+        """1 if ranks of positive differences prevail, −1 if those of negative ones do, else 0."""
+        twice, total = 4.0 * self.positive_ranks, self.num_pairs * (self.num_pairs + 1)
+        return int(twice > total) - int(twice < total)
 
 
 class RankSum(NamedTuple):
@@ -145,6 +156,9 @@ def _binomial_result() -> type[Any]:
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
     """Test whether paired values differ (Wilcoxon 1945); ties share their mean rank.
 
+    The p-value is the same for (y, x): it is summed over the lower tail, which W+ of one order and
+    W− of the other share.
+
     Args:
         x: (pairs,); infinite values are compared as such, equal pairs are left out.
         y: (pairs,).
@@ -154,10 +168,32 @@ def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
     if not len(difference):
         return SignedRank(0, 0.0, 1.0)
     ranks = stats.rankdata(np.abs(difference))
-    method = _method(np.abs(difference), EXACT_PAIRS, MOST_SIGNED)
-    found = stats.wilcoxon(difference, method=method, correction=True)
-    positive = float(ranks[difference > 0.0].sum())
-    return SignedRank(len(difference), positive, float(found.pvalue))
+    positive, negative = (float(ranks[sign * difference > 0.0].sum()) for sign in (1.0, -1.0))
+    if len(difference) > EXACT_PAIRS:
+        method: Any = "asymptotic"  # scipy's stubs do not know it with every other argument
+        p_value = float(stats.wilcoxon(difference, method=method, correction=True).pvalue)
+    else:
+        p_value = min(1.0, 2.0 * _lower_tail(ranks, min(positive, negative)))
+    return SignedRank(len(difference), positive, p_value)
+
+
+def _lower_tail(ranks: FloatArray, limit: float) -> float:
+    """Return the probability that ranks with random signs give a W+ up to a limit.
+
+    The exact distribution, built rank by rank: sums of positive numbers alone, so that no digit is
+    lost however small they are.
+
+    Args:
+        ranks: (n,) multiples of 1/2.
+        limit: A multiple of 1/2.
+    """
+    share = np.zeros(int(2.0 * limit) + 1)  # by twice the sum
+    share[0] = 1.0
+    for rank in np.rint(2.0 * ranks).astype(np.int64):
+        more = np.zeros_like(share)
+        more[rank:] = share[: max(len(share) - rank, 0)]
+        share = 0.5 * (share + more)
+    return float(share.sum())
 
 
 def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
@@ -170,25 +206,26 @@ def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
     values = np.concatenate([x, y])
     if not len(x) or not len(y) or (values == values[0]).all():
         return RankSum(0.5 * len(x) * len(y), 1.0)
-    method = _method(values, EXACT_VALUES, MOST_CHOSEN)
-    found = stats.mannwhitneyu(x, y, method=method)
+    if len(np.unique(values)) == len(values) <= EXACT_VALUES:
+        found = stats.mannwhitneyu(x, y, method="exact")
+    elif len(values) <= MOST_CHOSEN:  # with ties: every choice of the first sample's ranks
+        return _chosen_ranks(stats.rankdata(values), len(x))
+    else:  # corrected for ties and continuity
+        found = stats.mannwhitneyu(x, y, method="asymptotic")
     return RankSum(float(found.statistic), float(found.pvalue))
 
 
-def _method(values: FloatArray, exact: int, permuted: int) -> Any:
-    """Return how scipy is to find the p-value of a test on ranks.
+def _chosen_ranks(ranks: FloatArray, size: int) -> RankSum:
+    """Test the sum of the first ranks against that of all choices of as many.
 
     Args:
-        values: That are ranked, (n,).
-        exact: Without ties: the exact distribution up to so many values.
-        permuted: With ties, which that distribution does not know: all permutations up to so many
-            values. Otherwise the normal approximation, corrected for ties and continuity.
+        ranks: (n + m,) of both samples, multiples of 1/2.
+        size: Of the first sample, n.
     """
-    if len(np.unique(values)) == len(values):
-        return "exact" if len(values) <= exact else "asymptotic"
-    if len(values) <= permuted:
-        return stats.PermutationMethod(n_resamples=10**6)  # all of them
-    return "asymptotic"
+    observed = float(ranks[:size].sum())
+    sums = np.array([sum(chosen) for chosen in itertools.combinations(ranks, size)])
+    p_value = 2.0 * min(float(np.mean(sums <= observed)), float(np.mean(sums >= observed)))
+    return RankSum(observed - 0.5 * size * (size + 1), min(1.0, p_value))
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

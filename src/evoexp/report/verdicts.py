@@ -55,7 +55,7 @@ class Comparison(NamedTuple):
         quantity: Its name, or that of the pair in a table of one quantity.
         num_seeds: Replicates that both have.
         median_difference: Of first minus second.
-        test: Signed-rank test of the pairs.
+        test: Signed-rank test of the pairs; positive ranks are those of the first being better.
         p_adjusted: Its p-value by Holm over all quantities compared; equal to the plain one until
             `adjusted`.
         unpaired: The same values tested as independent samples.
@@ -73,10 +73,12 @@ class Comparison(NamedTuple):
     better: Effect
 
     def says(self, significance: float) -> int:
-        """Return 1 if the first is significantly better, −1 if significantly worse, else 0."""
-        if self.p_adjusted >= significance or self.better.a12 == 0.5:
-            return 0
-        return 1 if self.better.a12 > 0.5 else -1
+        """Return 1 if the first is significantly better, −1 if significantly worse, else 0.
+
+        Significance and direction are those of one statistic, the signed ranks: A12 and medians may
+        point the other way.
+        """
+        return self.test.direction if self.p_adjusted < significance else 0
 
 
 def judged(holds: bool | None) -> str:
@@ -165,8 +167,8 @@ def compare(
         confidence: Level of the interval.
         num_resamples: Of the bootstrap.
     """
-    test, unpaired = signed_rank(first, second), rank_sum(first, second)
     sign = -1.0 if lower_is_better else 1.0
+    test, unpaired = signed_rank(sign * first, sign * second), rank_sum(first, second)
     better = effect(sign * first, sign * second, confidence, num_resamples)
     differences = np.zeros(len(first))  # two infinite costs do not differ
     np.subtract(first, second, out=differences, where=first != second)
@@ -199,6 +201,19 @@ def judge_greater(
         p_adjusted: That of the test where it is one of several; None: it stands alone.
     """
     p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
+    says = greater(one, two, p_value, significance)
+    return {1: REPRODUCED, -1: CONTRADICTED}.get(says, INCONCLUSIVE)
+
+
+def greater(one: Proportion, two: Proportion, p_value: float, significance: float) -> int:
+    """Return 1 if a proportion is significantly greater than another, −1 if smaller, else 0.
+
+    Args:
+        one: Of some runs.
+        two: Of other runs.
+        p_value: Of Fisher's exact test, adjusted where it is one of several.
+        significance: Below this p-value a difference counts.
+    """
     if not one.total or not two.total or p_value >= significance:
-        return INCONCLUSIVE
-    return REPRODUCED if one.share > two.share else CONTRADICTED
+        return 0
+    return int(one.share > two.share) - int(one.share < two.share)

@@ -17,6 +17,7 @@ from evoexp.scenarios.obstacles import Obstacle
 from evoexp.validation import Component, NonNegative, Settings, Vector
 
 HALF_TURN = 180.0  # [deg] genes live in [0, π)
+ROUNDING = 2.0**-48  # [-] more than the relative errors of what `_reach` computes
 
 
 class Posture(Settings):
@@ -138,6 +139,10 @@ def _reach(
     squared = float(x * x + y * y)
     first, second = (float(length) for length in lengths)
     cosine = (squared - first * first - second * second) / (2.0 * first * second)
+    # a stretched or folded arm is one up to rounding, which an arccosine would blow up to 1e-8
+    rounding = ROUNDING * (squared + first * first + second * second) / (first * second)
+    if abs(abs(cosine) - 1.0) <= rounding:
+        cosine = 1.0 if cosine > 0.0 else -1.0
     if not -1.0 <= cosine <= 1.0:
         least, most = abs(first - second), first + second
         raise SettingError(
@@ -149,4 +154,8 @@ def _reach(
     bend = -side * acos(cosine)
     sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))
     one = atan2(float(y), float(x)) - atan2(second * sine_bend, first + second * cosine)
-    return np.array([one, one + bend]) / DEGREE
+    angles = np.array([one, one + bend]) / DEGREE
+    # 0 and 180 deg bound the genes: rounding must not put an arm outside
+    for bound in (0.0, HALF_TURN):
+        angles[np.abs(angles - bound) <= ROUNDING * HALF_TURN] = bound
+    return angles

@@ -62,6 +62,7 @@ def fill_table(
     members: IntArray,
     scale: float,
     is_first: bool,
+    margin: float,
     table: Table,
 ) -> None:
     """Write the blocks of some individuals of a population, and their reaches.
@@ -76,6 +77,7 @@ def fill_table(
         scale: A power of two.
         is_first: Whether this is arm 1, whose reaches are written one by one; else those of blocks
             are.
+        margin: Added to the reaches of arm 1: `MARGIN`, and what counts as contact.
         table: Written; block by block and configuration by configuration.
     """
     blocks, reaches = borrowed(table)
@@ -101,7 +103,7 @@ def fill_table(
             elbow_x, elbow_y = origin_x + u, origin_y + v
             ends = elbow_x, elbow_y, elbow_x + w, elbow_y + z
             if is_first:
-                most = transposed(farthest(origin_x, origin_y, ends))
+                most = transposed(farthest(origin_x, origin_y, ends, margin))
                 store_reaches(reaches, block * LANES, k, num, most)
             else:
                 store(
@@ -151,18 +153,20 @@ def spans(x: float, y: float, ends: tuple[Vector, Vector, Vector, Vector]) -> Ei
 
 
 @inlined
-def farthest(x: float, y: float, ends: tuple[Vector, Vector, Vector, Vector]) -> Eight:
+def farthest(
+    x: float, y: float, ends: tuple[Vector, Vector, Vector, Vector], margin: float
+) -> Eight:
     """Return how far arms reach at most along ±x, ±y, ±(x + y), ±(x − y), and a margin more."""
     a, b, c, d, e, f, g, h = spans(x, y, ends)
     return (
-        e + MARGIN,
-        f + MARGIN,
-        g + MARGIN,
-        h + MARGIN,
-        MARGIN - a,
-        MARGIN - b,
-        MARGIN - c,
-        MARGIN - d,
+        e + margin,
+        f + margin,
+        g + margin,
+        h + margin,
+        margin - a,
+        margin - b,
+        margin - c,
+        margin - d,
     )
 
 

@@ -11,7 +11,8 @@ Those run in single precision, on eight individuals at a time (`crossing_blocks`
 axis separates them: that spares most. A pair of links is apart where one of its two products is
 above `tau`, a bound on all rounding (proved at `_threshold`), and crosses where both are below
 −tau; what is neither, two pairs of ten thousand random ones, is decided by the exact predicates. So
-counts are exact, whatever the vector width.
+counts are the same whatever the vector width, and exact but for contacts that rounding hides:
+links nearer than `segment_predicates.contact_tolerance` touch.
 
 100 × 100 pairs in 4 configurations take 10 … 17 µs in a run of a search and 30 where all angles are
 random; blocks of 104 individuals, without a look for axes, took 27 in both.
@@ -26,13 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.models.crossing_blocks import (
+    MARGIN,
     Table,
     cross_block,
     farthest_of,
     fill_table,
     new_table,
 )
-from evoexp.collision.models.segment_predicates import touching
+from evoexp.collision.models.segment_predicates import contact_tolerance, meeting
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import exact_sincos
 from evoexp.numeric.vectors import LANES, least_lane, load, mask_bits, spread, upper
@@ -159,34 +161,52 @@ def longest_link(base_x: float, base_y: float, points: FloatArray) -> float:
 
 
 @kernel
-def _threshold(longest: float, distance: float) -> tuple[float, np.float32]:
+def _threshold(longest: float, distance: float, tolerance: float) -> tuple[float, np.float32]:
     """Return the scale 2^-e of tables, and tau, a bound on the error of line functions' products.
 
     With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its
     error is below 5 u V: the vectors are rounded (2 u), their products and differences (2 u, four
     times), sums of at most three terms follow. So the product of two errs by less than (10 + 1) u
     V² + 25 u² V²; taken are 16. The double precision of what is prepared and the sums of rounded
-    vectors add less than 2^-45 V².
+    vectors add less than 2^-45 V². A shift by the tolerance t, which makes two links touch that are
+    t apart, alters line functions by l t at most, and so products by 2 V l t + l² t².
     """
     exponent = max(math.frexp(max(longest, distance))[1], -_HIGHEST)
     scale = math.ldexp(1.0, -exponent)
     largest = longest * scale * (distance * scale + 3.0 * longest * scale)
-    return scale, np.float32(16.0 * _UNIT * largest * largest + _FLOOR)
+    moved = longest * scale * (tolerance * scale)
+    shift = moved * (2.0 * largest + moved)
+    return scale, np.float32(16.0 * _UNIT * largest * largest + shift + _FLOOR)
+
+
+@kernel
+def tolerance_of(base_1: Point, lengths_1: Point, base_2: Point, lengths_2: Point) -> float:
+    """Return the `contact_tolerance` of two arms [length unit]."""
+    size_1 = max(abs(base_1[0]), abs(base_1[1])) + lengths_1[0] + lengths_1[1]
+    size_2 = max(abs(base_2[0]), abs(base_2[1])) + lengths_2[0] + lengths_2[1]
+    return contact_tolerance(max(size_1, size_2))
 
 
 @kernel
 def colliding(
-    base_1: Point, points_1: FloatArray, i: int, base_2: Point, points_2: FloatArray, j: int, k: int
+    base_1: Point,
+    points_1: FloatArray,
+    i: int,
+    base_2: Point,
+    points_2: FloatArray,
+    j: int,
+    k: int,
+    tolerance: float,
 ) -> bool:
     """Return whether two individuals collide in configuration k, by the exact predicates."""
     ax, ay, dx, dy = base_1[0], base_1[1], base_2[0], base_2[1]
     bx, by, cx, cy = points_1[k, 0, i], points_1[k, 1, i], points_1[k, 2, i], points_1[k, 3, i]
     ex, ey, fx, fy = points_2[k, 0, j], points_2[k, 1, j], points_2[k, 2, j], points_2[k, 3, j]
     return (
-        touching(ax, ay, bx, by, dx, dy, ex, ey)
-        or touching(ax, ay, bx, by, ex, ey, fx, fy)
-        or touching(bx, by, cx, cy, dx, dy, ex, ey)
-        or touching(bx, by, cx, cy, ex, ey, fx, fy)
+        meeting(ax, ay, bx, by, dx, dy, ex, ey, tolerance)
+        or meeting(ax, ay, bx, by, ex, ey, fx, fy, tolerance)
+        or meeting(bx, by, cx, cy, dx, dy, ex, ey, tolerance)
+        or meeting(bx, by, cx, cy, ex, ey, fx, fy, tolerance)
     )
 
 
@@ -201,6 +221,7 @@ def _count_rows(
     table_2: Table,
     columns: IntArray,
     tau: np.float32,
+    tolerance: float,
     counts: NDArray[np.int16],
 ) -> None:
     """Fill counts[rows, columns] from the tables of all of population 1 and of the columns."""
@@ -232,7 +253,9 @@ def _count_rows(
                 if found[certain + U(n)] != found[possible + U(n)]:
                     j, total = columns[n], 0
                     for k in range(points_1.shape[0]):
-                        total += colliding(base_1, points_1, group[r], base_2, points_2, j, k)
+                        total += colliding(
+                            base_1, points_1, group[r], base_2, points_2, j, k, tolerance
+                        )
                     counts[i, U(j)] = total
 
 
@@ -259,6 +282,7 @@ def crossings(
     base_2: Point,
     points_2: FloatArray,
     columns: IntArray,
+    tolerance: float,
     counts: NDArray[np.int16],
     sums_1: IntArray,
     sums_2: IntArray,
@@ -273,6 +297,7 @@ def crossings(
         base_2: x, y of the base of arm 2.
         points_2: (K, 4, N2).
         columns: Individuals of population 2 that changed.
+        tolerance: Of `tolerance_of`; 0: the given points are exact.
         counts: (N1, N2) int16.
         sums_1: (N1,) int64.
         sums_2: (N2,) int64.
@@ -286,17 +311,32 @@ def crossings(
     apart = (x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1)
     if not squared + apart < _LARGEST:
         return False
-    scale, tau = _threshold(math.sqrt(squared), math.sqrt(apart))
+    scale, tau = _threshold(math.sqrt(squared), math.sqrt(apart), tolerance)
+    margin = MARGIN + 2.0 * tolerance * scale  # along x ± y, whose unit is sqrt 2
     num, num_1, num_2 = points_1.shape[0], points_1.shape[2], points_2.shape[2]
     one, two = new_table(num_1, num, num_1 + LANES), new_table(num_2, num, num_2 // LANES + 1)
-    fill_table(points_1, base_1, base_2, np.arange(num_1), scale, True, one)
+    fill_table(points_1, base_1, base_2, np.arange(num_1), scale, True, margin, one)
     # changed rows against all columns, then the other rows against changed columns
     if len(rows) > 0:
         everyone = np.arange(num_2)
-        fill_table(points_2, base_2, base_1, everyone, scale, False, two)
-        _count_rows(base_1, points_1, one, rows, base_2, points_2, two, everyone, tau, counts)
+        fill_table(points_2, base_2, base_1, everyone, scale, False, margin, two)
+        _count_rows(
+            base_1, points_1, one, rows, base_2, points_2, two, everyone, tau, tolerance, counts
+        )
     if len(columns) > 0 and len(other_rows) > 0:
-        fill_table(points_2, base_2, base_1, columns, scale, False, two)
-        _count_rows(base_1, points_1, one, other_rows, base_2, points_2, two, columns, tau, counts)
+        fill_table(points_2, base_2, base_1, columns, scale, False, margin, two)
+        _count_rows(
+            base_1,
+            points_1,
+            one,
+            other_rows,
+            base_2,
+            points_2,
+            two,
+            columns,
+            tau,
+            tolerance,
+            counts,
+        )
     sum_counts(counts, sums_1, sums_2)
     return True

@@ -3,8 +3,8 @@
 Curkovic, Jerbic & Stipancic 2013, section 3. Each arm has an absolute angle per link, from +x; two
 arms collide in a configuration if any of the four pairs of links have a point in common. An
 individual of one population is judged against every individual of the other, configuration by
-configuration (Eqs 4–5). The counts are exact for the given points: parallel, collinear, touching
-and vanishing links included.
+configuration (Eqs 4–5). Parallel, collinear, touching and vanishing links are decided exactly;
+links that only rounding holds apart touch (`segment_predicates.contact_tolerance`).
 
 Work with it in this order: `path_configurations` (where), `Arm.points` (once per individual),
 `count_crossings` (all pairs) or `update_crossings` (only those of changed individuals), all on
@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.models import link_crossing_kernels as kernels
+from evoexp.collision.models.segment_predicates import meeting
 from evoexp.numeric.compilation import kernel
-from evoexp.numeric.elementary import atan2, sincos
+from evoexp.numeric.elementary import atan2, sin
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 PARALLEL = 1e-12
-"""`closed_form` takes two links as parallel up to this sine of the angle between them [-]."""
+"""Links are parallel in `closed_form` up to this sine of the angle between them [-]."""
 
 
 class Arm(NamedTuple):
@@ -181,11 +182,8 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
 
     where each product is a sine of a difference of two angles times two lengths; for i = j = 2 and
     equal lengths this is Eq. 12. The paper counts mu, nu in (0, 1]; here in [0, 1]: a link has two
-    ends. Parallel links (`PARALLEL`) meet if they are on one line and overlap, and a link of length
-    0 is a point.
-
-    This is the paper's formula, rounded: within some 1e-16 of touching it may err,
-    `count_crossings` never does.
+    ends. The formula is rounded, and says nothing of parallel links: whether links cross is decided
+    as by `count_crossings`.
 
     Args:
         one: Arm 1.
@@ -208,54 +206,55 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
     angles[:2], angles[2:4], angles[4] = q_1, q_2, atan2(dy, dx)
     shape = (4, q_1.shape[1])
     found = ClosedForm(np.empty(shape), np.empty(shape), np.empty(shape, dtype=np.bool_))
-    _intersect(lengths, angles, *found)
+    _intersect(lengths, angles, found.mu, found.nu)
+    tolerance = kernels.tolerance_of(one.base, one.lengths, two.base, two.lengths)
+    _cross(_joints(one, q_1), _joints(two, q_2), tolerance, found.crossing)
     return found
 
 
+def _joints(arm: Arm, q: FloatArray) -> FloatArray:
+    """Return base, elbow and tip, (3, 2, n), at link angles (2, n) [rad]."""
+    joints = np.empty((3, 2, q.shape[1]))
+    joints[0] = np.array(arm.base)[:, None]
+    joints[1:] = arm.points(q[None]).reshape(2, 2, -1)
+    return joints
+
+
 @kernel
-def _intersect(
-    length: FloatArray, angle: FloatArray, mu: FloatArray, nu: FloatArray, crossing: BoolArray
-) -> None:
-    sines, cosines = np.empty((5, 5)), np.empty((5, 5))
+def _cross(one: FloatArray, two: FloatArray, tolerance: float, crossing: BoolArray) -> None:
+    """Write whether links cross, from the joints (3, 2, n) of both arms."""
+    for pair in range(4):
+        i, j = pair // 2, pair % 2
+        for n in range(crossing.shape[1]):
+            (ax, ay), (bx, by) = one[i, :, n], one[i + 1, :, n]
+            (cx, cy), (dx, dy) = two[j, :, n], two[j + 1, :, n]
+            crossing[pair, n] = meeting(ax, ay, bx, by, cx, cy, dx, dy, tolerance)
+
+
+@kernel
+def _intersect(length: FloatArray, angle: FloatArray, mu: FloatArray, nu: FloatArray) -> None:
+    sines = np.empty((5, 5))
     for n in range(angle.shape[1]):
         for a in range(5):
             for b in range(5):
-                turn = angle[b, n] - angle[a, n]
-                sines[a, b], cosines[a, b] = sincos(turn)
-        # w of every pair: across and along either link
+                sines[a, b] = sin(angle[b, n] - angle[a, n])
         for i in range(2):
             for j in range(2):
                 pair, v = 2 * i + j, 2 + j
-                across_i = length[4] * sines[i, 4]  # of w, from the line of link i
+                mu[pair, n] = nu[pair, n] = np.nan
+                if abs(sines[i, v]) <= PARALLEL or length[i] == 0.0 or length[v] == 0.0:
+                    continue
+                # w across either link
+                across_i = length[4] * sines[i, 4]
                 across_j = length[4] * sines[v, 4]
-                along_i = length[4] * cosines[i, 4]
-                along_j = length[4] * cosines[v, 4]
                 if j == 1:
                     across_i += length[2] * sines[i, 2]
-                    along_i += length[2] * cosines[i, 2]
                     across_j += length[2] * sines[v, 2]
-                    along_j += length[2] * cosines[v, 2]
                 if i == 1:
                     across_i -= length[0] * sines[i, 0]
-                    along_i -= length[0] * cosines[i, 0]
                     across_j -= length[0] * sines[v, 0]
-                    along_j -= length[0] * cosines[v, 0]
-                # lines that cross
-                if abs(sines[i, v]) > PARALLEL and length[i] > 0.0 and length[v] > 0.0:
-                    mu[pair, n] = -across_j / (length[i] * sines[i, v])
-                    nu[pair, n] = -across_i / (length[v] * sines[i, v])
-                    crossing[pair, n] = 0.0 <= mu[pair, n] <= 1.0 and 0.0 <= nu[pair, n] <= 1.0
-                    continue
-                # parallel lines, or a point
-                mu[pair, n] = nu[pair, n] = np.nan
-                reach = PARALLEL * (length[0] + length[1] + length[2] + length[3] + length[4])
-                if length[i] > 0.0:  # in the frame of link i, link j runs from `along_i` on
-                    end = along_i + length[v] * cosines[i, v]
-                    off = max(abs(across_i), abs(across_i + length[v] * sines[i, v]))
-                    low, high, own = min(along_i, end), max(along_i, end), length[i]
-                else:  # a point in the frame of link j
-                    off, low, high, own = abs(across_j), -along_j, -along_j, length[v]
-                crossing[pair, n] = off <= reach and low <= own + reach and high >= -reach
+                mu[pair, n] = -across_j / (length[i] * sines[i, v])
+                nu[pair, n] = -across_i / (length[v] * sines[i, v])
 
 
 def _update(
@@ -269,7 +268,10 @@ def _update(
     rows, others, columns = members
     base_1 = float(one.base[0]), float(one.base[1])
     base_2 = float(two.base[0]), float(two.base[1])
-    if not kernels.crossings(base_1, points_1, rows, others, base_2, points_2, columns, *found):
+    tolerance = kernels.tolerance_of(base_1, one.lengths, base_2, two.lengths)
+    if not kernels.crossings(
+        base_1, points_1, rows, others, base_2, points_2, columns, tolerance, *found
+    ):
         raise ValueError("points and bases must be finite and below 1e150")
 
 

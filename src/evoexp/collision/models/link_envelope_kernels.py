@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.models.crossing_blocks import add_where, greater, lesser
-from evoexp.collision.models.envelope_contact import Envelope, colliding
+from evoexp.collision.models.envelope_contact import Envelope, colliding, tolerance_of
 from evoexp.collision.models.link_crossing_kernels import Point, directions, sum_counts
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import LANES, Singles, load_singles, magnitude, spread_single
@@ -94,7 +94,7 @@ def _threshold(arm_1: Envelope, arm_2: Envelope) -> tuple[float, np.float32]:
     With links ≤ l, bases d apart, half widths and radii ≤ h: every distance is below V = d + 3 l +
     4 h and errs by less than 10 u V, u = 2^-24: the unit vectors' products (4 u), their multiples
     (2 u), and sums of up to six terms. So the product of two errs by less than 21 u V², a sum of
-    two squares by less than 32 u V² (40 taken).
+    two squares by less than 32 u V² (40 taken). What counts as contact, t, adds 2 V t + t².
     """
     (ax, ay), (dx, dy) = arm_1.base, arm_2.base
     apart = math.sqrt((dx - ax) * (dx - ax) + (dy - ay) * (dy - ay))
@@ -103,7 +103,9 @@ def _threshold(arm_1: Envelope, arm_2: Envelope) -> tuple[float, np.float32]:
     most = apart + 3.0 * longest + arm_1.half_width + arm_2.half_width
     most = most + arm_1.tcp_radius + arm_2.tcp_radius
     scale = math.ldexp(1.0, -max(math.frexp(most)[1], -1000))
-    return scale, np.float32(40.0 * _UNIT * (most * scale) * (most * scale) + _FLOOR)
+    largest, near = most * scale, tolerance_of(arm_1, arm_2) * scale
+    contact = near * (2.0 * largest + near)
+    return scale, np.float32(40.0 * _UNIT * largest * largest + contact + _FLOOR)
 
 
 @kernel

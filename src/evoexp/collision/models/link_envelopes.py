@@ -2,12 +2,11 @@
 
 Curkovic, Jerbic & Stipancic 2013, section 4: each link is a set of two boundary lines, parallel to
 it, and a circle of variable radius lies around the tool centre point (Fig. 11). Two arms collide in
-a configuration if a boundary line of one has a point in common with a boundary line of the other,
-or a circle of one is nearer to a boundary line of the other than its radius, or to its circle than
-both radii. Boundary lines have no ends across: an arm may lie between another's two lines
-unnoticed, as in the paper. Without width and radius this is `link_crossings`.
+a configuration if a boundary line or the circle of one touches a boundary line or the circle of the
+other. Boundary lines have no ends across: an arm may lie between another's two lines unnoticed, as
+in the paper. Without width and radius this is `link_crossings`.
 
-The lines are decided exactly, as given by `EnvelopedArm.boundaries`; distances in double precision.
+Lines and circles that only rounding holds apart touch, as in `link_crossings`.
 """
 
 from typing import NamedTuple

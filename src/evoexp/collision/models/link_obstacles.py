@@ -1,8 +1,8 @@
 """Collisions of planar arms of two links with discs, rectangles, capsules and half-planes.
 
-A link, or a boundary line of an envelope, collides where it has a point in common with the solid; a
-circle around the tip collides where the solid is nearer than its radius. Both are decided in double
-precision, which is right but within rounding of touching.
+A link, a boundary line of an envelope, or a circle around the tip collides where it touches the
+solid. All is decided in double precision, and what only rounding may hold apart touches
+(`segment_predicates.contact_tolerance`).
 """
 
 from typing import NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 
 from evoexp.collision.models.link_crossings import Arm, checked
 from evoexp.collision.models.link_envelopes import EnvelopedArm
-from evoexp.collision.models.segment_predicates import squared_distance
+from evoexp.collision.models.segment_predicates import contact_tolerance, squared_distance
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import U
@@ -83,7 +83,7 @@ def count_obstacle_collisions(arm: Arm, points: FloatArray, obstacles: PlanarObs
     lines[0, 0], lines[0, 1] = arm.base
     lines[0, 2], lines[0, 3] = points[:, 0], points[:, 1]
     lines[1] = points.transpose(1, 0, 2)
-    return np.asarray(_hits(lines, obstacles).sum(axis=0))
+    return np.asarray(_hits(lines, obstacles, _size(arm)).sum(axis=0))
 
 
 def count_enveloped_obstacle_collisions(
@@ -101,30 +101,39 @@ def count_enveloped_obstacle_collisions(
     Raises:
         ValueError: If outlines has another shape.
     """
-    hit = _hits(np.ascontiguousarray(arm.boundaries(outlines)), obstacles)
+    size = _size(arm.arm) + arm.half_width + arm.tcp_radius
+    hit = _hits(np.ascontiguousarray(arm.boundaries(outlines)), obstacles, size)
     if arm.tcp_radius > 0.0:
         tips = np.ascontiguousarray(outlines[:, 2:4].transpose(1, 0, 2))
         near = np.zeros(hit.shape, dtype=np.int64)
-        _circles(tips.reshape(2, -1), arm.tcp_radius, obstacles, near.reshape(-1))
+        _circles(tips.reshape(2, -1), arm.tcp_radius, obstacles, size, near.reshape(-1))
         hit |= near > 0
     return np.asarray(hit.sum(axis=0))
 
 
-def _hits(lines: FloatArray, obstacles: PlanarObstacles) -> BoolArray:
+def _size(arm: Arm) -> float:
+    """Return the greatest coordinate that an arm can reach."""
+    return float(max(abs(arm.base[0]), abs(arm.base[1])) + arm.lengths[0] + arm.lengths[1])
+
+
+def _hits(lines: FloatArray, obstacles: PlanarObstacles, arm_size: float) -> BoolArray:
     hit = np.zeros(lines.shape[2:], dtype=np.int64)
     flat = lines.reshape(len(lines), 4, -1)
     for line in flat:
-        _segments(line, obstacles, hit.reshape(-1))
+        _segments(line, obstacles, arm_size, hit.reshape(-1))
     return np.asarray(hit > 0)
 
 
 @kernel
-def _segments(lines: FloatArray, obstacles: PlanarObstacles, hit: IntArray) -> None:
+def _segments(
+    lines: FloatArray, obstacles: PlanarObstacles, arm_size: float, hit: IntArray
+) -> None:
     """Count the obstacles that each segment meets.
 
     Args:
         lines: (4, n) x, y, x, y of the ends.
         obstacles: The obstacles.
+        arm_size: Greatest coordinate of a segment [length unit].
         hit: (n,), to which the numbers are added.
     """
     kind, center, direction, size = (
@@ -132,7 +141,8 @@ def _segments(lines: FloatArray, obstacles: PlanarObstacles, hit: IntArray) -> N
     )  # fmt: skip
     for o in range(len(kind)):
         x, y, c, s = center[o, 0], center[o, 1], direction[o, 0], direction[o, 1]
-        a, b = size[o, 0], size[o, 1]
+        near = contact_tolerance(arm_size + abs(x) + abs(y) + size[o, 0] + size[o, 1])
+        a, b, half = size[o, 0] + near, size[o, 1] + near, size[o, 1]
         shape = kind[o]
         for m in range(lines.shape[1]):
             n = U(m)
@@ -145,20 +155,23 @@ def _segments(lines: FloatArray, obstacles: PlanarObstacles, hit: IntArray) -> N
             elif shape == BOX:
                 met = _meets_box(px, py, qx, qy, a, b)
             elif shape == CAPSULE:
-                met = _meets_capsule(px, py, qx, qy, a, b)
+                met = _meets_capsule(px, py, qx, qy, a, half)
             else:
-                met = min(px, qx) <= 0.0
+                met = min(px, qx) <= near
             hit[n] += met
 
 
 @kernel
-def _circles(tips: FloatArray, radius: float, obstacles: PlanarObstacles, hit: IntArray) -> None:
-    """Count the obstacles that are nearer to each point than a radius.
+def _circles(
+    tips: FloatArray, radius: float, obstacles: PlanarObstacles, arm_size: float, hit: IntArray
+) -> None:
+    """Count the obstacles that the circle around each point touches.
 
     Args:
         tips: (2, n) x, y of the points.
         radius: The radius [length unit].
         obstacles: The obstacles.
+        arm_size: Greatest coordinate of a circle [length unit].
         hit: (n,), to which the numbers are added.
     """
     kind, center, direction, size = (
@@ -167,22 +180,23 @@ def _circles(tips: FloatArray, radius: float, obstacles: PlanarObstacles, hit: I
     for o in range(len(kind)):
         x, y, c, s = center[o, 0], center[o, 1], direction[o, 0], direction[o, 1]
         a, b = size[o, 0], size[o, 1]
+        wide = radius + contact_tolerance(arm_size + abs(x) + abs(y) + a + b)
         for m in range(tips.shape[1]):
             n = U(m)
             dx, dy = tips[U(0), n] - x, tips[U(1), n] - y
             px, py = c * dx + s * dy, c * dy - s * dx
             if kind[o] == SPHERE:
-                off, reach = dx * dx + dy * dy, a + radius
+                off, reach = dx * dx + dy * dy, a + wide
             elif kind[o] == BOX:
                 u, v = max(abs(px) - a, 0.0), max(abs(py) - b, 0.0)
-                off, reach = u * u + v * v, radius
+                off, reach = u * u + v * v, wide
             elif kind[o] == CAPSULE:
                 u = max(abs(px) - b, 0.0)
-                off, reach = u * u + py * py, a + radius
+                off, reach = u * u + py * py, a + wide
             else:
                 u = max(px, 0.0)
-                off, reach = u * u, radius
-            hit[n] += off < reach * reach
+                off, reach = u * u, wide
+            hit[n] += off <= reach * reach
 
 
 @kernel

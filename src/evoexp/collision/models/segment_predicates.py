@@ -5,6 +5,10 @@ without error (Shewchuk 1997, "Adaptive precision floating-point arithmetic and 
 geometric predicates": two-sum, two-product, expansions), from `+ − ×` alone. The answer is that of
 rational arithmetic on the given coordinates while these lie below 1e150 and, where not zero, within
 280 decades of the greatest.
+
+Ends of links are sums of rounded sines, so links that touch, or lie on one line, may come out a few
+units in the last place apart (sin 45° and sin 135° differ by one). `meeting` therefore counts what
+is at most a tolerance apart as contact; `contact_tolerance` bounds that rounding.
 """
 
 import math
@@ -12,6 +16,9 @@ import math
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
+
+ROUNDING = 2.0**-46
+"""`contact_tolerance` of coordinates up to 1 [-]."""
 
 _FILTER = 3.3306690738754716e-16  # (3 + 16 u) u with u = 2^-53: relative error of the determinant
 _UNDERFLOW = 1e-300  # products that small have lost bits
@@ -66,6 +73,50 @@ def touching(
         or (a == 0.0 and _between(cx, cy, dx, dy, ax, ay))
         or (b == 0.0 and _between(cx, cy, dx, dy, bx, by))
     )
+
+
+@kernel
+def contact_tolerance(size: float) -> float:
+    """Return the distance up to which rounding cannot tell two planar arms from touching ones.
+
+    With u = 2^-53, and angles within ±π, the computed end of a link is off by at most 46 u · size:
+
+    - angles by 40 u: 2 π u from degrees to radians, 3 π u between two configurations, 24 u where
+      the end-effector's place is given (two arctangents and an arccosine);
+    - sine and cosine by 1.2 u each, their multiples and the sums of them by 4 u.
+
+    Two arms are thus off by 92 u · size against each other, and the distance of two segments is
+    rounded by less than 20 u · size: 128 u · size = 2^-46 · size exceed both. What touches in exact
+    arithmetic always counts; what is more than twice the tolerance apart never does.
+
+    Args:
+        size: Greatest coordinate that an end can have, and that of an obstacle, if it is one
+            [length unit].
+    """
+    return ROUNDING * size
+
+
+@kernel
+def meeting(
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+    cx: float,
+    cy: float,
+    dx: float,
+    dy: float,
+    tolerance: float,
+) -> bool:
+    """Return whether the segments ab and cd touch, or are at most `tolerance` apart."""
+    if touching(ax, ay, bx, by, cx, cy, dx, dy):
+        return True
+    # segments that do not cross are nearest to each other at an end
+    least = min(
+        min(squared_distance(ax, ay, bx, by, cx, cy), squared_distance(ax, ay, bx, by, dx, dy)),
+        min(squared_distance(cx, cy, dx, dy, ax, ay), squared_distance(cx, cy, dx, dy, bx, by)),
+    )
+    return tolerance > 0.0 and least <= tolerance * tolerance
 
 
 @kernel

@@ -23,6 +23,7 @@ from evoexp.report.kit import (
     markdown,
     solved,
     success,
+    verdicts,
 )
 
 RECOMMENDED = 100.0  # individuals (section 5)
@@ -186,18 +187,22 @@ def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSetti
     """Judge that smaller populations meet their goals less often."""
     pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
     adjusted = holm([fisher_exact(success(c), success(own)) for _, _, c, own in pairs])
-    clear = [pair for pair, p in zip(pairs, adjusted, strict=True) if p < settings.significance]
-    less = sum(success(c).share < success(own).share for _, _, c, own in clear)
+    says = [
+        verdicts.greater(success(own), success(c), p, settings.significance)
+        for (_, _, c, own), p in zip(pairs, adjusted, strict=True)
+    ]
+    clear = [pair for pair, said in zip(pairs, says, strict=True) if said]
+    less, more = says.count(1), says.count(-1)
     texts = (
         f"{name} {value:g}: {markdown.share(*success(c))} for {markdown.share(*success(own))}"
         for name, value, c, own in clear
     )
     told = (
         f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
-        f"often in {len(clear) - less}: {'; '.join(texts) or '–'}"
+        f"often in {more}: {'; '.join(texts) or '–'}"
     )
     hearing = judge.on("smaller_converge_less")
-    return hearing.own(told, f"{len(pairs)} pairs", _unless(len(clear) > less, less))
+    return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 
 def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Values) -> Claim:

@@ -26,6 +26,7 @@ from evoexp.report.kit import (
     markdown,
     run_measures,
     sweep_figures,
+    verdicts,
 )
 
 
@@ -131,7 +132,7 @@ def operator_claims(
         compared_rows = [rows[name].get(part.label) for name in rows]
         found = [row for row in compared_rows if row is not None]
         says = [row.says(settings.significance) for row in found]
-        says.append(_fewer(own, other, p_value, settings.significance))
+        says.append(verdicts.greater(other, own, p_value, settings.significance))
         told = (
             f"{_told(rows[COST].get(part.label), COST, '–')}; "
             f"{_told(rows[EVENNESS].get(part.label), EVENNESS, 'deg', (printed, part))}; "
@@ -157,12 +158,6 @@ def refuted(condition: ConditionResults) -> Proportion:
     """Count the motions whose bodies touch."""
     counts = condition.verdicts
     return Proportion(counts.refuted, counts.judged)
-
-
-def _fewer(one: Proportion, two: Proportion, p_value: float, significance: float) -> int:
-    if p_value >= significance or not one.total or not two.total:
-        return 0
-    return 1 if one.share < two.share else -1
 
 
 def _told(

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_crossing_kernels import crossings, link_points
+from evoexp.collision.models.link_crossing_kernels import crossings, link_points, tolerance_of
 from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
@@ -311,10 +311,10 @@ def evaluate_lines(
     for a in range(robots):
         for b in range(a + 1, robots):
             one, two = (arms[a, 0], arms[a, 1]), (arms[b, 0], arms[b, 1])
+            tolerance = tolerance_of(one, (arms[a, 2], arms[a, 3]), two, (arms[b, 2], arms[b, 3]))
             first, second = points[a][1:last], points[b][1:last]
-            if not crossings(
-                one, first, everyone, nobody, two, second, nobody, collisions[pair], rows, columns
-            ):
+            fixed = one, first, everyone, nobody, two, second, nobody, tolerance
+            if not crossings(*fixed, collisions[pair], rows, columns):
                 return False
             for k in range(count):
                 sums[a, k] += rows[k]

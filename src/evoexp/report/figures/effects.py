@@ -144,15 +144,16 @@ def effects_table(
 
     Returns:
         Columns quantity, condition (the other one), a12, lower, upper, p_adjusted (signed rank),
-        unpaired_adjusted (rank sum), seeds, significance.
+        unpaired_adjusted (rank sum), direction (of the signed ranks: 1 where the first is better),
+        seeds, significance.
     """
     rows = [
         (quantity, c.quantity, c.better.a12, *c.better.interval, *tests, c.num_seeds)
         for quantity, found in comparisons.items()
         for c in found
-        for tests in ((c.p_adjusted, c.unpaired_adjusted),)
+        for tests in ((c.p_adjusted, c.unpaired_adjusted, c.test.direction),)
     ]
-    names = ["quantity", "condition", "a12", "lower", "upper", *TESTS, "seeds"]
+    names = ["quantity", "condition", "a12", "lower", "upper", *TESTS, "direction", "seeds"]
     return pd.DataFrame(rows, columns=names).assign(significance=significance)
 
 
@@ -187,6 +188,10 @@ def draw_effects(table: pd.DataFrame) -> Figure:
 
 
 def _clear(rows: pd.DataFrame) -> IntArray:
-    """Return by how many of the two tests each row's difference is significant, (rows,)."""
+    """Return by how many of the two tests each row's A12 is significant, (rows,).
+
+    Signed ranks that point the other way than A12 say nothing for it.
+    """
     below = rows[list(TESTS)].to_numpy(np.float64) < rows[["significance"]].to_numpy(np.float64)
+    below[:, 0] &= (rows["direction"] * (rows["a12"] - 0.5)).to_numpy(np.float64) > 0.0
     return np.asarray(below.sum(axis=1), dtype=np.int64)

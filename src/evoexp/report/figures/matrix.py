@@ -31,13 +31,13 @@ def matrix_table(
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Columns condition, other, a12 (of the condition being better), lower, upper, p_adjusted,
-        seeds, significance.
+        Columns condition, other, a12 (of the condition being better), lower, upper, p_adjusted
+        (rank sum, the test of A12), seeds, significance.
     """
     found = []
     for (first, second), row in zip(pairs, rows, strict=True):
         low, high = row.better.interval
-        told = (row.p_adjusted, row.num_seeds)
+        told = (row.unpaired_adjusted, row.num_seeds)
         found.append((first, second, row.better.a12, low, high, *told))
         found.append((second, first, 1.0 - row.better.a12, 1.0 - high, 1.0 - low, *told))
     names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "seeds"]

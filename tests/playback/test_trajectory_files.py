@@ -1,0 +1,193 @@
+"""Joint trajectories out of files: matched by name, in known units, or refused in one line."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.input_files import TableError
+from evoexp.playback.recording import Joint
+from evoexp.playback.trajectory_files import fitted, parse_message, read_columns, read_message
+
+JOINTS = (Joint("turn", False), Joint("turn_2", False), Joint("slide", True))
+Q = [[0.0, 0.5, 0.1], [1.0, -0.5, 0.2], [0.5, 0.0, 0.0]]
+DEGREES = [[float(np.degrees(a)), float(np.degrees(b)), 100.0 * c] for a, b, c in Q]
+
+
+def table(head: str, rows: Any, mark: str = ",", times: bool = False) -> bytes:
+    lines = [head] + [
+        mark.join(map(str, ([k] if times else []) + list(row))) for k, row in enumerate(rows)
+    ]
+    return "\n".join(lines).encode()
+
+
+def message(points: Any, names: Any = ("turn", "turn_2", "slide"), **more: Any) -> dict[str, Any]:
+    return {"joint_names": list(names), "points": points, **more}
+
+
+def of_csv(content: bytes) -> tuple[Any, tuple[str, ...]]:
+    return fitted(read_columns(content), JOINTS, "m")
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "times"),
+    [
+        ("turn_rad,turn_2_rad,slide_m", Q, False),
+        ("time_s,turn_rad,turn_2_rad,slide_m", Q, True),
+        ("time,turn,turn_2,slide", Q, True),
+        ("t,turn_deg,turn_2 [deg],slide (cm)", DEGREES, True),
+        ("time_from_start,turn.position,turn_2/pos,slide_position_m", Q, True),
+        ("slide_m,turn_rad,turn_2_rad", [[c, a, b] for a, b, c in Q], False),
+        ("turn_rad,gripper,turn_2_rad,slide_m", [[a, 7, b, c] for a, b, c in Q], False),
+        ("turn,turn_vel,turn_2,slide", [[a, 9, b, c] for a, b, c in Q], False),
+        ("turn,turn_2,turn_2_effort,slide", [[a, b, 9, c] for a, b, c in Q], False),
+    ],
+)
+def test_columns_are_matched_by_name_and_unit(head: str, rows: Any, times: bool) -> None:
+    motion, remarks = of_csv(table(head, rows, times=times))
+    assert motion.q == pytest.approx(np.array(Q), abs=1e-15)
+    assert motion.coefficients is None
+    assert "straight lines between the points" in remarks
+    unread = next((r.removeprefix("not read: ") for r in remarks if r.startswith("not")), "")
+    assert unread == (
+        "gripper"
+        if "gripper" in head
+        else "velocities"
+        if "vel" in head
+        else "turn_2_effort"
+        if "effort" in head
+        else ""
+    )
+    assert any("without a unit" in r for r in remarks) is ("_rad" not in head and "deg" not in head)
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_spreadsheets_are_read(mark: str) -> None:
+    head = mark.join(("time_s", "turn_rad", "turn_2_rad", "slide_m"))
+    commas = [[str(x).replace(".", ",") for x in row] for row in Q]
+    content = b"\xef\xbb\xbf" + table(head, commas, mark, times=True)
+    assert of_csv(content)[0].q.tolist() == Q
+
+
+def test_velocities_of_all_joints_make_cubics() -> None:
+    head = "time_ms,turn_rad,turn_2_rad,slide_m,turn_rad_per_s,turn_2_velocity,slide_m/s"
+    rows = [[1000 * k, *q, 0.5 * k, 0, 0] for k, q in enumerate(Q)]
+    motion, remarks = of_csv(table(head, rows))
+    assert "cubics between the points, by their velocities" in remarks
+    assert motion.coefficients is not None
+    assert motion.coefficients[:, 1, 0].tolist() == [0.0, 0.5]
+    degrees = table(head.replace("turn_rad_per_s", "turn_deg_per_s"), rows)
+    assert of_csv(degrees)[0].coefficients[1, 1, 0] == pytest.approx(np.radians(0.5))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (table("turn_rad,turn_2_rad", [[0, 0]] * 2), "lacks joints slide .* named slide_m"),
+        (table("turn_rev,turn_2_rad,slide_m", Q), "lacks joints turn .* has .*turn_rev"),
+        (table("turn,turn_2,slide", [[90, 0, 0]] * 2), "turn: 90 without a unit .* turn_deg or"),
+        (table("turn_m,turn_2,slide", Q), "turn: must be in rad .*, was in m"),
+        (table("turn,turn_2,slide_rad", Q), "slide: must be in m .*, was in rad"),
+        (table("turn,turn_rad,turn_2,slide", [[0] * 4] * 2), "turn_rad: a second column of joint"),
+        (table("turn,turn_2,slide", Q[:1]), "must have two points or more, has 1"),
+        (table("turn,turn_2,slide", []), "must have two points or more, has 0"),
+        (table("time,turn,turn_2,slide", [[k, *q] for k, q in zip((0, 1, 1), Q, strict=True)]),
+         "times must grow from point to point: 1 s at point 3"),
+        (table("turn,turn_2,slide_m", [[0, 0, 1e8]] * 2), r"slide: must be at most 1e\+07"),
+    ],
+)  # fmt: skip
+def test_a_table_that_does_not_fit_is_refused(content: bytes, said: str) -> None:
+    with pytest.raises(ValueError, match=said) as caught:
+        of_csv(content)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (table("turn,turn_2,slide", [[0, "", 0]]), "line 2: must be a number in column turn_2"),
+        (table("turn,turn_2,slide", [[0, "nan", 0]]), "line 2: must be a number in column"),
+        (table("turn,turn,slide", Q), "line 1: must be a head with a name per column, each once"),
+        (table("0,0.5,0.1", Q), "line 1: must be a head with a name per column"),
+        (table("time_h,turn", [[0, 0]]), "line 1: must be a time in s, ms, us or ns"),
+        (table("turn,slide", [["0", "1,5"]]), "line 2: must be 2 cells.*decimal commas need semi"),
+        ("turn,slide\n0,0\n".encode("utf-16"), "line 1: must be text in UTF-8"),
+    ],
+)
+def test_a_bad_cell_is_named_by_its_line(content: bytes, said: str) -> None:
+    with pytest.raises(TableError, match=said):
+        read_columns(content)
+
+
+def points(**more: Any) -> list[dict[str, Any]]:
+    return [{"positions": q, **more} for q in Q]
+
+
+def test_messages_are_those_of_ros_and_ours() -> None:
+    ros = [
+        {"positions": q, "velocities": [0.1 * k] * 3, "time_from_start": {"sec": k, "nanosec": 0}}
+        for k, q in enumerate(Q)
+    ]
+    ours = [
+        {"positions": q, "velocities": [0.1 * k] * 3, "time_from_start": float(k)}
+        for k, q in enumerate(Q)
+    ]
+    expected, _ = fitted(read_message(message(ours)), JOINTS, "m")
+    assert expected.coefficients is not None
+    wrapped = {"joint_trajectory": message(ros), "multi_dof_joint_trajectory": {}}
+    for data in (message(ros), wrapped, {"trajectory": message(ros)}):
+        motion, remarks = fitted(read_message(data), JOINTS, "m")
+        assert np.array_equal(motion.coefficients, expected.coefficients)
+        assert "values without a unit are read in rad and m" in remarks
+    other = [2, 0, 1]
+    reordered = message(
+        [{"positions": [DEGREES[k][n] for n in other]} for k in range(3)],
+        [JOINTS[n].name for n in other],
+        units=[("deg", "deg", "cm")[n] for n in other],
+    )
+    motion, remarks = fitted(read_message(reordered), JOINTS, "m")
+    assert motion.q == pytest.approx(np.array(Q), abs=1e-15)
+    assert remarks == ("straight lines between the points",)
+
+
+def test_accelerations_are_told_not_to_be_read() -> None:
+    data = message(points(accelerations=[0.0, 1.0, 0.0]))
+    assert "not read: accelerations" in fitted(read_message(data), JOINTS, "m")[1]
+    data = message(points(accelerations=[0.0] * 3, effort=[]))
+    assert fitted(read_message(data), JOINTS, "m")[1][-1] == "straight lines between the points"
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ({"positions": Q}, "must have joint_names and points, as a JointTrajectory, has positions"),
+        (message(points(), ("turn", "turn", "slide")), "joint_names must be names, each once"),
+        (message(points(), ("turn", "slide")), r"points\[0\].positions must be 2 numbers"),
+        (message(points(), units=["rad"]), "units must be 3, one per joint"),
+        (message([{"velocities": Q[0]}]), r"points\[0\].positions must be 3 numbers.* was 0"),
+        (message([{"positions": [0, None, 0]}]), r"points\[0\].positions must be finite numbers"),
+        (message([{"positions": [0, True, 0]}]), r"points\[0\].positions must be finite numbers"),
+        (message([{"positions": [0, np.inf, 0]}]), r"points\[0\].positions must be finite"),
+        (message([*points(), {"positions": Q[0], "velocities": Q[0]}]), r"points\[0\].velocities"),
+        (message([7]), r"points\[0\].positions must be a list"),
+        (message(points(time_from_start="soon")), r"points\[0\].time_from_start must be finite"),
+    ],
+)
+def test_a_bad_message_is_refused_by_place(data: Any, said: str) -> None:
+    with pytest.raises(ValueError, match=said) as caught:
+        read_message(data)
+    assert "\n" not in str(caught.value)
+
+
+def test_yaml_is_read_as_ros_prints_it() -> None:
+    text = (
+        "header:\n  frame_id: ''\njoint_names:\n- turn\n- turn_2\n- slide\npoints:\n"
+        "- positions: [0, 5e-1, 1e-1]\n  time_from_start: {sec: 0, nanosec: 0}\n"
+        "- positions: [1.0, -0.5, 0.2]\n  time_from_start: {sec: 1, nanosec: 500000000}\n---\n"
+    )
+    motion, _ = fitted(read_message(parse_message(text, is_yaml=True)), JOINTS, "m")
+    assert motion.q.tolist() == Q[:2]
+    with pytest.raises(ValueError, match="must hold one message, holds 2"):
+        parse_message(text + text, is_yaml=True)
+    with pytest.raises(ValueError, match="expected"):
+        parse_message("a: [", is_yaml=True)

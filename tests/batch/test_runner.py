@@ -325,7 +325,6 @@ def test_workers_have_one_thread_per_library_whoever_started_them(fresh_workers:
     assert [os.environ.get(name) for name in names] == before
 
 
-@pytest.mark.matrix
 def test_a_killed_worker_costs_its_own_replicate_a_retry(
     faulty: Condition,
     undisturbed: dict[int, str],

@@ -24,7 +24,6 @@ def cases(outputs: Path) -> list[Case]:
     return case_results.cases(smoke_results(outputs, "chen_placement"))
 
 
-@pytest.mark.matrix
 def test_conditions_are_told_apart(cases: list[Case]) -> None:
     assert [case.name for case in cases] == list(case_results.PRINTED)
     for case in cases:
@@ -36,7 +35,6 @@ def test_conditions_are_told_apart(cases: list[Case]) -> None:
         assert case.optimum.planned == 1
 
 
-@pytest.mark.matrix
 def test_the_page(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_placement")
     assert figure_stems(directory) == {"fig_3_to_8_postures", "fig_4_to_8_fitness", "gaps", "scene"}
@@ -111,7 +109,6 @@ def test_verdicts_where_they_are_judged(
     )
 
 
-@pytest.mark.matrix
 def test_all_printed_torques_and_their_ratio_have_a_row(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_placement")
     claims = (directory / "index.md").read_text().split("## Claims")[1]

@@ -76,7 +76,7 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         drawing.table()
 
 
-@pytest.mark.matrix
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
@@ -173,7 +173,6 @@ def test_arms_stand_as_the_paper_prints(outputs: Path) -> None:
     )
 
 
-@pytest.mark.matrix
 def test_solutions_show_tested_positions_and_contacts(outputs: Path) -> None:
     condition = blind(outputs)
     replicate, verdict = next(iter(body_contacts.refuted(condition).items()))

@@ -34,6 +34,12 @@ def copy_tree(tree: Path, place: Path) -> Path:
     return Path(shutil.copytree(tree, place, ignore=LEFT_OUT))
 
 
+def _copy_if_there(file: str, place: str) -> None:
+    """Copy a file, unless another process removed it meanwhile."""
+    with contextlib.suppress(FileNotFoundError):
+        shutil.copy2(file, place)
+
+
 def near_tests(tree: Path, module: Path) -> list[list[str]]:
     """Choose the tests that may kill the mutants of a module.
 
@@ -97,6 +103,7 @@ class Trials:
         """Copy the tree into an empty folder."""
         self._place = place  # its bytecode lies elsewhere if a prefix is set; it is small
         self.tree = copy_tree(tree, place / "tree")
+        shutil.copytree(cache_root(), place / "cache", copy_function=_copy_if_there)
         self._count = 0
 
     def run(self, mutant: Mutant) -> Outcome:
@@ -128,7 +135,7 @@ class Trials:
     def _pytest(self, names: list[str]) -> Outcome:
         """Run tests with a cache, outputs and temporary files that no other run sees."""
         place = self._place / "run"
-        shutil.copytree(cache_root(), place / "cache")
+        shutil.copytree(self._place / "cache", place / "cache")
         (place / "tmp").mkdir()
         inherited = {
             name: value

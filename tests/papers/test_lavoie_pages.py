@@ -76,7 +76,7 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         drawing.table()
 
 
-@pytest.mark.examples(1)
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

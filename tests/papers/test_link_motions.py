@@ -62,6 +62,7 @@ def test_limits_are_those_of_equation_2() -> None:
     assert link_motions.times_over_limit(one, link_motions.straight(one)) == pytest.approx(expected)
 
 
+@pytest.mark.matrix
 def test_a_control_has_the_limits_of_the_planner_beside_it() -> None:
     control = (
         expand("curkovic_methods_b", "control=random_search").conditions[0].condition.prepare()

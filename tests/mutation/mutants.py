@@ -12,40 +12,16 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 PACKAGE = Path("src/evoexp")
 HERE = Path(__file__).parent
 
-FLIPPED = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.In: ast.NotIn,
-    ast.NotIn: ast.In,
-    ast.Is: ast.IsNot,
-    ast.IsNot: ast.Is,
-    ast.And: ast.Or,
-    ast.Or: ast.And,
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-}
-OPPOSITES = dict(
-    pair
-    for one, other in [
-        ("min", "max"),
-        ("minimum", "maximum"),
-        ("argmin", "argmax"),
-        ("fmin", "fmax"),
-        ("nanmin", "nanmax"),
-        ("any", "all"),
-        ("floor", "ceil"),
-    ]
-    for pair in ((one, other), (other, one))
-)
+_COMPARISONS = [(ast.Lt, ast.LtE), (ast.Gt, ast.GtE), (ast.Eq, ast.NotEq), (ast.In, ast.NotIn)]
+_OPERATORS = [*_COMPARISONS, (ast.Is, ast.IsNot), (ast.And, ast.Or), (ast.Add, ast.Sub)]
+FLIPPED: dict[type, Any] = dict(_OPERATORS) | {two: one for one, two in _OPERATORS}
+_EXTREMES = [("min", "max"), ("minimum", "maximum"), ("argmin", "argmax"), ("any", "all")]
+OPPOSITES = dict(_EXTREMES) | {two: one for one, two in _EXTREMES}
 INDICES = {"-1": "0", "0": "-1", "1": "0", "1:": ":", ":-1": ":", "-1:": "-2:", ":1": ":2"}
 MOTION = re.compile(r"\boM[if]\b|placement\b|\.inverse\(\)")  # a factor whose order counts
 # A mutant of these could end processes or remove files outside of its copy.
@@ -112,7 +88,8 @@ def _borders(node: ast.AST) -> Iterator[tuple[str, ast.expr, str]]:
     if isinstance(node, ast.FunctionDef):
         values = [*node.args.defaults, *node.args.kw_defaults]
     elif isinstance(node, ast.ClassDef):
-        values = [part.value for part in node.body if isinstance(part, ast.AnnAssign)]
+        fields = [part for part in node.body if isinstance(part, ast.AnnAssign)]
+        values = [part.value for part in fields if "ClassVar" not in ast.unparse(part.annotation)]
     elif isinstance(node, ast.Return):
         values = [node.value]
     for value in values:
@@ -160,7 +137,7 @@ def _variants(node: ast.expr) -> Iterator[tuple[str, str]]:
 
 
 def _is_sequence(node: ast.expr) -> bool:
-    is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
+    is_text = isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)
     return is_text or isinstance(node, ast.JoinedStr | ast.List | ast.Tuple)
 
 
@@ -194,15 +171,16 @@ def drawn(tree: Path, seed: int, count: int) -> list[Mutant]:
         room, *inner = path.relative_to(tree / PACKAGE).parts
         if room != "assets":
             rooms[room if inner else ""].append(path)
-    rng = random.Random(seed)
     mutants: dict[Mutant, None] = {}  # in the order of the draw
-    for room in itertools.cycle(sorted(rooms)):
+    for place, room in enumerate(itertools.cycle(sorted(rooms))):
+        rng = random.Random(f"{seed} {place}")  # an edit elsewhere leaves this draw as it is
         [path] = rng.choices(rooms[room], [file.stat().st_size for file in rooms[room]])
         kinds = defaultdict[str, list[Mutant]](list)
         for kind, mutant in mutants_of(path.relative_to(tree).as_posix(), path.read_text()):
             kinds[kind].append(mutant)
         if kinds:
-            mutant = rng.choice(kinds[rng.choice(sorted(kinds))])
+            [kind] = rng.choices(sorted(kinds))
+            [mutant] = rng.choices(kinds[kind])
             if (mutant.file, mutant.before, mutant.after) not in equivalent:
                 mutants[mutant] = None
         if len(mutants) == count:

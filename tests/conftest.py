@@ -36,11 +36,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_pycollect_makeitem(collector: pytest.Collector, name: str, obj: Any) -> Any:
-    """Leave out what is marked `matrix` unless it is asked for; see `matrix.examples`."""
-    if matrices_are_asked_for():
-        return None
-    marked = [mark.name for mark in getattr(obj, "pytestmark", ()) if name.startswith("test")]
-    return [] if "matrix" in marked or collector.get_closest_marker("matrix") else None
+    """Leave out tests marked `matrix` or `exhaustive` unless asked for; see `matrix.examples`."""
+    marked = {mark.name for mark in getattr(obj, "pytestmark", ()) if name.startswith("test")}
+    marked.update(mark.name for mark in collector.iter_markers())
+    is_left_out = ("matrix" in marked and not matrices_are_asked_for()) or (
+        "exhaustive" in marked and EXHAUSTIVE not in os.environ
+    )
+    return [] if is_left_out else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

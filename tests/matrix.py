@@ -37,6 +37,11 @@ def first(count: int, values: Iterable[Any]) -> list[Any]:
     return examples(known, lambda value: any(value is one for one in early))
 
 
+def num_cases(few: int, many: int) -> int:
+    """Return the number of cases of a test: many with ./scripts/test --all, else few."""
+    return many if matrices_are_asked_for() else few
+
+
 def counts(few: int, many: int) -> int:
     """Return the number of cases of a test: many with ./scripts/test --exhaustive, else few."""
     return many if EXHAUSTIVE in os.environ else few

@@ -1,5 +1,6 @@
 """The shipped table tells the truth, and `reproduce` answers from it where nothing was ever run."""
 
+from collections import Counter
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -154,6 +155,17 @@ def test_an_ambiguous_prefix_lists_the_candidates(
     monkeypatch.setattr(shipped, "shipped", lambda: tuple(twins))
     assert main(["reproduce", "abc"]) == 2
     assert "ambiguous: abc100000000, abc200000000" in capsys.readouterr().err
+
+
+def test_a_hash_is_found_once_in_the_smallest_experiment_that_has_it() -> None:
+    sizes = Counter((row.experiment, row.budget) for row in TABLE)
+    found = {row.condition_id: row for row in shipped.find("")}
+    assert len(shipped.find("")) == len(found) == len({row.condition_id for row in TABLE})
+    shared = [row for row in TABLE if found[row.condition_id] != row]
+    assert shared
+    for row in shared:
+        smallest = found[row.condition_id]
+        assert sizes[smallest.experiment, smallest.budget] <= sizes[row.experiment, row.budget]
 
 
 # --------------------------------------------------------------------------- scripts/update-shipped

@@ -16,10 +16,7 @@ from evoexp.condition import Condition
 from evoexp.store.run_directory import RunDirectory
 
 pytest.importorskip("distributed", reason="needs distributed, from evoexp[cluster]")
-pytestmark = [
-    pytest.mark.matrix,
-    pytest.mark.filterwarnings("ignore"),  # distributed's own
-]
+pytestmark = pytest.mark.filterwarnings("ignore")  # distributed's own
 DASK = {"backend": "dask", "num_workers": 2}
 
 
@@ -53,6 +50,7 @@ def scheduler(tmp_path: Path, plug_in: Path) -> Iterator[str]:
                 process.wait()
 
 
+@pytest.mark.matrix
 def test_workers_of_a_scheduler_give_the_same_digests(
     faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, scheduler: str
 ) -> None:
@@ -63,6 +61,7 @@ def test_workers_of_a_scheduler_give_the_same_digests(
     assert not new_batch(tmp_path / "outputs", (faulty, 12), **settings).jobs
 
 
+@pytest.mark.matrix
 def test_a_killed_worker_loses_nothing_but_its_own_replicate(
     faulty: Condition,
     undisturbed: dict[int, str],
@@ -85,6 +84,7 @@ def test_a_killed_worker_loses_nothing_but_its_own_replicate(
     assert RunDirectory(tmp_path / "outputs", faulty.id).failed() == set(reasons)
 
 
+@pytest.mark.matrix
 def test_a_worker_with_other_code_is_refused(
     faulty: Condition, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -32,7 +32,6 @@ def test_a_slow_replicate_fails_and_the_others_go_on(
     assert digests(tmp_path / "outputs", faulty) == {k: undisturbed[k] for k in (0, 2, 3)}
 
 
-@pytest.mark.matrix
 def test_workers_lose_nothing_but_what_hangs_or_eats_memory(
     faulty: Condition,
     undisturbed: dict[int, str],

@@ -22,6 +22,7 @@ from evoexp.collision.certifier.verdict import Limits, _Judgement
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion
+from matrix import num_cases
 
 
 def judgement(seed: int) -> _Judgement:
@@ -138,8 +139,7 @@ def slow_walk(judged: _Judgement, pair: int, t: float) -> float:
     return least
 
 
-@pytest.mark.matrix
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=num_cases(6, 60), deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), t=st.floats(0.0, 1.0))
 def test_local_minima_are_found(seed: int, t: float) -> None:
     """As by halving steps, from the same instant.

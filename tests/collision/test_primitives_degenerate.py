@@ -20,6 +20,7 @@ from evoexp.scenarios.obstacles import (
     SphereObstacle,
     obstacle_table,
 )
+from matrix import num_cases
 from references.primitive_distances import along, to_obstacle, to_segment
 
 Point = tuple[float, float, float]
@@ -58,8 +59,7 @@ def clearance(
     return collision.clearance(np.zeros((1, 1)))
 
 
-@pytest.mark.matrix
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=num_cases(25, 300), deadline=None)
 @given(POINTS, POINTS, POINTS, POINTS, RADII, RADII)
 @example((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.25, 0.5, 0.0), (0.5, 0.5, 0.0), 0.1, 0.1)
 @example((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0, 0.0)
@@ -76,8 +76,7 @@ def test_two_capsules(a: Point, b: Point, c: Point, d: Point, one: float, two: f
         assert found == pytest.approx(expected, abs=1e-12)
 
 
-@pytest.mark.matrix
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=num_cases(25, 300), deadline=None)
 @given(POINTS, POINTS, RADII, st.integers(0, len(OBSTACLES) - 1))
 @example((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0, 1)  # along the middle of a thin box
 @example((-1.0, 0.25, 0.01), (1.0, 0.25, 0.01), 0.1, 1)  # along an edge

@@ -37,7 +37,6 @@ def test_a_run_says_what_is_there_and_runs_nothing_twice(
     assert not (outputs / "reports").exists()
 
 
-@pytest.mark.matrix
 def test_a_run_without_report_loads_neither_pandas_nor_matplotlib(outputs: Path) -> None:
     """The two take as long to load as two hundred replicates of some planners."""
     words = ["run", *PLANAR, "num_replicates=1", "--no-report"]

@@ -53,7 +53,6 @@ def package(tmp_path: Path) -> Iterator[Path]:
         yield conf
 
 
-@pytest.mark.matrix
 def test_the_first_folder_that_has_an_option_wins(
     package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,7 @@ from evoexp.evolution.hall_of_fame import (
     renew_hall,
     update_hall,
 )
-from matrix import first
+from matrix import first, num_cases
 
 Key = tuple[int, float]
 
@@ -187,7 +187,6 @@ def test_without_a_free_team_there_is_none() -> None:
     assert best_team(np.zeros((1, 2, 2), dtype=int), own).individuals.tolist() == [1, 0]
 
 
-@pytest.mark.matrix
 @given(
     st.integers(0, 10_000),
     st.sampled_from([2, 3]),
@@ -199,7 +198,7 @@ def test_without_a_free_team_there_is_none() -> None:
     st.sampled_from([(), (0,), (1,)]),
     st.booleans(),
 )
-@settings(deadline=None)
+@settings(max_examples=num_cases(30, 100), deadline=None)
 def test_hall_is_chosen_as_defined(
     seed: int,
     num: int,
@@ -384,7 +383,6 @@ def test_individuals_of_a_population_that_may_be_shared_are_in_many_teams() -> N
     assert chosen.teams.tolist() == [[0, 0], [1, 0], [2, 0]]
 
 
-@pytest.mark.matrix
 @pytest.mark.parametrize("num", [2, 3])
 @pytest.mark.parametrize("dtype", first(1, [np.float64, np.uint8, np.int32]))
 def test_kernels_ignore_padding_and_take_any_number_type(num: int, dtype: type) -> None:

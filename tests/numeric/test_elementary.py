@@ -359,7 +359,6 @@ def test_odd_functions_are_odd_to_the_bit(name: str) -> None:
         assert same_bits(over_array(name, -x), -over_array(name, x))
 
 
-@pytest.mark.matrix
 def test_float32_and_integers_count_as_float64() -> None:
     x: Any = np.float32(0.3)
     for function in (sin, acos, log, exp):
@@ -529,7 +528,6 @@ def sum_borrowed_rows(rows, count):  # type: ignore[no-untyped-def]
 sum_rows_compiled = numba.njit(error_model="numpy", nogil=True, forceinline=True)(sum_rows)
 
 
-@pytest.mark.matrix
 def test_borrowed_arrays_are_not_counted() -> None:
     """Where a kernel hands arrays on, references to them are counted, but not to borrowed ones."""
     counts = []

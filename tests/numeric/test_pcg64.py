@@ -16,12 +16,12 @@ from evoexp.numeric.pcg64 import (
     put_uniforms,
     skip_words,
 )
+from matrix import num_cases
 
 COUNTS = st.lists(st.tuples(st.integers(0, 200), st.booleans()), min_size=1, max_size=8)
 
 
-@pytest.mark.matrix
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=num_cases(15, 60), deadline=None)
 @given(st.integers(0, 2**64), st.booleans(), COUNTS)
 def test_numbers_and_states_are_numpys(
     seed: int, half: bool, counts: list[tuple[int, bool]]

@@ -89,7 +89,7 @@ def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
     assert "greatest tilt at postures (upright)" in text
 
 
-@pytest.mark.matrix
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
@@ -111,7 +111,6 @@ def test_studies_have_figures_and_a_row_per_condition(
         assert drawn(table, drawing.draw)
 
 
-@pytest.mark.matrix
 def test_the_study_reads_no_log(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Thousands of runs: summaries say all of it."""
 
@@ -161,7 +160,6 @@ def test_lengths_and_detours_of_paths(outputs: Path) -> None:
     assert (detours >= 1.0).all()
 
 
-@pytest.mark.matrix
 def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
     table = solids.models_table([("MANUS", condition)])

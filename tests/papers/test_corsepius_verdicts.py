@@ -75,7 +75,6 @@ def verdict(claims: dict[str, Claim], text: str) -> str:
     return next(claim.verdict for name, claim in claims.items() if name.startswith(text))
 
 
-@pytest.mark.matrix
 def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
     """Where cycles do not depend on the size, evaluations go with it."""
     claims = study(lambda task, size: (20.0, RUNS))
@@ -98,7 +97,6 @@ def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
     )  # ten take a tenth
 
 
-@pytest.mark.matrix
 def test_one_task_that_large_populations_plan_faster_contradicts() -> None:
     claims = study(lambda task, size: (20.0 if task != "pose" else 4e5 / size**2, RUNS))
     assert (

@@ -114,7 +114,7 @@ def test_a_trail_begins_at_the_start_and_ends_at_the_goal(outputs: Path) -> None
     assert len(postures) == 2 * 2 * (5 * robot_motions.POSTURES + 1)
 
 
-@pytest.mark.matrix
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("name", "robots", "stem"),
     [("curkovic_stationary", 2, "fig_10_motion"), ("curkovic_three", 3, "motion")],
@@ -317,7 +317,6 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
     assert families.families(both)[0].pairs[0][1].label == "5 substeps"
 
 
-@pytest.mark.matrix
 def test_curves_show_three_defects(outputs: Path) -> None:
     found = page(outputs, "curkovic_motion", "curkovic_sweep")
     table = drawing(found, "defects")

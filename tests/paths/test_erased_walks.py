@@ -9,11 +9,11 @@ from evoexp.numeric.pcg64 import Twin
 from evoexp.paths.erased_walks import Sums, follow_all, room_for_exits, walk_all
 from evoexp.paths.grid_measures import Tolls, length_and_mean, measure_path
 from evoexp.paths.walkers import WORDS, Walkers, choice_table
+from matrix import num_cases
 from paths.walked_worlds import SEEDS, SHAPES, World
 
 
-@pytest.mark.matrix
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=num_cases(10, 60), deadline=None)
 @given(
     SHAPES,
     st.floats(0.0, 0.5),

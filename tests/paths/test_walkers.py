@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
+from matrix import num_cases
 from paths.walked_worlds import SEEDS, SHAPES, World, as_path, nodes_of
 
 
@@ -38,8 +39,7 @@ def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list
     return trails[:count], taken
 
 
-@pytest.mark.matrix
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=num_cases(10, 60), deadline=None)
 @given(
     SHAPES,
     st.floats(0.0, 0.5),

@@ -275,7 +275,6 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
     assert bound > turns
 
 
-@pytest.mark.matrix
 def test_a_spline_is_executed_between_the_same_configurations() -> None:
     planner, problem = prepared(*SMALL)
     curved, _ = prepared(*SMALL, "planner.interpolation=cubic")

@@ -18,6 +18,7 @@ from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.grid_path_ga.path_sampling import PathSampling
 from evoexp.planners.grid_path_ga.planner import STRETCH
 from evoexp.planners.proofs import judge_motion
+from matrix import num_cases
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
 SEEDS = st.integers(0, 2**32)
@@ -57,8 +58,7 @@ def test_every_path_of_every_generation_is_valid_and_costs_what_the_equations_sa
             assert cost == pytest.approx(0.2 * distance + 1.0 * unsafeness, rel=1e-12)
 
 
-@pytest.mark.matrix
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=num_cases(10, 40), deadline=None)
 @given(SHAPES, st.floats(0.0, 0.5), SEEDS)
 def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     shape: tuple[int, ...], share: float, seed: int
@@ -178,7 +178,6 @@ def test_the_last_population_is_only_its_paths() -> None:
     np.testing.assert_array_equal(own.cost(problem, last.population).cost, last.costs)
 
 
-@pytest.mark.matrix
 def test_walks_whose_moves_weigh_no_whole_numbers_take_the_longer_way() -> None:
     fields = PotentialFields(**(FIELDS | {"goal_potentials": (0.5, 1.75)}))
     own = planner(collision=fields)

@@ -16,6 +16,7 @@ from evoexp.planners.grid_path_ga.kernels import RESULTS, Population
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import GridPathGa
+from matrix import num_cases
 from paths.walked_worlds import SEEDS
 from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
 from shipped_conditions import expanded
@@ -46,8 +47,7 @@ def test_every_path_stays_valid_and_no_generation_is_worse(num_paths: int, revis
     assert generations[-1].best_cost < generations[0].best_cost
 
 
-@pytest.mark.matrix
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=num_cases(5, 40), deadline=None)
 @given(SHAPES, st.floats(0.0, 0.5), st.integers(1, 4), st.booleans(), SEEDS)
 def test_pieces_are_those_of_whole_paths_that_are_regenerated_settled_and_measured(
     shape: tuple[int, ...], share: float, num_paths: int, is_safety: bool, seed: int

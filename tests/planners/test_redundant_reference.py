@@ -108,7 +108,6 @@ def test_generations_of_bits_agree_to_rounding() -> None:
     assert largest_difference(binary, 0)[0] < ROUNDING
 
 
-@pytest.mark.matrix
 def test_both_sub_paths_and_the_arm_of_ten_joints_agree() -> None:
     given = condition("experiment=lavoie_10dof", population_size=150, stop_cost_sp1=6.0)
     difference, searched = largest_difference(given, 1)

@@ -123,7 +123,6 @@ def six_axes(base: tuple[float, float, float]) -> SerialChain:
     return SerialChain(joints=joints, tip=(0.2, 0.0, 0.0), base_position=base)
 
 
-@pytest.mark.matrix
 def test_two_arms_of_six_joints_are_planned_by_the_same_planner() -> None:
     """With the wrists held straight they are the paper's arms.
 

@@ -55,7 +55,7 @@ def test_the_minimax_optimum_has_equal_torques() -> None:
     np.testing.assert_allclose(torques, truth.cost, atol=1e-10)
 
 
-@pytest.mark.matrix
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("limit", "k"),
     [([[-180, 60], [-180, 180], [-180, 180]], 0), ([[-180, 180], [60, 90], [-180, 180]], 1)],
@@ -100,7 +100,6 @@ def test_starts_reach_the_target() -> None:
     assert len({tuple(row) for row in truth.arrays["starts"]}) == 60
 
 
-@pytest.mark.matrix
 def test_the_landscape_is_the_planners_cost() -> None:
     truth, _, problem = found("minimax", "landscape")
     one, two, cost = (truth.arrays[name] for name in ("theta_1", "theta_2", "cost"))

@@ -170,7 +170,6 @@ def test_the_command_in_the_index_makes_this_report(
     assert cli.main(["report", *hashes[1].split()]) == 0
 
 
-@pytest.mark.matrix
 def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     experiment = expand("rana_planar", "ga.num_generations=1")
     store(tmp_path, experiment)

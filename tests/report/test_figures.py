@@ -67,7 +67,6 @@ def test_conditions_of_other_effort_share_an_axis_of_evaluations() -> None:
     assert axes.get_xlim()[1] == 300.0
 
 
-@pytest.mark.matrix
 def test_convergence_of_infinite_costs_and_of_one_generation() -> None:
     table = curves("GA", 0, 50.0)
     table.loc[table["generation"] < 2, ["median", "lower", "upper"]] = np.inf
@@ -205,7 +204,6 @@ def test_distances_are_best_and_envelope(results: Results) -> None:
     } <= set(words)
 
 
-@pytest.mark.matrix
 def test_a_figure_has_the_same_bytes_each_time_whatever_the_users_style() -> None:
     import matplotlib as mpl
 

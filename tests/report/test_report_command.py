@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -42,7 +40,6 @@ def test_an_experiment_may_be_named_as_the_folder_of_its_report(
     assert "Made by `evoexp report rana_planar budget=smoke" in text
 
 
-@pytest.mark.matrix
 def test_the_experiment_may_be_an_override_as_for_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert report("experiment=rana_planar", *SMALL, "--only", "random search") == 0
     text = page(capsys).read_text()
@@ -95,9 +92,3 @@ def test_overrides_and_hashes_exclude_each_other(capsys: pytest.CaptureFixture[s
         "overrides: must be left out where runs are given by their hashes"
         in capsys.readouterr().err
     )
-
-
-@pytest.mark.matrix
-def test_loading_the_command_loads_no_matplotlib() -> None:
-    code = "import sys, evoexp.commands.report; sys.exit('matplotlib' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

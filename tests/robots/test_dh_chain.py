@@ -100,7 +100,6 @@ def test_base_and_tool_are_chosen_freely() -> None:
     assert pose[[2, 5, 8]] == pytest.approx([0.0, -1.0, 0.0], abs=1e-12)
 
 
-@pytest.mark.matrix
 def test_sliding_joints_slide_along_z() -> None:
     joints = (
         DhJoint(dh=(0.0, 90.0, 0.2, 0.0), limits=(0.0, 0.5), kind="prismatic"),

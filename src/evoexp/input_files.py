@@ -58,6 +58,16 @@ def read_bounded(path: str | Path, limit: int = MAX_INPUT) -> bytes:
         return file.read(status.st_size)
 
 
+def stand_in(content: bytes) -> str:
+    """Name the thing that a download left in the place of a file; empty: nothing of the kind."""
+    start = content[:1000].removeprefix(b"\xef\xbb\xbf").lstrip().lower()
+    if start.startswith(b"version https://git-lfs"):
+        return "a Git-LFS pointer in the file's place (git lfs pull brings the file)"
+    if start.startswith((b"<!doctype html", b"<html")):
+        return "an HTML page in the file's place (download the raw file)"
+    return "" if start else "an empty file"
+
+
 class TableError(ValueError):
     """A table that cannot be read: its line, what that must be, and what it was."""
 

@@ -13,7 +13,8 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
 from evoexp.robots.joint_choice import joint_roles
 from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_text import JointText, check_urdf, parsed_xml, read_joints
+from evoexp.robots.urdf_reading import read_urdf
+from evoexp.robots.urdf_text import JointText, read_joints
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
 
@@ -56,9 +57,7 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
 
 
 def _joints(robot: dict[str, Any]) -> dict[str, JointText]:
-    root = parsed_xml(File(**robot["urdf"]).content, "robot.path", "robot")
-    check_urdf(root, "robot.path")
-    return read_joints(root, "robot.path")
+    return read_joints(read_urdf(File(**robot["urdf"]).content, "robot.path"), "robot.path")
 
 
 def _standing(

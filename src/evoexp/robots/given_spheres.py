@@ -1,49 +1,42 @@
 """Spheres that somebody else put in the place of a robot's bodies: a URDF with spheres per link."""
 
-import xml.etree.ElementTree as ET
 from typing import Any
 
 import numpy as np
 
 from evoexp.errors import SettingError, nearest
 from evoexp.records import FloatArray
-from evoexp.robots.urdf_text import check_urdf, parsed_xml
-
-FIELD = "robot.spheres"
 
 
-def with_spheres(urdf: bytes, spheres: bytes) -> bytes:
-    """Return a URDF whose collision bodies are the spheres of another one, link by link.
+def with_spheres(root: Any, other: Any, field: str) -> Any:
+    """Put the spheres of one URDF in the place of the collision bodies of another, link by link.
 
     Args:
-        urdf: The robot's.
-        spheres: The other.
+        root: The robot, that `read_urdf` returned; it is changed.
+        other: The spheres, likewise.
+        field: That names them, for errors.
+
+    Returns:
+        The robot with spheres.
 
     Raises:
         SettingError: If the other has no spheres, other bodies, or links that the robot has not.
     """
-    root = parsed_xml(urdf, "robot.urdf", "robot")
-    other = parsed_xml(spheres, FIELD, "robot")
-    check_urdf(other, FIELD)
-    links = {str(link.get("name")): link for link in root.iterfind("link")}
+    links = {link.get("name"): link for link in root.iterfind("link")}
     for link in links.values():
-        for collision in link.findall("collision"):
-            link.remove(collision)
-    count = 0
+        link[:] = []
     for link in other.iterfind("link"):
         for collision in link.findall("collision"):
-            name = str(link.get("name"))
+            name = link.get("name")
             if name not in links:
                 must = "a URDF whose spheres belong to links of the robot"
-                raise SettingError(FIELD, must, name, nearest(name, list(links)))
+                raise SettingError(field, must, name, nearest(name, list(links)))
             if collision.find("geometry/sphere") is None:
-                raise SettingError(FIELD, "a URDF of spheres", f"another body of '{name}'")
-            collision.attrib.pop("name", None)
+                raise SettingError(field, "a URDF of spheres", f"another body of '{name}'")
             links[name].append(collision)
-            count += 1
-    if count == 0:
-        raise SettingError(FIELD, "a URDF of spheres", "one without")
-    return ET.tostring(root)
+    if not any(len(link) for link in links.values()):
+        raise SettingError(field, "a URDF of spheres", "one without")
+    return root
 
 
 def spheres_of_bodies(bodies: list[Any], spheres: list[Any]) -> list[FloatArray]:

@@ -7,9 +7,7 @@ attached to the condition; whoever has it needs neither the library nor the time
 
 import contextlib
 import hashlib
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, Literal
 
 import coal
@@ -21,6 +19,7 @@ from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray, IntArray
+from evoexp.robots.mesh_checks import load, triangles_of
 
 Decomposition = Literal["coacd", "hulls"]
 
@@ -70,18 +69,9 @@ def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, In
     Raises:
         SettingError: If it cannot be read.
     """
-    with tempfile.TemporaryDirectory() as directory:
-        place = Path(directory) / f"mesh{ending.lower()}"
-        place.write_bytes(content)
-        try:
-            mesh: Any = coal.MeshLoader().load(str(place), np.ones(3))
-        except (ValueError, RuntimeError) as error:
-            reason = str(error).strip().splitlines()[0].replace(directory, "")
-            raise SettingError(field, "a URDF whose meshes can be read", reason) from None
-    corners = np.array([mesh.vertex(k) for k in range(mesh.num_vertices)]).reshape(-1, 3)
-    faces = [mesh.tri_indices(k) for k in range(mesh.num_tris)]
-    triangles = np.array([[f[0], f[1], f[2]] for f in faces], dtype=np.int64).reshape(-1, 3)
-    return np.asarray(corners, dtype=np.float64), triangles
+    mesh = load(content, ending, f"mesh{ending}", field)
+    corners = np.asarray(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
+    return corners, triangles_of(mesh)
 
 
 def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:

@@ -5,7 +5,9 @@ travel with it (`evoexp.attachments`). Where they lay and what they were called 
 identity.
 """
 
+import contextlib
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
@@ -15,12 +17,13 @@ from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, keep, located
 from evoexp.errors import SettingError, nearest
+from evoexp.mesh_files import MESHES, mesh_content, package_folders
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
 from evoexp.robots.joint_choice import joint_roles, standing_values
-from evoexp.robots.mesh_files import MESHES, mesh_content, robot_file
+from evoexp.robots.mesh_checks import whole_mesh
 from evoexp.robots.mesh_pieces import (
     Decomposition,
     in_pieces,
@@ -28,11 +31,17 @@ from evoexp.robots.mesh_pieces import (
     mesh_pieces,
     read_pieces,
 )
+from evoexp.robots.robot_data import robot_file
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
+from evoexp.robots.urdf_bodies import built_bodies
+from evoexp.robots.urdf_reading import check_tree, read_urdf
 from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
-from evoexp.robots.urdf_text import LARGEST, MESH, check_urdf, file_content, parsed_xml, read_joints
+from evoexp.robots.urdf_text import file_content, parsed_xml, read_joints
 from evoexp.validation import Positive, Settings
+
+MESH = "link/collision/geometry/mesh"
+SPHERES = "robot.spheres"
 
 
 class Mesh(Settings):
@@ -49,6 +58,16 @@ class Mesh(Settings):
     pieces: File | None = None
 
 
+@contextlib.contextmanager
+def _named(file: Any) -> Iterator[None]:
+    """Add the name of a file to the refusals of what is in it."""
+    try:
+        yield
+    except SettingError as error:
+        hint = f"{error.hint}; in {file}"
+        raise SettingError(error.field, error.must, error.was, hint) from None
+
+
 def _pairs(value: Any) -> Any:
     """Turn a mapping of names to values into pairs in the order of the names."""
     return tuple(sorted(value.items())) if isinstance(value, dict) else value
@@ -59,6 +78,8 @@ StandingValues = Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs
 
 class Urdf(Chain):
     """An arm out of a URDF; in a configuration `path` (and `srdf`) name the files that are read.
+
+    `packages` tells the folders of packages of meshes, by their names.
 
     Attributes:
         urdf: The URDF.
@@ -131,15 +152,19 @@ class Urdf(Chain):
             return settings
         path = robot_file(settings.pop("path"), f"{field}.path")
         srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
+        packages = package_folders(settings.pop("packages", None), f"{field}.packages")
         content = file_content(path, f"{field}.path")
-        root = parsed_xml(content, f"{field}.path", "robot")
-        check_urdf(root, f"{field}.path")
+        file = Path(located(str(path)))
+        with _named(file):
+            root = read_urdf(content, f"{field}.path")
+            check_tree(root, f"{field}.path")
+            read_joints(root, f"{field}.path")
+            found = {}
+            for name in dict.fromkeys(mesh.get("filename") for mesh in root.iterfind(MESH)):
+                data = mesh_content(name, file, packages, f"{field}.path")
+                found[name] = whole_mesh(data, name, f"{field}.path")
         settings["urdf"] = {SHA256: keep(content)}
-        names = dict.fromkeys(str(mesh.get("filename")) for mesh in root.iterfind(MESH))
-        if names:
-            found = {
-                name: mesh_content(name, Path(located(path)), f"{field}.path") for name in names
-            }
+        if found:
             settings["meshes"] = [
                 {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
             ]
@@ -150,7 +175,8 @@ class Urdf(Chain):
                     mesh["pieces"] = {SHA256: keep(cut)}
         if (spheres := settings.pop("spheres", None)) is not None:
             content = file_content(spheres, f"{field}.spheres")
-            parsed_xml(content, f"{field}.spheres", "robot")
+            with _named(spheres):
+                read_urdf(content, f"{field}.spheres")
             settings["spheres"] = {SHA256: keep(content)}
         if srdf is not None:
             content = file_content(srdf, f"{field}.srdf")
@@ -160,8 +186,8 @@ class Urdf(Chain):
 
     def chains(self) -> tuple[Arm, ...]:
         """Return the arms: one, or one per group."""
-        root = parsed_xml(self.urdf.content, "robot.urdf", "robot")
-        check_urdf(root, "robot.urdf")
+        root = self._root()
+        check_tree(root, "robot.path")
         joints = read_joints(root, "robot.path")
         srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
         groups = self.groups or ((self.group,) if self.group else ())
@@ -203,13 +229,15 @@ class Urdf(Chain):
     def _rules(self) -> JointRules:
         return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)
 
+    def _root(self) -> Any:
+        return read_urdf(self.urdf.content, "robot.path")
+
     def _model(self) -> Any:
         try:
-            return pin.buildModelFromXML(plain_urdf(self.urdf.content, {}, self._rules()))
+            return pin.buildModelFromXML(plain_urdf(self._root(), self._rules()))
         except (ValueError, RuntimeError) as error:
-            raise SettingError(
-                "robot.path", "a URDF that Pinocchio reads", str(error).strip().splitlines()[0]
-            ) from None
+            reason = str(error).strip().splitlines()[0]
+            raise SettingError("robot.path", "a URDF that Pinocchio reads", reason) from None
 
     def _geometry(self, model: Any) -> Any:
         with tempfile.TemporaryDirectory() as directory:
@@ -219,53 +247,29 @@ class Urdf(Chain):
                 if ending not in MESHES:
                     must = f"a name that ends in {', '.join(MESHES)}"
                     raise SettingError(f"robot.meshes[{k}].name", must, mesh.name)
-                place = Path(directory) / f"mesh_{k}{ending}"
-                place.write_bytes(mesh.file.content)
-                places[mesh.name] = str(place)
-            try:
-                text = plain_urdf(self.urdf.content, places, self._rules())
-                found = pin.buildGeomFromUrdfString(
-                    model, text, pin.GeometryType.COLLISION, None, directory
-                )
-            except (ValueError, RuntimeError) as error:
-                raise SettingError(
-                    "robot.path",
-                    "a URDF whose collision bodies can be read",
-                    str(error).strip().splitlines()[0].replace(directory, ""),
-                ) from None
-            if self.decomposition is not None:
-                found = self._in_pieces(found, places)
-        for item in found.geometryObjects:
-            item.geometry.computeLocalAABB()
-            far = np.abs(item.placement.translation).max() + item.geometry.aabb_radius
-            if not 0.0 <= far <= LARGEST:
-                must = f"a URDF whose bodies lie within {LARGEST:g} m"
-                raise SettingError("robot.path", must, f"'{item.name}' that reaches to {far:.3g}")
-        return found
+                places[mesh.name] = Path(directory) / f"mesh_{k}{ending}"
+                places[mesh.name].write_bytes(mesh.file.content)
+            bodies = built_bodies(model, self._root(), self._rules(), places, "robot.path")
+        return bodies if self.decomposition is None else self._in_pieces(bodies, places)
 
     def _given_spheres(self) -> dict[str, FloatArray]:
         """Return the given spheres of each body by its name: middles in its frame, and radii."""
         assert self.spheres is not None
         model = self._model()
-        text = with_spheres(self.urdf.content, self.spheres.content)
-        plain = plain_urdf(text, {}, self._rules())
-        try:
-            spheres = pin.buildGeomFromUrdfString(model, plain, pin.GeometryType.COLLISION)
-        except (ValueError, RuntimeError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise SettingError("robot.spheres", "a URDF that Pinocchio reads", reason) from None
+        root = with_spheres(self._root(), read_urdf(self.spheres.content, SPHERES), SPHERES)
+        spheres = built_bodies(model, root, self._rules(), {}, SPHERES)
         bodies = list(self._geometry(model).geometryObjects)
         found = spheres_of_bodies(bodies, list(spheres.geometryObjects))
         return dict(zip(body_names(bodies), found, strict=True))
 
-    def _in_pieces(self, geometry: Any, places: dict[str, str]) -> Any:
+    def _in_pieces(self, geometry: Any, places: dict[str, Path]) -> Any:
         """Return collision bodies with the pieces of meshes in their place.
 
         Args:
             geometry: The bodies, a `pin.GeometryModel`.
             places: Name of each mesh → the path from which it was read.
         """
-        files = {places[mesh.name]: mesh.pieces for mesh in self.meshes}
+        files = {str(places[mesh.name]): mesh.pieces for mesh in self.meshes}
         shapes = {}
         for item in geometry.geometryObjects:
             if item.meshPath not in files:

@@ -7,7 +7,6 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.robots.urdf_text import MESH, check_urdf, parsed_xml
 
 PLANAR = (("x", "prismatic", "1 0 0"), ("y", "prismatic", "0 1 0"), ("yaw", "revolute", "0 0 1"))
 FLOATING = (
@@ -38,27 +37,28 @@ class JointRules(NamedTuple):
     base: str
 
 
-def plain_urdf(content: bytes, places: dict[str, str], rules: JointRules) -> str:
-    """Rewrite a URDF without visual elements, with the present paths of its meshes.
+def plain_urdf(root: Any, rules: JointRules, places: dict[str, str] | None = None) -> str:
+    """Rewrite a URDF for Pinocchio, with the present paths of its meshes.
+
+    Cylinders stand in the place of capsules, which urdfdom leaves out.
 
     Args:
-        content: Of the URDF.
-        places: Where each mesh lies; none: bodies of meshes are left out.
+        root: That `read_urdf` returned; it is changed.
         rules: For joints without limits, or of several coordinates.
+        places: Where each mesh lies; None: collision bodies are left out.
     """
-    root = parsed_xml(content, "robot.urdf", "robot")
-    check_urdf(root, "robot.urdf")
     for link in root.iterfind("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-        if not places:
-            for collision in link.findall("collision"):
-                if collision.find("geometry/mesh") is not None:
-                    link.remove(collision)
-    for mesh in root.iterfind(MESH):
-        if (name := str(mesh.get("filename"))) not in places:
-            raise SettingError("robot.meshes", "those that the URDF names", f"without '{name}'")
-        mesh.set("filename", places[name])
+        for collision in link.findall("collision"):
+            (shape,) = collision.find("geometry")
+            if places is None:
+                link.remove(collision)
+            elif shape.tag == "capsule":
+                shape.tag = "cylinder"
+            elif shape.tag == "mesh":
+                if (name := shape.get("filename")) not in places:
+                    must = "those that the URDF names"
+                    raise SettingError("robot.meshes", must, f"without '{name}'")
+                shape.set("filename", places[name])
     for joint in root.findall("joint"):
         _rewrite_joint(root, joint, rules)
     if rules.base in ("planar", "floating"):
@@ -110,10 +110,10 @@ def _limit(joint: Any, most: float, *, always: bool = False) -> None:
         given = [max(given[0], -most), min(given[1], most)]
     for side, value in zip(("lower", "upper"), given, strict=True):
         limit.set(side, repr(value))
-    # numbers without which Pinocchio does not read limits
-    for name in ("effort", "velocity"):
-        if limit.get(name) is None:
-            limit.set(name, "0")
+    # numbers without which Pinocchio does not read limits; a speed of 0 is none
+    limit.set("effort", "0")
+    if not np.isfinite(float(limit.get("velocity", "inf"))):
+        limit.set("velocity", "0")
 
 
 def _part_joint(root: Any, joint: Any, parts: Any, rules: JointRules) -> None:
@@ -136,8 +136,6 @@ def _part_joint(root: Any, joint: Any, parts: Any, rules: JointRules) -> None:
 def _across(normal: str) -> dict[str, str]:
     """Choose the directions of a planar joint's coordinates in the plane across a normal."""
     z = np.array([float(word) for word in normal.split()])
-    if len(z) != 3:
-        raise SettingError("robot.path", "a URDF whose axes have three numbers", normal)
     z /= np.sqrt(np.sum(z * z))
     x, y = np.eye(3)[0], np.eye(3)[1]
     if z[2] != 1.0:
@@ -153,8 +151,6 @@ def _free_base(root: Any, parts: Any, rules: JointRules) -> None:
     children = {str(child.get("link")) for child in root.iterfind("joint/child")}
     roots = [str(link.get("name")) for link in root.iterfind("link")]
     below = [name for name in roots if name not in children]
-    if len(below) != 1:
-        raise SettingError("robot.path", "a URDF of one tree of links", ", ".join(below) or "none")
     ground = f"{BASE}_ground"
     ET.SubElement(root, "link", {"name": ground})
     _append_parts(root, BASE, ground, below[0], parts, rules)

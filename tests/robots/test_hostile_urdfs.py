@@ -11,7 +11,7 @@ from confinement import confined, no_longer
 from evoexp.condition import Condition
 from evoexp.configuration.building import build_condition
 from evoexp.errors import EvoexpError
-from evoexp.robots.mesh_files import MESHES
+from evoexp.mesh_files import MESHES
 from evoexp.testing.small_conditions import conditions
 from matrix import counts, matrices_are_asked_for
 

@@ -13,7 +13,7 @@ from evoexp.attachments import PREFIX
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log
 from evoexp.errors import EvoexpError
-from evoexp.robots.mesh_files import ROBOT_DATA, robot_file
+from evoexp.robots.robot_data import ROBOT_DATA, robot_file
 from evoexp.robots.urdf import Urdf
 from evoexp.store.log_reader import read_log
 from evoexp.testing.robot_gallery import (
@@ -61,7 +61,7 @@ def test_logs_reproduce_without_the_files(tmp_path: Path, monkeypatch: pytest.Mo
         raise AssertionError("a log names no files")
 
     monkeypatch.setattr("evoexp.attachments._contents", {})
-    monkeypatch.setattr("evoexp.robots.mesh_files.robot_file", nothing)
+    monkeypatch.setattr("evoexp.robots.robot_data.robot_file", nothing)
     monkeypatch.setattr("evoexp.robots.urdf.file_content", nothing)
     assert reproduce_log(log).matches
 
@@ -95,7 +95,7 @@ def test_a_name_of_the_package_is_refused_without_it(monkeypatch: pytest.MonkeyP
     def missing(name: str) -> None:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("evoexp.robots.mesh_files.distribution", missing)
+    monkeypatch.setattr("evoexp.robots.robot_data.distribution", missing)
     with pytest.raises(EvoexpError) as found:
         Urdf.read_files({"path": f"{ROBOT_DATA}:ur5.urdf"}, "robot")
     assert "pip install 'evoexp[robots]'" in str(found.value)

@@ -47,9 +47,10 @@ class Arms(Robot):
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
-        """Return settings in which a given `path` and `srdf` count for all arms out of a URDF."""
+        """Return settings in which the files that are given count for all arms out of a URDF."""
         settings = dict(settings)
-        given = {name: settings.pop(name) for name in ("path", "srdf") if name in settings}
+        files = ("path", "srdf", "packages")
+        given = {name: settings.pop(name) for name in files if name in settings}
         shared = {name: path for name, path in given.items() if path is not None}
         if shared and isinstance(settings.get("arms"), list):
             settings["arms"] = [

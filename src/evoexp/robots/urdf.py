@@ -15,12 +15,12 @@ from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, keep, located
 from evoexp.errors import SettingError, nearest
+from evoexp.mesh_files import MESHES, mesh_content, package_folders
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
 from evoexp.robots.joint_choice import joint_roles, standing_values
-from evoexp.robots.mesh_files import MESHES, mesh_content, robot_file
 from evoexp.robots.mesh_pieces import (
     Decomposition,
     in_pieces,
@@ -28,6 +28,7 @@ from evoexp.robots.mesh_pieces import (
     mesh_pieces,
     read_pieces,
 )
+from evoexp.robots.robot_data import robot_file
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
 from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
@@ -59,6 +60,8 @@ StandingValues = Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs
 
 class Urdf(Chain):
     """An arm out of a URDF; in a configuration `path` (and `srdf`) name the files that are read.
+
+    `packages` tells the folders of packages of meshes, by their names.
 
     Attributes:
         urdf: The URDF.
@@ -131,15 +134,15 @@ class Urdf(Chain):
             return settings
         path = robot_file(settings.pop("path"), f"{field}.path")
         srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
+        packages = package_folders(settings.pop("packages", None), f"{field}.packages")
         content = file_content(path, f"{field}.path")
         root = parsed_xml(content, f"{field}.path", "robot")
         check_urdf(root, f"{field}.path")
         settings["urdf"] = {SHA256: keep(content)}
         names = dict.fromkeys(str(mesh.get("filename")) for mesh in root.iterfind(MESH))
         if names:
-            found = {
-                name: mesh_content(name, Path(located(path)), f"{field}.path") for name in names
-            }
+            file = Path(located(path))
+            found = {name: mesh_content(name, file, packages, f"{field}.path") for name in names}
             settings["meshes"] = [
                 {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
             ]

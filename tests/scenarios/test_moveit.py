@@ -206,6 +206,12 @@ def asked(**changes: Any) -> Any:
     return read_request(file)
 
 
+def read_goal(changes: dict[str, Any]) -> None:
+    if asked(**changes).link:
+        file = document(request(**changes), REQUEST)
+        read_link_goal(file, read_frames(document(scene()), None))
+
+
 def test_a_request_names_group_start_and_goal() -> None:
     found = asked()
     assert found.group == "arm"
@@ -214,14 +220,17 @@ def test_a_request_names_group_start_and_goal() -> None:
     assert not found.link
 
 
-def link_goal(turn: list[float], tolerance: float, offset: list[float]) -> dict[str, Any]:
+def link_goal(
+    turn: list[float], tolerance: float, offset: list[float], **region: Any
+) -> dict[str, Any]:
     place = {
         "link_name": "tip",
         "target_point_offset": offset,
         "constraint_region": {
             "primitives": [{"type": "box", "dimensions": [0.02, 0.04, 0.06]}],
             "primitive_poses": [{"position": [0.4, 0.1, 0.5]}],
-        },
+        }
+        | region,
     }
     tolerances = {f"absolute_{axis}_axis_tolerance": tolerance for axis in "xyz"}
     oriented = {"link_name": "tip", "orientation": turn, **tolerances}
@@ -251,16 +260,22 @@ def test_a_pose_of_a_link_has_the_tolerances_of_its_constraints() -> None:
         ({"goal_constraints": [{}]}, "a goal of joints, or of one position"),
         ({"goal_constraints": [{"visibility_constraints": [{"a": 1}]}]}, "visibility constraints"),
         ({"goal_constraints": [link_goal([0, 0, 0, 1], 0.0, [0, 0, 0])]}, "tolerances above 0"),
+        (
+            {
+                "goal_constraints": [
+                    link_goal([0, 0, 0, 1], 0.1, [0, 0, 0], meshes=[{"vertices": [1]}])
+                ]
+            },
+            "goals within meshes",
+        ),
+        ({"goal_constraints": [{"position_constraints": [{}]}]}, "a goal of a link"),
         ({"start_state": {"joint_state": {"name": ["a"], "position": []}}}, "1 numbers"),
         ({"start_state": {"attached_collision_objects": [{"a": 1}]}}, "attached objects"),
     ],
 )
 def test_requests_that_are_not_known_are_refused(changes: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingError, match=named) as caught:
-        if asked(**changes).link:
-            read_link_goal(
-                document(request(**changes), REQUEST), read_frames(document(scene()), None)
-            )
+        read_goal(changes)
     assert str(caught.value).startswith("scenario.request: ")
 
 

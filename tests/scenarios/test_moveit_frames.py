@@ -190,7 +190,7 @@ REFUSED = {
         "", r"the planning frame at fixed_frame_transforms\[0\]\.child_frame_id, was ''"),
     "a link elsewhere": ([SELF, moved("base", "world", 1, 0, 0)],
         "", r"transform of 'base' is that of the robot's link.*; the link stands at \(0, 0, 0\)"),
-    "a link that moves": ([SELF], "tip", r"stands still \(base, world\) at 'o', was \"'tip', a lin"),
+    "a link that moves": ([SELF], "tip", r"stands still \(base, world\) at 'o', was \"'tip', a"),
     "a link that moves, with a transform": ([SELF, moved("tip", "world", 1, 0, 0)],
         "tip", r"stands still \(base, world\) at 'o', was \"'tip', a link that moves"),
     "an unknown frame": ([SELF, moved("shelf", "world")],

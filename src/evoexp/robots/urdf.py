@@ -117,6 +117,11 @@ class Urdf(Chain):
         """Whether pairs are still to be derived."""
         return settings.get("pairs") is None and "urdf" in settings
 
+    @property
+    def robot_name(self) -> str:
+        """The robot's name in the URDF."""
+        return str(self._model().name)
+
     def build(self) -> Assembly:
         """Return the robot with its derived pairs, given spheres and the frames of its links."""
         pairs = self.pairs.content if self.pairs else None

@@ -158,18 +158,19 @@ class MoveitTask(Component):
         """
         return _world(self._message("scene"), links, self.meshes, load)
 
-    def notes(self, robot: str) -> tuple[str, ...]:
+    def notes(self, robot: Any) -> tuple[str, ...]:
         """Name the parts of the messages that are left out and may matter.
 
         Args:
-            robot: Name of the robot's model.
+            robot: The robot of the condition.
         """
+        name = getattr(robot, "robot_name", "")
         scene, request = (self._message(name).root for name in FILES)
         found = []
         if scene.get("is_diff"):
             found.append("the scene is a change of another (is_diff): it is taken as it is")
-        if robot != (model := scene.get("robot_model_name") or robot):
-            found.append(f"the scene is of the robot '{model}', the robot is '{robot}'")
+        if name and (model := scene.get("robot_model_name") or name) != name:
+            found.append(f"the scene is of the robot '{model}', the robot is '{name}'")
         scaled = ("max_velocity_scaling_factor", "max_acceleration_scaling_factor")
         left = [name for name in scaled if request.get(name) not in (None, 0, 1)]
         left += ["max_cartesian_speed"] if request.get("max_cartesian_speed") else []

@@ -1,6 +1,7 @@
 """Where objects of planning scenes stand, judged by a slow reader after MoveIt's own code."""
 
 import copy
+import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from test_moveit import mesh, random_pose
 
 import evoexp
 from evoexp.collision.scene import obstacle_shapes
+from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.planners.moveit_tasks import arm_motion
@@ -201,17 +203,37 @@ REFUSED = {
 }  # fmt: skip
 
 
+def prepare(words: list[str]) -> None:
+    (found,) = conditions(*words).values()
+    found.prepare()
+
+
 @pytest.mark.parametrize("case", REFUSED)
 def test_frames_that_would_be_guessed_are_refused(case: str, tmp_path: Path) -> None:
     transforms, frame, named = REFUSED[case]
     thing = body("sphere", [0.1], [3, 0, 0], name="o", header={"frame_id": frame})
     message = scene(thing, fixed_frame_transforms=transforms)
     words = [*write_robot(tmp_path), *write_problem(tmp_path, message), *COVERED]
-    (found,) = conditions(*words).values()
     with pytest.raises(SettingError, match=named) as caught:
-        found.prepare()
+        prepare(words)
     line = str(caught.value)
     assert line.startswith(f"scenario.scene: {tmp_path}") and "\n" not in line
+
+
+def test_runs_that_took_frames_the_wrong_way_round_are_refused_not_taken(tmp_path: Path) -> None:
+    """Their identity is another, and whoever opens one is told to run it again."""
+    thing = body("sphere", [0.1], [3, 0, 0], name="o", header={"frame_id": "world"})
+    message = scene(thing, fixed_frame_transforms=[SELF, moved("camera", "world", 1, 0, 0)])
+    words = [*write_robot(tmp_path), *COVERED]
+    (found,) = conditions(*words, *write_problem(tmp_path, message)).values()
+    plain = json.loads(found.to_json())
+    assert plain["scenario"].pop("frame_names") == "header"
+    before = Condition.from_json(json.dumps(plain).encode())
+    assert before.id != found.id
+    with pytest.raises(SettingError, match=r"frame_names: must be header, .* run it again"):
+        before.prepare()
+    (alone,) = conditions(*words, *write_problem(tmp_path, scene(thing))).values()
+    assert "frame_names" not in json.loads(alone.to_json())["scenario"]
 
 
 def test_a_scene_of_one_frame_needs_no_transform_and_a_virtual_joint_names_it(
@@ -245,7 +267,7 @@ def state(**joints: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("file", ["scene", "request"])
 def test_a_robot_that_its_virtual_joint_moves_is_refused(file: str, tmp_path: Path) -> None:
-    def prepare(own: dict[str, Any]) -> None:
+    def prepare_with(own: dict[str, Any]) -> None:
         transforms = [SELF, moved("shelf", "world", 0, 0, 1)]
         asked, message = request(), scene(fixed_frame_transforms=transforms)
         if file == "scene":
@@ -256,10 +278,10 @@ def test_a_robot_that_its_virtual_joint_moves_is_refused(file: str, tmp_path: Pa
         found.prepare()
 
     words = [*write_robot(tmp_path), *COVERED]
-    prepare(state())
-    prepare(state(header={"frame_id": "/world"}))
+    prepare_with(state())
+    prepare_with(state(header={"frame_id": "/world"}))
     place = {"translation": [0, 0, 1], "rotation": [0, 0, 0, 1]}
-    prepare(state(header={"frame_id": "shelf"}, transforms=[place]))  # it stands at the origin
+    prepare_with(state(header={"frame_id": "shelf"}, transforms=[place]))  # it stands at the origin
     for own, named in (
         (state(transforms=[place]), r"a robot at the origin .*, was 'one at \(0, 0, 1\) m"),
         (state(header={"frame_id": "shelf"}), r"was 'one at \(0, 0, -1\) m"),
@@ -267,7 +289,7 @@ def test_a_robot_that_its_virtual_joint_moves_is_refused(file: str, tmp_path: Pa
         (state(transforms=[]), r"a transform per joint of .*, was 0"),
     ):
         with pytest.raises(SettingError, match=named) as caught:
-            prepare(own)
+            prepare_with(own)
         assert str(caught.value).startswith(f"scenario.{file}: ")
 
 

@@ -8,7 +8,7 @@ or to a pose of the tool.
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit_files import Document, Pose
+from evoexp.scenarios.moveit_frames import has_other_frames
 from evoexp.scenarios.moveit_meshes import Mesh, resources
 from evoexp.scenarios.moveit_messages import REQUEST, SCENE
 from evoexp.scenarios.moveit_request import (
@@ -88,6 +89,8 @@ class MoveitTask(Component):
         position_tolerance: Of the tool at a goal of joints, for planners that end at poses [m].
         angle_tolerance: The same of its orientation [deg].
         meshes: That the scene names by their files.
+        frame_names: The id of a fixed transform that names its frame; `header` where a scene has
+            other frames than one. Runs before November 2026 took the child's, and are refused.
     """
 
     component: ClassVar[str] = "moveit"
@@ -99,6 +102,7 @@ class MoveitTask(Component):
     position_tolerance: Positive
     angle_tolerance: Positive
     meshes: tuple[SceneMesh, ...] = ()
+    frame_names: Literal["child", "header"] = "child"
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
@@ -120,6 +124,8 @@ class MoveitTask(Component):
             settings[name] = {SHA256: keep(content)}
             _paths[settings[name][SHA256]] = path
             document = _document(content, f"{field}.{name}: {path}", message)
+            if message == SCENE and has_other_frames(document):
+                settings["frame_names"] = "header"
             if message == SCENE and (names := resources(document)):
                 place = Path(located(path))
                 settings["meshes"] = [
@@ -156,7 +162,11 @@ class MoveitTask(Component):
         Raises:
             SettingError: If the scene holds what evoexp does not know.
         """
-        return _world(self._message("scene"), links, self.meshes, load)
+        scene = self._message("scene")
+        if self.frame_names == "child" and has_other_frames(scene):
+            must = "header, as MoveIt names frames: give the scene again and run it again"
+            raise SettingError("scenario.frame_names", must, self.frame_names)
+        return _world(scene, links, self.meshes, load)
 
     def notes(self, robot: Any) -> tuple[str, ...]:
         """Name the parts of the messages that are left out and may matter.

@@ -40,13 +40,12 @@ class Frames(NamedTuple):
             SettingError: If the frame is not known, or moves.
         """
         name = frame_name(document.mapping(header, f"{where}.header").get("frame_id"))
-        name = name or self.planning
-        if name in self.poses:
-            return self.poses[name]
         must = f"given in a frame that stands still ({', '.join(self.poses)}) at {where}"
         if name in self.moving:
             raise SettingError(document.field, must, f"'{name}', a link that moves")
-        raise SettingError(document.field, must, name, nearest(name, self.poses))
+        if (name := name or self.planning) not in self.poses:
+            raise SettingError(document.field, must, name, nearest(name, self.poses))
+        return self.poses[name]
 
 
 def frame_name(value: Any) -> str:
@@ -72,7 +71,8 @@ def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
     known = dict.fromkeys(filter(None, (ground, links and links.root, WORLD)))
     if planning in moving or (planning and not is_certain and planning not in known):
         must = f"of transforms whose child_frame_id is the planning frame ({', '.join(known)})"
-        raise SettingError(scene.field, must, planning)
+        hint = "; header.frame_id names the frame that a transform places"
+        raise SettingError(scene.field, must, planning, hint)
     poses = {name: _link_pose(pose) for name, pose in standing.items()}
     origin = poses.get(planning or ground or WORLD, IDENTITY)
     poses.setdefault(planning or ground or WORLD, origin)
@@ -88,6 +88,16 @@ def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
                 scene.field, must, pose.text, f"; the link stands {poses[name].text}"
             )
     return Frames(planning or ground or WORLD, poses, moving)
+
+
+def has_other_frames(scene: Document) -> bool:
+    """Whether a scene has fixed transforms of frames other than the planning frame.
+
+    Raises:
+        SettingError: If they contradict each other.
+    """
+    poses = _fixed_transforms(scene)[0].values()
+    return not all(pose.is_near(IDENTITY, SAME) for pose in poses)
 
 
 def _fixed_transforms(scene: Document) -> tuple[dict[str, Pose], str, bool]:

@@ -60,8 +60,6 @@ def read_message(content: bytes, field: str) -> dict[str, Any]:
     for begins, name, hint in FORMATS:
         if re.match(begins, content, re.IGNORECASE):
             raise SettingError(field, MUST, name, hint)
-    if content.lstrip().startswith(b"{"):
-        content = content.replace(b"\t", b" ")  # JSON may be indented by tabs, YAML may not
     try:
         _check(content, field)
         roots = [root for root in yaml.load_all(content, _Loader) if root is not None]

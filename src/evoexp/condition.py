@@ -227,6 +227,19 @@ class Condition(NamedTuple):
         """
         return _prepare(self)
 
+    def notes(self) -> list[str]:
+        """Return the remarks of planner and scenario on settings and problem, one per line.
+
+        Raises:
+            SettingError: If the parts contradict each other.
+        """
+        planner, problem = self.prepare()
+        of_scenario = getattr(self.scenario, "notes", None)
+        return [
+            *planner.notes(problem),
+            *(of_scenario(self.robot) if callable(of_scenario) else ()),
+        ]
+
 
 def _nested(planner: Any) -> Iterator[Any]:
     """Yield a planner and those that it stands beside, the outermost first."""

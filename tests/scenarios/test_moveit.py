@@ -11,14 +11,26 @@ import yaml
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.scenarios.moveit_request import read_request
-from evoexp.scenarios.moveit_scene import World, read_world
+from evoexp.scenarios.moveit_files import Document
+from evoexp.scenarios.moveit_frames import read_frames
+from evoexp.scenarios.moveit_messages import REQUEST, SCENE
+from evoexp.scenarios.moveit_request import read_link_goal, read_request
+from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world
 from evoexp.scenarios.obstacles import BOX, CYLINDER, HALF_SPACE, SPHERE, obstacle_table
 from moveit_samples import GOAL, JOINTS, START, body, request, scene
 
 
+def document(plain: Any, message: str = SCENE) -> Document:
+    text = plain if isinstance(plain, bytes) else yaml.safe_dump(plain).encode()
+    return Document(text, "scenario.scene" if message == SCENE else "scenario.request", message)
+
+
 def read(plain: Any) -> World:
-    return read_world(yaml.safe_dump(plain).encode())
+    """Read all of a scene."""
+    file = document(plain)
+    read_state(file, file.root.get("robot_state"), "robot_state")
+    read_allowed(file)
+    return read_world(file, None, {})
 
 
 def random_pose(rng: np.random.Generator) -> tuple[pin.SE3, dict[str, Any]]:
@@ -49,7 +61,13 @@ def test_an_object_stands_at_its_pose_times_the_primitive_s(seed: int) -> None:
                 ],
                 "primitive_poses": [copy.deepcopy(inner_plain) for _ in range(3)],
             },
-            fixed_frame_transforms=[{"child_frame_id": "shelf", "transform": transform}],
+            fixed_frame_transforms=[
+                {
+                    "header": {"frame_id": "shelf"},
+                    "child_frame_id": "world",
+                    "transform": transform,
+                }
+            ],
         )
     )
     expected, table = frame * own * inner, obstacle_table(world.obstacles)
@@ -87,7 +105,7 @@ def test_a_plane_is_the_half_space_behind_it() -> None:
 def test_small_numbers_without_a_point_are_numbers() -> None:
     """YAML takes 1e-05 for a text."""
     text = yaml.safe_dump(scene(body("sphere", [0.1], [0.0, 0.0, 7.0]))).replace("7.0", "1e-05")
-    (ball,) = read_world(text.encode()).obstacles
+    (ball,) = read(text.encode()).obstacles
     assert ball.center == (0.0, 0.0, 1e-5)  # type: ignore[union-attr]
 
 
@@ -98,7 +116,7 @@ def test_the_matrix_says_which_pairs_may_touch() -> None:
         "default_entry_names": ["c", "d"],
         "default_entry_values": [True, False],
     }
-    allowed = read(scene(allowed_collision_matrix=matrix)).allowed
+    allowed = read_allowed(document(scene(allowed_collision_matrix=matrix)))
     assert allowed.may_touch("a", "b") is True
     assert allowed.may_touch("a", "x") is None
     assert allowed.may_touch("a", "c") is True  # a default counts where no entry does
@@ -125,7 +143,6 @@ FRACTION = {
     "vertices": [{"x": 0, "y": 0, "z": k} for k in range(3)],
     "triangles": [{"vertex_indices": [0, 1, 1.5]}],
 }
-FILE = {"id": "m", "meshes": [{"resource": "package://a/b.stl"}], "mesh_poses": [{}]}
 REFUSED = {
     "attached objects": {"robot_state": {"attached_collision_objects": [{"link_name": "x"}]}},
     "octomaps": {"world": {"octomap": {"octomap": {"data": [1]}}}},
@@ -136,14 +153,15 @@ REFUSED = {
     "counted from 0, was '0, 1, 1.5'": scene(
         mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) | {"meshes": [FRACTION]}
     ),
-    "objects to be added": scene(body("sphere", [1], [0, 0, 0], operation=1)),
+    r"'thing'.operation ADD \(0\), was 'REMOVE'": scene(
+        body("sphere", [1], [0, 0, 0], operation=1)
+    ),
     r"a normal other than 0 of 'floor', was \[0.0, 0.0, 0.0\]": scene(
         {"id": "floor", "planes": [{"coef": [0, 0, 0, -1]}], "plane_poses": [{}]}
     ),
     "a pose per mesh": scene(HALF),
-    "vertices and triangles of 'm', was 'the file package": scene(FILE),
     "a prism": scene({"id": "c", "primitives": [PRISM], "primitive_poses": [{}]}),
-    "frames that do not move": scene(body("sphere", [1], [0, 0, 0], header={"frame_id": "hand"})),
+    "frame that stands still": scene(body("sphere", [1], [0, 0, 0], header={"frame_id": "hand"})),
     "dimensions above 0": scene(body("box", [1, 0, 1], [0, 0, 0])),
     "2 numbers": scene(body("cylinder", [1], [0, 0, 0])),
     "a pose per primitive": scene({"id": "x", "primitives": [PRISM]}),
@@ -179,11 +197,19 @@ def test_empty_parts_are_no_parts() -> None:
 )
 def test_no_other_yaml_is_read(text: bytes) -> None:
     with pytest.raises(SettingError, match=r"^scenario\.scene: must be YAML"):
-        read_world(text)
+        document(text)
 
 
 def asked(**changes: Any) -> Any:
-    return read_request(yaml.safe_dump(request(**changes)).encode(), {})
+    file = document(request(**changes), REQUEST)
+    read_state(file, file.root.get("start_state"), "start_state")
+    return read_request(file)
+
+
+def read_goal(changes: dict[str, Any]) -> None:
+    if asked(**changes).link:
+        file = document(request(**changes), REQUEST)
+        read_link_goal(file, read_frames(document(scene()), None))
 
 
 def test_a_request_names_group_start_and_goal() -> None:
@@ -191,17 +217,20 @@ def test_a_request_names_group_start_and_goal() -> None:
     assert found.group == "arm"
     assert found.joint_goal == dict(zip(JOINTS, GOAL, strict=True))
     assert found.start == dict(zip(JOINTS, START, strict=True)) | {"finger": 0.05, "nail": 0.3}
-    assert found.link_goal is None
+    assert not found.link
 
 
-def link_goal(turn: list[float], tolerance: float, offset: list[float]) -> dict[str, Any]:
+def link_goal(
+    turn: list[float], tolerance: float, offset: list[float], **region: Any
+) -> dict[str, Any]:
     place = {
         "link_name": "tip",
         "target_point_offset": offset,
         "constraint_region": {
             "primitives": [{"type": "box", "dimensions": [0.02, 0.04, 0.06]}],
             "primitive_poses": [{"position": [0.4, 0.1, 0.5]}],
-        },
+        }
+        | region,
     }
     tolerances = {f"absolute_{axis}_axis_tolerance": tolerance for axis in "xyz"}
     oriented = {"link_name": "tip", "orientation": turn, **tolerances}
@@ -210,7 +239,11 @@ def link_goal(turn: list[float], tolerance: float, offset: list[float]) -> dict[
 
 def test_a_pose_of_a_link_has_the_tolerances_of_its_constraints() -> None:
     half = float(np.sqrt(0.5))
-    goal = asked(goal_constraints=[link_goal([0, 0, half, half], 0.1, [0.1, 0, 0])]).link_goal
+    file = document(
+        request(goal_constraints=[link_goal([0, 0, half, half], 0.1, [0.1, 0, 0])]), REQUEST
+    )
+    assert read_request(file).link == "tip"
+    goal = read_link_goal(file, read_frames(document(scene()), None))
     assert (goal.link, goal.distance) == ("tip", 0.01)
     assert goal.angle == pytest.approx(0.1 / DEGREE)
     # the point 0.1 along the link's x axis is the goal, and that axis points along y
@@ -227,13 +260,22 @@ def test_a_pose_of_a_link_has_the_tolerances_of_its_constraints() -> None:
         ({"goal_constraints": [{}]}, "a goal of joints, or of one position"),
         ({"goal_constraints": [{"visibility_constraints": [{"a": 1}]}]}, "visibility constraints"),
         ({"goal_constraints": [link_goal([0, 0, 0, 1], 0.0, [0, 0, 0])]}, "tolerances above 0"),
+        (
+            {
+                "goal_constraints": [
+                    link_goal([0, 0, 0, 1], 0.1, [0, 0, 0], meshes=[{"vertices": [1]}])
+                ]
+            },
+            "goals within meshes",
+        ),
+        ({"goal_constraints": [{"position_constraints": [{}]}]}, "a goal of a link"),
         ({"start_state": {"joint_state": {"name": ["a"], "position": []}}}, "1 numbers"),
         ({"start_state": {"attached_collision_objects": [{"a": 1}]}}, "attached objects"),
     ],
 )
 def test_requests_that_are_not_known_are_refused(changes: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingError, match=named) as caught:
-        asked(**changes)
+        read_goal(changes)
     assert str(caught.value).startswith("scenario.request: ")
 
 

@@ -7,8 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-import yaml
-from test_moveit import mesh, random_pose
+from test_moveit import document, mesh, random_pose
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError
@@ -22,7 +21,7 @@ CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 def read(*objects: dict[str, Any]) -> tuple[Any, ...]:
-    return read_world(yaml.safe_dump(scene(*objects)).encode()).obstacles
+    return read_world(document(scene(*objects)), None, {}).obstacles
 
 
 def shapes(obstacles: tuple[Any, ...]) -> list[tuple[Any, Any]]:

@@ -230,11 +230,10 @@ def _shapes(path: Path) -> dict[str, list[int]]:
 
 
 def _notes(config_json: bytes) -> list[str]:
-    """Return the planner's remarks on its settings, or the reason why there can be none."""
+    """Return the remarks on a condition's settings, or the reason why there can be none."""
 
     def find() -> list[str]:
-        planner, problem = Condition.from_json(config_json).prepare()
-        return list(planner.notes(problem))
+        return Condition.from_json(config_json).notes()
 
     try:
         modules = component_modules(json.loads(config_json))

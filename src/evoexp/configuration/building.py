@@ -8,7 +8,7 @@ from evoexp.condition import PARTS, Condition, read_files
 from evoexp.configuration.experiment import Budget
 from evoexp.configuration.named_states import with_named_states
 from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
-from evoexp.configuration.planning_groups import with_planning_group
+from evoexp.configuration.planning_groups import with_planning_group, with_shared_packages
 from evoexp.configuration.refusals import chosen
 from evoexp.configuration.search_path import file_directories
 from evoexp.errors import SettingError, UnknownSetting
@@ -31,7 +31,7 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
     Raises:
         EvoexpError: For a value that cannot be, or parts that do not go together.
     """
-    read = read_files(config, file_directories(), with_planning_group)
+    read = read_files(with_shared_packages(config), file_directories(), with_planning_group)
     plain = with_named_states(read)
     # groups that the planner takes in, whose errors name the group, as it was typed
     for group in (group for group in PLANNER_PARTS if plain.get(group) is not None):

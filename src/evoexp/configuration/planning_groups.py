@@ -21,6 +21,22 @@ from evoexp.validation import TARGET, build
 TURNING, SLIDING = ("revolute", "continuous"), "prismatic"
 
 
+def with_shared_packages(plain: dict[str, Any]) -> dict[str, Any]:
+    """Return a configuration whose planning scene finds meshes in the robot's packages, too.
+
+    Args:
+        plain: Groups as plain data, before files are read.
+    """
+    robot, scenario = (plain.get(part) for part in PARTS[:2])
+    if not isinstance(scenario, dict) or scenario.get(TARGET) != MoveitTask.component:
+        return plain
+    shared = robot.get("packages") if isinstance(robot, dict) else None
+    if not isinstance(shared, dict):
+        return plain
+    packages = shared | (scenario.get("packages") or {})
+    return {**plain, "scenario": {**scenario, "packages": packages}}
+
+
 def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
     """Return a configuration whose robot is as the request wants it, if a request there is.
 
@@ -45,12 +61,12 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
             raise SettingError("robot.group", must, given)
         if not robot.get("joints") and not robot.get("groups") and robot.get("srdf"):
             settings["group"] = group
-    if (goal := task.plan_request.link_goal) is not None:
+    if link := task.plan_request.link:
         given = robot.get("tool_frame") or ""
-        if given and given != goal.link:
-            must = f"'{goal.link}', the link whose goal scenario.request gives (or left out)"
+        if given and given != link:
+            must = f"'{link}', the link whose goal scenario.request gives (or left out)"
             raise SettingError("robot.tool_frame", must, given)
-        settings["tool_frame"] = goal.link
+        settings["tool_frame"] = link
     standing = _standing(task.state, settings, joints)
     settings["fixed"] = dict(robot.get("fixed") or {}) | standing
     return {**plain, "robot": settings}

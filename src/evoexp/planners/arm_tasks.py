@@ -22,6 +22,7 @@ from evoexp.planners.moveit_tasks import (
     arm_motion,
     hull_notes,
     moving_joints,
+    touching,
     with_allowed_pairs,
     without_pairs,
 )
@@ -218,7 +219,7 @@ def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmTask) -> Scene:
     """
     found, num_bodies = scene(assembly, task.obstacles, self_pairs=True), assembly.geometry.ngeoms
     if isinstance(given, MoveitTask):
-        found = without_pairs(found, given, num_bodies)
+        found = without_pairs(found, given, assembly)
     names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
     return found._replace(names=(*found.names[:num_bodies], *names))
 
@@ -245,8 +246,7 @@ def covered_collision(
     check_limits(assembly, ends)
     for field, q in zip(FIELDS, ends, strict=True):
         check_bodies(bodies, DEGREE * q, field, task.length_unit)
-    names = bodies.names[: assembly.geometry.ngeoms]
-    ignored = given.touching(names) if isinstance(given, MoveitTask) else ()
+    ignored = touching(assembly, given) if isinstance(given, MoveitTask) else ()
     return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored)
 
 

@@ -101,11 +101,10 @@ def scene_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
 
 
 def notes(shown: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
-    """Return (conditions, note): the planners' notes on the conditions whose motions are shown."""
+    """Return (conditions, note): the notes on the conditions whose motions are shown."""
     labels: dict[str, list[str]] = {}
     for each in shown:
-        planner, problem = each.condition.prepared
-        for note in planner.notes(problem):
+        for note in each.condition.condition.notes():
             own = labels.setdefault(note, [])
             if each.condition.label not in own:
                 own.append(each.condition.label)

@@ -37,6 +37,22 @@ class Tool(NamedTuple):
     position: FloatArray  # (3,)
 
 
+class LinkFrames(NamedTuple):
+    """The frames of a URDF's links, for tasks that give places in them.
+
+    Attributes:
+        root: The link that all others hang on.
+        standing: Name of each link that is fixed to the ground, and its pose (12,) in the world.
+        moving: Names of the links that hang on a joint.
+        ground: The frame to which the SRDF's virtual joint ties the root; empty: none.
+    """
+
+    root: str
+    standing: tuple[tuple[str, tuple[float, ...]], ...]
+    moving: frozenset[str]
+    ground: str = ""
+
+
 class Assembly(NamedTuple):
     """A robot, built. Shared and read-only: whoever needs `pin.Data` makes its own.
 
@@ -53,6 +69,7 @@ class Assembly(NamedTuple):
         pairs: Data of `collision.derived_pairs`, attached to the condition; None: there is none.
         spheres: Spheres that are given as the covers of bodies, by name: (spheres, 4) middles in
             the body's frame and radii; None: none are.
+        frames: Of the links; None: they have no names.
     """
 
     model: Any  # pin.Model
@@ -65,6 +82,7 @@ class Assembly(NamedTuple):
     disabled: frozenset[frozenset[str]] = frozenset()
     pairs: bytes | None = None
     spheres: Mapping[str, FloatArray] | None = None
+    frames: LinkFrames | None = None
 
     @property
     def num_arms(self) -> int:

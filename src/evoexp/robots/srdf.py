@@ -87,6 +87,15 @@ class Srdf:
             found.append(NamedState(str(state.get("name")), str(state.get("group")), own))
         return found
 
+    def ground(self) -> str:
+        """Find the frame to which a virtual joint ties the root; empty where none does.
+
+        MoveIt's planning frame is that of a virtual joint that is not fixed (`buildRecursive` in
+        moveit_core's `robot_model.cpp`).
+        """
+        free = (j for j in self._root.iterfind("virtual_joint") if j.get("type") != "fixed")
+        return next((str(joint.get("parent_frame")) for joint in free), "")
+
     def disabled_links(self) -> list[tuple[str, str]]:
         """List the pairs of links that are never judged."""
         return [

@@ -19,7 +19,7 @@ from evoexp.attachments import SHA256, File, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import MESHES, mesh_content, package_folders
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
+from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain, LinkFrames
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
 from evoexp.robots.joint_choice import joint_roles, standing_values
@@ -31,6 +31,7 @@ from evoexp.robots.mesh_pieces import (
     mesh_pieces,
     read_pieces,
 )
+from evoexp.robots.poses import pose_of
 from evoexp.robots.robot_data import robot_file
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
@@ -134,9 +135,15 @@ class Urdf(Chain):
         """Whether pairs are still to be derived."""
         return settings.get("pairs") is None and "urdf" in settings
 
+    @property
+    def robot_name(self) -> str:
+        """The robot's name in the URDF."""
+        return str(self._model().name)
+
     def build(self) -> Assembly:
-        """Return the robot with its derived pairs and given spheres."""
-        found = super().build()._replace(pairs=self.pairs.content if self.pairs else None)
+        """Return the robot with its derived pairs, given spheres and the frames of its links."""
+        pairs = self.pairs.content if self.pairs else None
+        found = super().build()._replace(pairs=pairs, frames=self._link_frames())
         return found if self.spheres is None else found._replace(spheres=self._given_spheres())
 
     @classmethod
@@ -225,6 +232,18 @@ class Urdf(Chain):
             must = f"a frame per group ({len(self.groups)})"
             raise SettingError("robot.tool_frames", must, list(self.tool_frames))
         return tuple((name, f"robot.tool_frames[{k}]") for k, name in enumerate(self.tool_frames))
+
+    def _link_frames(self) -> LinkFrames:
+        model = self._model()
+        base = self._base(model)
+        links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+        poses = [(str(link.name), base * link.placement) for link in links if not link.parentJoint]
+        standing = tuple(
+            (name, tuple(pose_of(pose.rotation, pose.translation).tolist())) for name, pose in poses
+        )
+        moving = frozenset(str(link.name) for link in links if link.parentJoint)
+        ground = "" if self.srdf is None else Srdf(self.srdf.content, {}).ground()
+        return LinkFrames(str(links[0].name), standing, moving, ground)
 
     def _rules(self) -> JointRules:
         return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)

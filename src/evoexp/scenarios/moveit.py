@@ -6,27 +6,57 @@ or to a pose of the tool.
 """
 
 import functools
-import re
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from evoexp.attachments import SHA256, File, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.input_files import read_bounded
+from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit_files import MAX_SCENE, Pose
-from evoexp.scenarios.moveit_request import LinkGoal, Request, read_request, state_of
-from evoexp.scenarios.moveit_scene import World, read_world
-from evoexp.validation import Component, NonNegative, Positive
+from evoexp.scenarios.moveit_files import Document, Pose
+from evoexp.scenarios.moveit_frames import has_other_frames
+from evoexp.scenarios.moveit_meshes import Mesh, resources
+from evoexp.scenarios.moveit_messages import REQUEST, SCENE
+from evoexp.scenarios.moveit_request import (
+    LinkGoal,
+    Request,
+    check_start,
+    read_link_goal,
+    read_request,
+    state_of,
+)
+from evoexp.scenarios.moveit_scene import AllowedPairs, World, read_allowed, read_state, read_world
+from evoexp.scenarios.moveit_yaml import MAX_SCENE
+from evoexp.validation import Component, NonNegative, Positive, Settings
 
 if TYPE_CHECKING:
+    from evoexp.robots.assembly import LinkFrames
     from evoexp.scenarios.posture_task import PostureTask
 
-FILES = ("scene", "request")
+FILES = {"scene": SCENE, "request": REQUEST}  # settings → messages
 UP = (0.0, 0.0, 1.0)  # as MoveIt's planning frames have it
+LoadMesh = Callable[[bytes, str, str], Mesh]
+"""Reads a mesh out of a file's content, the ending of its name, and a field for errors."""
+
+_paths: dict[str, str] = {}  # SHA-256 of a file → its path as it was given, for messages
+
+
+class SceneMesh(Settings):
+    """A mesh that a scene names by its file.
+
+    Attributes:
+        name: As the scene names it.
+        file: Its content.
+    """
+
+    name: str
+    file: File
 
 
 class Joints(NamedTuple):
@@ -50,12 +80,17 @@ class Joints(NamedTuple):
 class MoveitTask(Component):
     """A planning scene and a request; in a configuration both are paths of YAML files.
 
+    `packages` tells the folders of packages of meshes, by their names.
+
     Attributes:
         scene: A `moveit_msgs/PlanningScene`.
         request: A `moveit_msgs/MotionPlanRequest`.
         security_margin: Clearance between bodies that the task requires [m].
         position_tolerance: Of the tool at a goal of joints, for planners that end at poses [m].
         angle_tolerance: The same of its orientation [deg].
+        meshes: That the scene names by their files.
+        frame_names: The id of a fixed transform that names its frame; `header` where a scene has
+            other frames than one. Runs before November 2026 took the child's, and are refused.
     """
 
     component: ClassVar[str] = "moveit"
@@ -66,6 +101,8 @@ class MoveitTask(Component):
     security_margin: NonNegative
     position_tolerance: Positive
     angle_tolerance: Positive
+    meshes: tuple[SceneMesh, ...] = ()
+    frame_names: Literal["child", "header"] = "child"
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
@@ -75,63 +112,125 @@ class MoveitTask(Component):
             SettingError: If a file cannot be read, or is not what it should be.
         """
         settings = dict(settings)
-        for name in FILES:
+        packages = package_folders(settings.pop("packages", None), f"{field}.packages")
+        for name, message in FILES.items():
             path = settings.get(name)
-            if isinstance(path, str | None):
-                if path in (None, "???"):
-                    must = f"given: the path of MoveIt's planning {name} (YAML)"
-                    raise SettingError(f"{field}.{name}", must, None)
-                settings[name] = {SHA256: keep(_content(path, f"{field}.{name}"))}
+            if not isinstance(path, str | None):
+                continue
+            if path in (None, "???"):
+                must = f"given: the path of MoveIt's planning {name} (YAML)"
+                raise SettingError(f"{field}.{name}", must, None)
+            content = _content(path, f"{field}.{name}")
+            settings[name] = {SHA256: keep(content)}
+            _paths[settings[name][SHA256]] = path
+            document = _document(content, f"{field}.{name}: {path}", message)
+            if message == SCENE and has_other_frames(document):
+                settings["frame_names"] = "header"
+            if message == SCENE and (names := resources(document)):
+                place = Path(located(path))
+                settings["meshes"] = [
+                    {"name": mesh, "file": {SHA256: keep(content)}}
+                    for mesh in names
+                    for content in [mesh_content(mesh, place, packages, f"{field}.{name}")]
+                ]
         return settings
 
     @property
-    def world(self) -> World:
-        """The scene, read."""
-        return _world(self.scene.content)
+    def allowed(self) -> AllowedPairs:
+        """The scene's allowed-collision matrix."""
+        return _allowed(self._message("scene"))
 
     @property
     def plan_request(self) -> Request:
-        """The request, read."""
-        return _request(self.request.content, self.scene.content)
+        """The request, but for the places in it."""
+        return _request(self._message("request"))
 
     @property
     def state(self) -> dict[str, float]:
         """Joint names → positions at the start [rad, m]; the request's come before the scene's."""
-        return self.world.state | self.plan_request.start
+        scene = self._message("scene")
+        state = read_state(scene, scene.root.get("robot_state"), "robot_state")
+        return state | self.plan_request.start
+
+    def world(self, links: "LinkFrames | None", load: LoadMesh) -> World:
+        """Return the scene's objects.
+
+        Args:
+            links: Of the robot; None: they have no names.
+            load: Reads meshes that the scene names.
+
+        Raises:
+            SettingError: If the scene holds what evoexp does not know.
+        """
+        scene = self._message("scene")
+        if self.frame_names == "child" and has_other_frames(scene):
+            must = "header, as MoveIt names frames: give the scene again and run it again"
+            raise SettingError("scenario.frame_names", must, self.frame_names)
+        return _world(scene, links, self.meshes, load)
+
+    def notes(self, robot: Any) -> tuple[str, ...]:
+        """Name the parts of the messages that are left out and may matter.
+
+        Args:
+            robot: The robot of the condition.
+        """
+        name = getattr(robot, "robot_name", "")
+        scene, request = (self._message(name).root for name in FILES)
+        found = []
+        if scene.get("is_diff"):
+            found.append("the scene is a change of another (is_diff): it is taken as it is")
+        if name and (model := scene.get("robot_model_name") or name) != name:
+            found.append(f"the scene is of the robot '{model}', the robot is '{name}'")
+        scaled = ("max_velocity_scaling_factor", "max_acceleration_scaling_factor")
+        left = [name for name in scaled if request.get(name) not in (None, 0, 1)]
+        left += ["max_cartesian_speed"] if request.get("max_cartesian_speed") else []
+        if left:
+            found.append(f"left out of the request: {', '.join(left)} (export has its own limits)")
+        return tuple(found)
+
+    def _message(self, name: str) -> Document:
+        file: File = getattr(self, name)
+        path = _paths.get(file.sha256)
+        field = f"scenario.{name}" if path is None else f"scenario.{name}: {path}"
+        return _document(file.content, field, FILES[name])
 
     def disabled(
-        self, bodies: tuple[str, ...], given: frozenset[frozenset[str]]
+        self, links: dict[str, str], given: frozenset[frozenset[str]]
     ) -> frozenset[frozenset[str]]:
         """Return the pairs of a robot's bodies that are never judged.
 
         Args:
-            bodies: Their names: the links', numbered where a link has several.
+            links: Names of the bodies → their links.
             given: Pairs that the robot itself names; the scene's matrix has the last word.
         """
-        allowed = self.world.allowed
-        links = [_link(name, allowed.names) for name in bodies]
-        found = set(given)
-        for a, one in enumerate(bodies):
-            for b, two in enumerate(bodies[:a]):
-                known = allowed.may_touch(links[a], links[b])
-                pair = frozenset((one, two))
-                if known is not None and links[a] != links[b]:
-                    (found.add if known else found.discard)(pair)
+        allowed, found = self.allowed, set(given)
+        for a, one in enumerate(links):
+            for two in list(links)[:a]:
+                known = allowed.may_touch(links[one], links[two])
+                if known is not None and links[one] != links[two]:
+                    (found.add if known else found.discard)(frozenset((one, two)))
         return frozenset(found)
 
-    def touching(self, bodies: tuple[str, ...]) -> tuple[tuple[int, int], ...]:
-        """Return the pairs (body, obstacle) that may touch."""
-        world = self.world
-        links = [_link(name, world.allowed.names) for name in bodies]
+    def touching(self, links: dict[str, str], world: World) -> tuple[tuple[int, int], ...]:
+        """Return the pairs (body, obstacle) that may touch.
+
+        Args:
+            links: Names of the bodies → their links.
+            world: Of this task.
+        """
         return tuple(
             (k, n)
-            for k, link in enumerate(links)
+            for k, link in enumerate(links.values())
             for n, name in enumerate(world.objects)
-            if world.allowed.may_touch(link, name)
+            if self.allowed.may_touch(link, name)
         )
 
-    def arm_motion(self, joints: Joints) -> ArmMotion:
+    def arm_motion(self, joints: Joints, world: World) -> ArmMotion:
         """Return the task as a motion from a configuration to another.
+
+        Args:
+            joints: Of the robot.
+            world: Of this task.
 
         Raises:
             SettingError: If the goal is a pose, or is silent about a joint.
@@ -139,8 +238,8 @@ class MoveitTask(Component):
         q_goal = self.goal_configuration(joints)
         if q_goal is None:
             must = "a goal of joints for this planner (posture_es plans to poses)"
-            link = self.plan_request.link_goal
-            raise SettingError("scenario.request", must, f"a pose of '{link and link.link}'")
+            raise SettingError("scenario.request", must, f"a pose of '{self.plan_request.link}'")
+        check_start(self._message("request"), world.frames)
         ends = [joints.typed(q) for q in (state_of(joints.names, self.state), q_goal)]
         start, end = (
             tuple(tuple(float(value) for value in q[a:b]) for a, b in joints.slices) for q in ends
@@ -150,7 +249,7 @@ class MoveitTask(Component):
             q_goal=end,
             security_margin=self.security_margin,
             length_unit=self.length_unit,
-            obstacles=self.world.obstacles,
+            obstacles=world.obstacles,
         )
 
     def goal_configuration(self, joints: Joints) -> FloatArray | None:
@@ -168,21 +267,24 @@ class MoveitTask(Component):
                 raise SettingError("scenario.request", must, name, hint)
         return state_of(joints.names, goal, self.state) if goal else None
 
-    def posture_task(self, joints: Joints, tool_at_goal: Pose | None) -> "PostureTask":
+    def posture_task(
+        self, joints: Joints, world: World, tool_at_goal: Pose | None
+    ) -> "PostureTask":
         """Return the task as one of reaching a pose.
 
         Args:
             joints: Of the robot.
+            world: Of this task.
             tool_at_goal: The tool's pose in the goal's configuration; None: the goal is a pose.
         """
         from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
 
+        request = self._message("request")
+        check_start(request, world.frames)
         if tool_at_goal is not None:
             link = LinkGoal("", tool_at_goal, self.position_tolerance, self.angle_tolerance)
         else:
-            given = self.plan_request.link_goal
-            assert given is not None
-            link = given
+            link = read_link_goal(request, world.frames)
         start = joints.typed(state_of(joints.names, self.state))
         x, y, z = (float(value) for value in link.pose.position)
         goal: PoseGoal | PointGoal = PointGoal(kind="point", point=(x, y, z))
@@ -200,18 +302,28 @@ class MoveitTask(Component):
             security_margin=self.security_margin,
             length_unit=self.length_unit,
             check_reach=True,
-            obstacles=self.world.obstacles,
+            obstacles=world.obstacles,
         )
 
 
 @functools.lru_cache(maxsize=64)
-def _world(content: bytes) -> World:
-    return read_world(content)
+def _document(content: bytes, field: str, message: str) -> Document:
+    return Document(content, field, message)
+
+
+_allowed = functools.lru_cache(maxsize=64)(read_allowed)
+_request = functools.lru_cache(maxsize=64)(read_request)
 
 
 @functools.lru_cache(maxsize=64)
-def _request(content: bytes, scene: bytes) -> Request:
-    return read_request(content, _world(scene).frames)
+def _world(
+    scene: Document, links: "LinkFrames | None", meshes: tuple[SceneMesh, ...], load: LoadMesh
+) -> World:
+    loaded = {}
+    for mesh in meshes:
+        field = f"{scene.field}: the mesh '{mesh.name}'"
+        loaded[mesh.name] = load(mesh.file.content, Path(mesh.name).suffix, field)
+    return read_world(scene, links, loaded)
 
 
 def _content(path: str, field: str) -> bytes:
@@ -220,8 +332,3 @@ def _content(path: str, field: str) -> bytes:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(field, f"a file that can be read ({reason})", path) from None
-
-
-def _link(body: str, named: set[str]) -> str:
-    """Return the link of a body: its name, without a number that tells bodies of a link apart."""
-    return body if body in named else re.sub(r"_\d+$", "", body)

@@ -1,33 +1,17 @@
-"""Planning scenes and motion plan requests as MoveIt writes them in YAML.
+"""Messages of MoveIt in files, as plain data that is asked by name, and poses in them."""
 
-They are read as plain data, within limits. What evoexp does not know (attached objects, padding,
-constraints on the path) is refused by its name; settings of MoveIt's own planners are left out.
-"""
-
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.input_files import MEGABYTE
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.records import FloatArray
+from evoexp.scenarios.moveit_messages import check_message
 
-MAX_SCENE = 4 * MEGABYTE  # the largest of the data set MotionBenchMaker has 12 kB
-MOST_NESTED, MOST_VALUES = 30, 200_000
 LARGEST = 1e7  # [m, rad] as of the numbers of robots and scenarios
+SLACK = 0.01  # [-] by which a quaternion's length may differ from 1: the numbers are rounded
 KINDS = ("", "box", "sphere", "cylinder", "cone", "prism")  # numbered as in SolidPrimitive.msg
-# what a scene or a request may hold that evoexp does not know, by where it stands
-UNKNOWN_OF_SCENE = {
-    "robot_state.attached_collision_objects": "attached objects",
-    "world.octomap.octomap.data": "octomaps",
-}
-UNKNOWN_OF_REQUEST = {
-    "start_state.attached_collision_objects": "attached objects",
-    "path_constraints": "path constraints",
-    "trajectory_constraints": "trajectory constraints",
-}
 
 
 class Pose(NamedTuple):
@@ -50,6 +34,17 @@ class Pose(NamedTuple):
         return np.asarray(_product(self.rotation, point[:, None])[:, 0] + self.position)
 
     @property
+    def inverse(self) -> "Pose":
+        """The pose of the frame in which this one is given, in this one's frame."""
+        turned = self.rotation.T
+        return Pose(turned, -_product(turned, self.position[:, None])[:, 0])
+
+    def is_near(self, other: "Pose", tolerance: float) -> bool:
+        """Whether all numbers of two poses agree within a tolerance [m, -]."""
+        pairs = zip(self, other, strict=True)
+        return all(np.allclose(a, b, rtol=0.0, atol=tolerance) for a, b in pairs)
+
+    @property
     def angles(self) -> tuple[float, float, float]:
         """Roll, pitch, yaw [deg]: rotation = Rz(yaw) Ry(pitch) Rx(roll)."""
         r = self.rotation
@@ -61,63 +56,42 @@ class Pose(NamedTuple):
             roll, yaw = 0.0, atan2(-r[0, 1], r[1, 1])
         return roll / DEGREE, pitch / DEGREE, yaw / DEGREE
 
+    @property
+    def text(self) -> str:
+        """The pose as a message shows it."""
+        rows = self.position, self.angles
+        place, angles = (", ".join(f"{x + 0.0:g}" for x in row) for row in rows)
+        return f"at ({place}) m, turned by ({angles})°"
+
 
 IDENTITY = Pose(np.eye(3), np.zeros(3))
 
 
-class Document:
-    """A file's data, asked by name; errors name the place."""
+def primitive_kind(value: Any) -> str:
+    """Return the kind of a primitive, which is a number or, by robowflex, a name."""
+    is_number = type(value) is int and 0 < value < len(KINDS)
+    return KINDS[value] if is_number else str(value).lower()
 
-    def __init__(self, content: bytes, field: str) -> None:
-        """Read YAML within limits.
+
+class Document:
+    """The message of a file, asked by name; errors name the place."""
+
+    def __init__(self, content: bytes, field: str, message: str) -> None:
+        """Read a message within limits.
 
         Args:
             content: Of the file.
             field: The setting that names it, for errors.
+            message: Its type, of `moveit_messages.FIELDS`.
 
         Raises:
-            SettingError: If it is no mapping, too large or too deep, or refers to parts of itself.
+            SettingError: If it is no such message, or holds what evoexp does not know.
         """
-        import yaml  # most tasks come out of no such file
+        from evoexp.scenarios.moveit_yaml import read_message  # most tasks come out of no such file
 
         self.field = field
-        if len(content) > MAX_SCENE:
-            must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
-            raise SettingError(field, must, f"{len(content) / MEGABYTE:.1f} MB")
-        try:
-            self._check(content)
-            self.root = yaml.load(content, yaml.CSafeLoader)
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            line = str(error).strip().replace("\n", " ")[:120]
-            raise SettingError(field, "YAML as MoveIt writes it", line) from None
-        if not isinstance(self.root, dict):
-            raise SettingError(field, "YAML as MoveIt writes it", type(self.root).__name__)
-
-    def _check(self, content: bytes) -> None:
-        import yaml
-
-        depth = 0
-        for count, event in enumerate(yaml.parse(content, yaml.CSafeLoader)):
-            depth += isinstance(event, yaml.CollectionStartEvent)
-            depth -= isinstance(event, yaml.CollectionEndEvent)
-            if isinstance(event, yaml.AliasEvent):
-                raise SettingError(self.field, "YAML without aliases", f"*{event.anchor}")
-            if depth > MOST_NESTED or count > MOST_VALUES:
-                must = f"YAML of at most {MOST_VALUES:,} values, nested {MOST_NESTED} deep"
-                raise SettingError(self.field, must, "more")
-
-    def refuse(self, unknown: Mapping[str, str]) -> None:
-        """Refuse parts that evoexp does not know, wherever they hold something.
-
-        Args:
-            unknown: Path of a part → its name.
-        """
-        for path, name in unknown.items():
-            value: Any = self.root
-            for key in path.split("."):
-                value = value.get(key) if isinstance(value, dict) else None
-            if _holds(value):
-                raise SettingError(self.field, f"free of {name}, which evoexp does not know", path)
+        self.root = read_message(content, field)
+        check_message(self.root, message, field)
 
     def mapping(self, value: Any, where: str) -> dict[str, Any]:
         """Return a mapping; an absent one is empty."""
@@ -181,8 +155,9 @@ class Document:
         size = x * x + y * y + z * z + w * w
         if size == 0.0:  # ROS leaves an orientation that nobody set at 0
             return np.eye(3)
-        if abs(size - 1.0) > 1e-2:
-            raise SettingError(self.field, f"quaternions of length 1 at {where}", size)
+        length = float(np.sqrt(size))
+        if abs(length - 1.0) > SLACK:
+            raise SettingError(self.field, f"quaternions of length 1 at {where}", round(length, 6))
         s = 2.0 / size
         return np.array(
             [
@@ -198,13 +173,6 @@ class Document:
         if not isinstance(value, kind):
             raise SettingError(self.field, f"{name} at {where}", str(value)[:40])
         return value
-
-
-def _holds(value: Any) -> bool:
-    """Whether a part says anything: an empty message has only empty parts."""
-    if isinstance(value, dict):
-        return any(_holds(part) for key, part in value.items() if key != "header")
-    return bool(value)
 
 
 def _product(one: FloatArray, two: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """Meshes and cones of a planning scene, as convex hulls that contain them."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,34 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.scenarios.moveit_files import Document, Pose
 from evoexp.scenarios.obstacles import HullObstacle
 
+Mesh = tuple[FloatArray, IntArray]
+"""Corners (corners, 3) [m] and triangles (triangles, 3) of corners' numbers."""
+
 AROUND = 32  # corners of a cone's base; they stand out of it by half a hundredth of its radius
 
 
+def resources(scene: Document) -> list[str]:
+    """List the files that the meshes of a scene name, as robowflex writes them."""
+    world = scene.mapping(scene.root.get("world"), "world")
+    objects = scene.items(world.get("collision_objects"), "world.collision_objects")
+    meshes = [mesh for thing in objects if isinstance(thing, dict) for mesh in _meshes(thing)]
+    return list(dict.fromkeys(str(mesh["resource"]) for mesh in meshes if mesh.get("resource")))
+
+
 def mesh_hulls(
-    scene: Document, given: dict[str, Any], pose: Pose, where: str, name: str
+    scene: Document,
+    given: dict[str, Any],
+    meshes: Mapping[str, Mesh],
+    pose: Pose,
+    where: str,
+    name: str,
 ) -> list[HullObstacle]:
     """Return the convex hulls of the parts of a mesh (`shape_msgs/Mesh`) that hang together.
 
     Args:
         scene: The file.
         given: The mesh.
+        meshes: Of the files that meshes of the scene name.
         pose: Where it stands.
         where: Its place in the file, for errors.
         name: Of the object; the hulls are numbered if they are several.
@@ -29,16 +47,44 @@ def mesh_hulls(
     Raises:
         SettingError: If it is no mesh, or a part of it has no inside.
     """
-    if "resource" in given:
-        must = f"vertices and triangles of '{name}'"
-        raise SettingError(scene.field, must, f"the file {given['resource']}")
+    if resource := given.get("resource"):
+        if given.get("vertices") or given.get("triangles"):
+            raise SettingError(scene.field, f"a resource or triangles at {where}, not both", name)
+        corners, triangles = meshes[str(resource)]
+        scale = given.get("dimensions")
+        if scale is not None:
+            corners = corners * scene.numbers(scale, f"{where}.dimensions", 3)
+    else:
+        corners, triangles = _own_triangles(scene, given, where, name)
+    found = []
+    parts = _parts(corners, triangles)
+    for k, part in enumerate(parts):
+        hull = hull_of(part)
+        if hull is None:
+            must = f"meshes with an inside ('{name}')"
+            raise SettingError(scene.field, must, f"a part of {len(part)} vertices in one plane")
+        found.append(_hull(hull[0], pose, f"{name}_{k + 1}" if len(parts) > 1 else name))
+    return found
+
+
+def _meshes(thing: dict[str, Any]) -> list[dict[str, Any]]:
+    meshes = thing.get("meshes")
+    return [mesh for mesh in meshes if isinstance(mesh, dict)] if isinstance(meshes, list) else []
+
+
+def _own_triangles(scene: Document, given: dict[str, Any], where: str, name: str) -> Mesh:
+    """Read the corners and triangles that a message holds."""
+    if given.get("dimensions"):
+        must = f"a mesh whose dimensions scale a resource at {where}"
+        raise SettingError(scene.field, must, name)
     corners = np.array(
-        [scene.point(each, where) for each in scene.items(given.get("vertices"), where)]
+        [scene.point(item, where) for item in scene.items(given.get("vertices"), where)]
     )
-    faces = [
-        scene.numbers(scene.mapping(each, where).get("vertex_indices"), where, 3)
-        for each in scene.items(given.get("triangles"), where)
-    ]
+    faces = []
+    for item in scene.items(given.get("triangles"), where):
+        # robowflex writes the list alone
+        face = item if isinstance(item, list) else scene.mapping(item, where).get("vertex_indices")
+        faces.append(scene.numbers(face, where, 3))
     triangles = np.array(faces).reshape(-1, 3)
     whole = np.all(triangles == np.floor(triangles)) and np.all(triangles >= 0.0)
     if not whole or not len(triangles) or triangles.max() >= len(corners):
@@ -51,15 +97,7 @@ def mesh_hulls(
         ]
         told = ", ".join(f"{value:g}" for value in wrong[0]) if wrong else "none"
         raise SettingError(scene.field, must, told)
-    found = []
-    parts = _parts(corners, triangles.astype(np.int64))
-    for k, part in enumerate(parts):
-        hull = hull_of(part)
-        if hull is None:
-            must = f"meshes with an inside ('{name}')"
-            raise SettingError(scene.field, must, f"a part of {len(part)} vertices in one plane")
-        found.append(_hull(hull[0], pose, f"{name}_{k + 1}" if len(parts) > 1 else name))
-    return found
+    return corners, triangles.astype(np.int64)
 
 
 def cone_hull(height: float, radius: float, pose: Pose, name: str) -> HullObstacle:

@@ -6,8 +6,9 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.scenarios.moveit_files import UNKNOWN_OF_REQUEST, Document, Pose
-from evoexp.scenarios.moveit_scene import frame_pose, read_state
+from evoexp.scenarios.moveit_files import Document, Pose, primitive_kind
+from evoexp.scenarios.moveit_frames import Frames
+from evoexp.scenarios.moveit_scene import check_robot_place, read_state
 
 HALF_TURN = 180.0  # [deg] an orientation within which is any orientation
 
@@ -35,37 +36,25 @@ class Request(NamedTuple):
         group: The planning group; empty: not given.
         start: Joint names → positions [rad, m].
         joint_goal: Joint names → positions [rad, m]; empty: the goal is a link's.
-        link_goal: The link's goal; None: the goal is one of joints.
+        link: The link whose pose is the goal; empty: the goal is one of joints.
     """
 
     group: str
     start: dict[str, float]
     joint_goal: dict[str, float]
-    link_goal: LinkGoal | None
+    link: str
 
 
-def read_request(content: bytes, frames: dict[str, Pose]) -> Request:
+def read_request(request: Document) -> Request:
     """Read a motion plan request.
 
-    Args:
-        content: Of the file.
-        frames: Of the scene: frames that do not move → their poses.
-
     Raises:
-        SettingError: If it is none, or holds what evoexp does not know.
+        SettingError: If it holds what evoexp does not know.
     """
-    request = Document(content, "scenario.request")
-    request.refuse(UNKNOWN_OF_REQUEST)
-    goals = request.items(request.root.get("goal_constraints"), "goal_constraints")
-    if len(goals) != 1:
-        raise SettingError(request.field, "a request with one goal (goal_constraints)", len(goals))
-    goal = request.mapping(goals[0], "goal_constraints[0]")
-    if request.items(goal.get("visibility_constraints"), "goal_constraints[0]"):
-        must = "free of visibility constraints, which evoexp does not know"
-        raise SettingError(request.field, must, "goal_constraints[0].visibility_constraints")
     joints: dict[str, float] = {}
-    for each in request.items(goal.get("joint_constraints"), "joint_constraints"):
-        given = request.mapping(each, "joint_constraints")
+    goal = _goal(request)
+    for item in request.items(goal.get("joint_constraints"), "joint_constraints"):
+        given = request.mapping(item, "joint_constraints")
         name = str(given.get("joint_name", ""))
         if name in joints:
             raise SettingError(request.field, "one goal per joint", name)
@@ -77,16 +66,37 @@ def read_request(content: bytes, frames: dict[str, Pose]) -> Request:
     if not joints and len(places) != 1:
         must = "a goal of joints, or of one position"
         raise SettingError(request.field, must, f"{len(places)} positions")
+    link = ""
+    if places:
+        place = request.mapping(places[0], "position_constraints[0]")
+        link = str(place.get("link_name") or "")
+        if not link:
+            raise SettingError(request.field, "a goal of a link (link_name)", link)
     start = read_state(request, request.root.get("start_state"), "start_state")
-    link = None if joints else _link_goal(request, places[0], turns, frames)
     return Request(str(request.root.get("group_name") or ""), start, joints, link)
 
 
-def _link_goal(
-    request: Document, place: Any, turns: list[Any], frames: dict[str, Pose]
-) -> LinkGoal:
-    """Read a position constraint, and an orientation constraint of the same link."""
-    given = request.mapping(place, "position_constraints[0]")
+def _goal(request: Document) -> dict[str, Any]:
+    """Return the only goal."""
+    goals = request.items(request.root.get("goal_constraints"), "goal_constraints")
+    if len(goals) != 1:
+        raise SettingError(request.field, "a request with one goal (goal_constraints)", len(goals))
+    return request.mapping(goals[0], "goal_constraints[0]")
+
+
+def read_link_goal(request: Document, frames: Frames) -> LinkGoal:
+    """Read the goal of a link: a position constraint, and perhaps an orientation constraint.
+
+    Args:
+        request: Whose goal is a link's.
+        frames: In which places are given.
+
+    Raises:
+        SettingError: If it holds what evoexp does not know.
+    """
+    goal = _goal(request)
+    turns = request.items(goal.get("orientation_constraints"), "orientation_constraints")
+    given = request.mapping(goal["position_constraints"][0], "position_constraints[0]")
     link = str(given.get("link_name", ""))
     region = request.mapping(given.get("constraint_region"), f"constraint_region of '{link}'")
     bodies = request.items(region.get("primitives"), f"constraint_region of '{link}'")
@@ -96,13 +106,13 @@ def _link_goal(
         raise SettingError(request.field, must, len(bodies))
     body = request.mapping(bodies[0], f"constraint_region of '{link}'")
     sizes = request.numbers(body.get("dimensions"), f"constraint_region of '{link}'")
-    kind = {1: "box", 2: "sphere"}.get(body.get("type", 0), str(body.get("type")).lower())
+    kind = primitive_kind(body.get("type"))
     if (kind, len(sizes)) not in (("box", 3), ("sphere", 1)) or not sizes.min() > 0.0:
         must = f"a sphere or box around the goal of '{link}'"
         raise SettingError(request.field, must, f"{kind} {[float(size) for size in sizes]}")
     # the greatest ball in the box: a goal that is met by it is met by the box
     distance = float(sizes.min()) * (0.5 if kind == "box" else 1.0)
-    frame = frame_pose(request, given.get("header"), frames)
+    frame = frames.of_header(request, given.get("header"), f"the goal of '{link}'")
     pose = frame.times(request.pose(poses[0], f"the goal of '{link}'"))
     offset = request.pose({"position": given.get("target_point_offset")}, f"'{link}'").position
     angle = None
@@ -117,14 +127,14 @@ def _link_goal(
 
 
 def _orientation(
-    request: Document, turn: Any, link: str, pose: Pose, frames: dict[str, Pose]
+    request: Document, turn: Any, link: str, pose: Pose, frames: Frames
 ) -> tuple[float | None, Pose]:
     """Return the tolerance [deg] of an orientation, and the pose with it."""
     given = request.mapping(turn, "orientation_constraints[0]")
     if str(given.get("link_name", "")) != link:
         must = f"an orientation of '{link}', whose position is the goal"
         raise SettingError(request.field, must, str(given.get("link_name")))
-    frame = frame_pose(request, given.get("header"), frames)
+    frame = frames.of_header(request, given.get("header"), f"the orientation of '{link}'")
     turned = frame.times(request.pose({"orientation": given.get("orientation")}, f"'{link}'"))
     names = [f"absolute_{axis}_axis_tolerance" for axis in "xyz"]
     least = min(request.number(given.get(name, 0.0), f"{name} of '{link}'") for name in names)
@@ -133,6 +143,15 @@ def _orientation(
     angle = float(least / DEGREE)
     pose = Pose(turned.rotation, pose.position)
     return (angle, pose) if angle < HALF_TURN else (None, pose)
+
+
+def check_start(request: Document, frames: Frames) -> None:
+    """Refuse a start at which the robot stands elsewhere than its root.
+
+    Raises:
+        SettingError: If it does.
+    """
+    check_robot_place(request, request.root.get("start_state"), "start_state", frames)
 
 
 def state_of(names: tuple[str, ...], *states: dict[str, float]) -> np.ndarray:

@@ -1,18 +1,14 @@
-"""The world of a MoveIt planning scene: objects, frames, and which pairs may touch."""
+"""The world of a MoveIt planning scene: objects, and which pairs may touch."""
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from evoexp.errors import SettingError, nearest
-from evoexp.scenarios.moveit_files import (
-    IDENTITY,
-    KINDS,
-    UNKNOWN_OF_SCENE,
-    Document,
-    Pose,
-)
-from evoexp.scenarios.moveit_meshes import cone_hull, mesh_hulls
+from evoexp.scenarios.moveit_files import IDENTITY, Document, Pose, primitive_kind
+from evoexp.scenarios.moveit_frames import Frames, read_frames
+from evoexp.scenarios.moveit_meshes import Mesh, cone_hull, mesh_hulls
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CylinderObstacle,
@@ -20,6 +16,9 @@ from evoexp.scenarios.obstacles import (
     Obstacle,
     SphereObstacle,
 )
+
+if TYPE_CHECKING:
+    from evoexp.robots.assembly import LinkFrames
 
 MOST_OBJECTS = 2000  # bodies: every one is tested against every body of the robot
 SINGULAR = {"primitives": "primitive", "planes": "plane", "meshes": "mesh"}
@@ -29,8 +28,12 @@ SIZES = {
     "cylinder": 2,
     "cone": 2,
 }  # numbers of a primitive that evoexp knows
-ADDED = (0, None, "add", "ADD", b"\0", "\0")  # CollisionObject.operation
-KEPT_FRAMES = ("", "world", "/world")
+# CollisionObject.operation, a byte: as ROS 1 writes it, ROS 2, and robowflex
+OPERATIONS = {
+    form: name
+    for k, name in enumerate(("ADD", "REMOVE", "APPEND", "MOVE"))
+    for form in (str(k), chr(k), str(bytes([k])), name.lower())
+}
 
 
 class AllowedPairs(NamedTuple):
@@ -62,105 +65,107 @@ class World(NamedTuple):
     """The objects that stand around the robot.
 
     Attributes:
-        obstacles: Its bodies, in the robot's root frame [m].
+        obstacles: Its bodies, in the world [m].
         objects: (obstacles) the object that each belongs to.
-        allowed: Which pairs may touch.
-        state: Joint names → positions of the scene's robot [rad, m].
-        frames: Frames that do not move → their poses in the root frame.
-        robot: Name of the robot's model; empty: not given.
+        frames: In which places are given.
     """
 
     obstacles: tuple[Obstacle, ...]
     objects: tuple[str, ...]
-    allowed: AllowedPairs
-    state: dict[str, float]
-    frames: dict[str, Pose]
-    robot: str
+    frames: Frames
 
 
-def read_world(content: bytes) -> World:
-    """Read a planning scene.
+def read_world(scene: Document, links: "LinkFrames | None", meshes: Mapping[str, Mesh]) -> World:
+    """Read the objects of a planning scene.
+
+    Args:
+        scene: The planning scene.
+        links: Of the robot; None: they have no names.
+        meshes: Corners and triangles of meshes that the scene names, by these names.
 
     Raises:
-        SettingError: If it is none, or holds what evoexp does not know.
+        SettingError: If it holds what evoexp does not know.
     """
-    scene = Document(content, "scenario.scene")
-    scene.refuse(UNKNOWN_OF_SCENE)
     for name, neutral in (("link_padding", 0.0), ("link_scale", 1.0)):
-        for each in scene.items(scene.root.get(name), name):
-            given = scene.mapping(each, name)
+        for item in scene.items(scene.root.get(name), name):
+            given = scene.mapping(item, name)
             size = given.get("padding", given.get("scale"))
             if size is not None and scene.number(size, name) != neutral:
                 must = f"free of {name}, which evoexp does not know"
                 raise SettingError(scene.field, must, str(given.get("link_name")))
-    frames = {}
-    for each in scene.items(scene.root.get("fixed_frame_transforms"), "fixed_frame_transforms"):
-        given = scene.mapping(each, "fixed_frame_transforms")
-        name = str(given.get("child_frame_id", ""))
-        frames[name] = scene.pose(given.get("transform"), f"the frame '{name}'")
-    world = scene.mapping(scene.root.get("world"), "world")
+    frames = read_frames(scene, links)
+    check_robot_place(scene, scene.root.get("robot_state"), "robot_state", frames)
     obstacles: list[Obstacle] = []
     owners: list[str] = []
-    for each in scene.items(world.get("collision_objects"), "world.collision_objects"):
-        given = scene.mapping(each, "world.collision_objects")
+    world = scene.mapping(scene.root.get("world"), "world")
+    for item in scene.items(world.get("collision_objects"), "world.collision_objects"):
+        given = scene.mapping(item, "world.collision_objects")
         name = str(given.get("id", "")) or f"object_{len(set(owners)) + 1}"
         if name in owners:
             raise SettingError(scene.field, "objects whose ids differ", name)
-        own = _bodies(scene, given, name, frames)
-        obstacles += own
-        owners += [name] * len(own)
+        bodies = _bodies(scene, given, name, frames, meshes)
+        obstacles += bodies
+        owners += [name] * len(bodies)
     if len(obstacles) > MOST_OBJECTS:
         must = f"a scene of at most {MOST_OBJECTS} bodies"
         raise SettingError(scene.field, must, len(obstacles))
-    state = read_state(scene, scene.root.get("robot_state"), "robot_state")
-    robot = str(scene.root.get("robot_model_name") or "")
-    return World(tuple(obstacles), tuple(owners), _allowed(scene), state, frames, robot)
+    return World(tuple(obstacles), tuple(owners), frames)
 
 
 def read_state(document: Document, value: Any, where: str) -> dict[str, float]:
     """Read a robot state: joint names → positions.
 
     Raises:
-        SettingError: If names and positions do not match, or the robot stands elsewhere than its
-            root.
+        SettingError: If names and positions do not match, or a joint has two positions.
     """
     state = document.mapping(value, where)
     joints = document.mapping(state.get("joint_state"), f"{where}.joint_state")
     names = document.names(joints.get("name"), f"{where}.joint_state.name")
     values = document.numbers(joints.get("position"), f"{where}.joint_state.position", len(names))
-    several = document.mapping(state.get("multi_dof_joint_state"), where)
-    for transform in document.items(several.get("transforms"), where):
-        pose = document.pose(transform, f"{where}.multi_dof_joint_state")
-        if not np.allclose(pose.rotation, np.eye(3), atol=1e-9) or pose.position.any():
-            must = "a robot at the origin (robot.base_position moves it elsewhere)"
-            at = ", ".join(f"{x:g}" for x in pose.position)
-            raise SettingError(document.field, must, f"one at ({at}) by {where}")
-    return dict(zip(names, map(float, values), strict=True))
+    positions: dict[str, float] = {}
+    for name, position in zip(names, map(float, values), strict=True):
+        if positions.setdefault(name, position) != position:
+            must = f"one position of '{name}' at {where}.joint_state"
+            raise SettingError(document.field, must, [positions[name], position])
+    return positions
 
 
-def frame_pose(document: Document, header: Any, frames: dict[str, Pose]) -> Pose:
-    """Return the pose of the frame that a header names.
+def check_robot_place(document: Document, value: Any, where: str, frames: Frames) -> None:
+    """Refuse a state in which joints of several coordinates move the robot.
 
     Raises:
-        SettingError: If the frame is neither the world, a fixed frame, nor left out.
+        SettingError: If the robot stands elsewhere than its root.
     """
-    given = document.mapping(header, "header").get("frame_id") or ""
-    name = str(given)
-    if name in frames or name in KEPT_FRAMES:
-        return frames.get(name, IDENTITY)
-    names = ["world", *frames]
-    must = f"frames that do not move ({', '.join(dict.fromkeys(names))})"
-    raise SettingError(document.field, must, name, nearest(name, names))
+    state = document.mapping(value, where)
+    where = f"{where}.multi_dof_joint_state"
+    joints = document.mapping(state.get("multi_dof_joint_state"), where)
+    names = document.names(joints.get("joint_names"), where)
+    transforms = document.items(joints.get("transforms"), where)
+    if names and len(transforms) != len(names):
+        raise SettingError(document.field, f"a transform per joint of {where}", len(transforms))
+    planning = frames.poses[frames.planning]
+    for transform in transforms:
+        # MoveIt takes the transform to lead from the frame of the header
+        frame = frames.of_header(document, joints.get("header"), where)
+        pose = document.pose(transform, where).times(planning.inverse.times(frame).inverse)
+        if not pose.is_near(IDENTITY, 1e-9):
+            must = "a robot at the origin (robot.base_position moves it elsewhere)"
+            raise SettingError(document.field, must, f"one {pose.text} by {where}")
 
 
 def _bodies(
-    scene: Document, given: dict[str, Any], name: str, frames: dict[str, Pose]
+    scene: Document,
+    given: dict[str, Any],
+    name: str,
+    frames: Frames,
+    meshes: Mapping[str, Mesh],
 ) -> list[Obstacle]:
     """Return the bodies of a collision object."""
-    if given.get("operation", 0) not in ADDED:
-        must = f"objects to be added ('{name}'.operation: 0)"
-        raise SettingError(scene.field, must, str(given["operation"]))
-    own = frame_pose(scene, given.get("header"), frames)
+    operation = OPERATIONS.get(str(given.get("operation", 0)).lower(), given.get("operation"))
+    if operation not in (None, "ADD"):
+        must = f"a scene whose objects are there, '{name}'.operation ADD (0)"
+        raise SettingError(scene.field, must, operation)
+    own = frames.of_header(scene, given.get("header"), f"'{name}'")
     own = own.times(scene.pose(given.get("pose"), f"'{name}'"))
     found: list[Obstacle] = []
     for kind, singular in SINGULAR.items():
@@ -176,7 +181,7 @@ def _bodies(
             where = f"'{name}'.{kind}[{k}]"
             data = scene.mapping(body, where)
             if kind == "meshes":
-                found += mesh_hulls(scene, data, placed, where, label)
+                found += mesh_hulls(scene, data, meshes, placed, where, label)
             else:
                 make = _primitive if kind == "primitives" else _plane
                 found.append(make(scene, data, placed, label))
@@ -187,10 +192,7 @@ def _bodies(
 
 def _primitive(scene: Document, given: dict[str, Any], pose: Pose, name: str) -> Obstacle:
     """Return a box [x, y, z], a sphere [radius], a cylinder or cone [height, radius]."""
-    kind = given.get("type")
-    if isinstance(kind, int) and 0 < kind < len(KINDS):
-        kind = KINDS[kind]
-    kind = str(kind).lower()
+    kind = primitive_kind(given.get("type"))
     if kind not in SIZES:
         must = f"primitives that are {', '.join(SIZES)}"
         raise SettingError(scene.field, must, f"'{name}', a {kind}", nearest(kind, SIZES))
@@ -231,8 +233,12 @@ def _plane(scene: Document, given: dict[str, Any], pose: Pose, name: str) -> Obs
     )
 
 
-def _allowed(scene: Document) -> AllowedPairs:
-    """Read the allowed-collision matrix."""
+def read_allowed(scene: Document) -> AllowedPairs:
+    """Read the allowed-collision matrix.
+
+    Raises:
+        SettingError: If it is no square of truth values, or says two things of a pair.
+    """
     where = "allowed_collision_matrix"
     matrix = scene.mapping(scene.root.get(where), where)
     names = scene.names(matrix.get("entry_names"), f"{where}.entry_names")
@@ -246,7 +252,10 @@ def _allowed(scene: Document) -> AllowedPairs:
         if len(values) != len(names) or not all(isinstance(value, bool) for value in values):
             must = f"{len(names)} truth values in every row of {where}"
             raise SettingError(scene.field, must, f"the row of '{one}'")
-        entries |= {frozenset((one, two)): v for two, v in zip(names, values, strict=True)}
+        for two, value in zip(names, values, strict=True):
+            if one != two and entries.setdefault(frozenset((one, two)), value) != value:
+                must = f"a symmetric {where}"
+                raise SettingError(scene.field, must, f"two values of '{one}' and '{two}'")
     known = scene.names(matrix.get("default_entry_names"), f"{where}.default_entry_names")
     values = scene.items(matrix.get("default_entry_values"), f"{where}.default_entry_values")
     if len(known) != len(values) or not all(isinstance(value, bool) for value in values):

@@ -1,0 +1,137 @@
+"""The frames in which a planning scene and a request give places.
+
+MoveIt names a frame of its own in `header.frame_id` of a fixed transform and the planning frame in
+`child_frame_id`; the transform takes coordinates in the named frame to the planning frame
+(`Transforms::setTransform` and `copyTransforms` in moveit_core's `transforms.cpp`). A frame that is
+a link comes before a transform (`PlanningScene::getFrameTransform`).
+"""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from evoexp.errors import SettingError, nearest
+from evoexp.scenarios.moveit_files import IDENTITY, Document, Pose
+
+if TYPE_CHECKING:
+    from evoexp.robots.assembly import LinkFrames
+
+WORLD = "world"  # the planning frame where nothing else names it
+SAME = 1e-6  # [m, -] by which two descriptions of one frame may differ: they are rounded
+
+
+class Frames(NamedTuple):
+    """Frames by their names, without a slash before them.
+
+    Attributes:
+        planning: The planning frame.
+        poses: Frames that stand still → their poses in the world.
+        moving: Links that move.
+    """
+
+    planning: str
+    poses: dict[str, Pose]
+    moving: frozenset[str]
+
+    def of_header(self, document: Document, header: Any, where: str) -> Pose:
+        """Return the pose of the frame that a header names; the planning frame's if it names none.
+
+        Raises:
+            SettingError: If the frame is not known, or moves.
+        """
+        name = frame_name(document.mapping(header, f"{where}.header").get("frame_id"))
+        must = f"given in a frame that stands still ({', '.join(self.poses)}) at {where}"
+        if name in self.moving:
+            raise SettingError(document.field, must, f"'{name}', a link that moves")
+        if (name := name or self.planning) not in self.poses:
+            raise SettingError(document.field, must, name, nearest(name, self.poses))
+        return self.poses[name]
+
+
+def frame_name(value: Any) -> str:
+    """Return the name of a frame; `/base` and `base` are one."""
+    return str(value or "").strip().lstrip("/")
+
+
+def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
+    """Read the fixed transforms of a scene beside the links of a robot.
+
+    Args:
+        scene: The planning scene.
+        links: Of the robot; None: they have no names.
+
+    Raises:
+        SettingError: If transforms do not lead to one planning frame, or contradict each other or
+            the robot.
+    """
+    standing = {} if links is None else dict(links.standing)
+    moving = frozenset[str]() if links is None else links.moving
+    ground = "" if links is None else links.ground
+    named, planning, is_certain = _fixed_transforms(scene)
+    known = dict.fromkeys(filter(None, (ground, links and links.root, WORLD)))
+    if planning in moving or (planning and not is_certain and planning not in known):
+        must = f"of transforms whose child_frame_id is the planning frame ({', '.join(known)})"
+        hint = "; header.frame_id names the frame that a transform places"
+        raise SettingError(scene.field, must, planning, hint)
+    poses = {name: _link_pose(pose) for name, pose in standing.items()}
+    origin = poses.get(planning or ground or WORLD, IDENTITY)
+    poses.setdefault(planning or ground or WORLD, origin)
+    if ground:
+        poses.setdefault(ground, IDENTITY)
+    for name, local in named.items():
+        if name in moving:
+            continue
+        pose = origin.times(local)
+        if not pose.is_near(poses.setdefault(name, pose), SAME):
+            must = f"a scene whose transform of '{name}' is that of the robot's link"
+            raise SettingError(
+                scene.field, must, pose.text, f"; the link stands {poses[name].text}"
+            )
+    return Frames(planning or ground or WORLD, poses, moving)
+
+
+def has_other_frames(scene: Document) -> bool:
+    """Whether a scene has fixed transforms of frames other than the planning frame.
+
+    Raises:
+        SettingError: If they contradict each other.
+    """
+    poses = _fixed_transforms(scene)[0].values()
+    return not all(pose.is_near(IDENTITY, SAME) for pose in poses)
+
+
+def _fixed_transforms(scene: Document) -> tuple[dict[str, Pose], str, bool]:
+    """Read the fixed transforms.
+
+    Returns:
+        Frames and their poses in the planning frame; its name, empty if none is given; and whether
+        it is surely the planning frame's, as MoveIt writes it: with a transform into itself.
+    """
+    named: dict[str, Pose] = {}
+    planning, is_certain = "", False
+    where = "fixed_frame_transforms"
+    for k, item in enumerate(scene.items(scene.root.get(where), where)):
+        given, place = scene.mapping(item, where), f"{where}[{k}]"
+        header = scene.mapping(given.get("header"), f"{place}.header")
+        name, target = frame_name(header.get("frame_id")), frame_name(given.get("child_frame_id"))
+        pose = scene.pose(given.get("transform"), place)
+        is_identity = pose.is_near(IDENTITY, SAME)
+        if not is_identity and (not name or name == target):
+            must = f"a frame other than '{target}' at {place}.header.frame_id, or no transform"
+            raise SettingError(scene.field, must, name)
+        if not target and name:
+            raise SettingError(scene.field, f"the planning frame at {place}.child_frame_id", "")
+        if planning and target and target != planning:
+            must = f"one planning frame for all of {where}, the child_frame_id '{planning}'"
+            raise SettingError(scene.field, must, f"'{name}' in '{target}'")
+        planning = target or planning
+        is_certain |= bool(target) and name in ("", target)
+        if name and not pose.is_near(named.setdefault(name, pose), SAME):
+            must = f"one transform of '{name}' in {where}"
+            raise SettingError(scene.field, must, f"{named[name].text} and {pose.text}")
+    return named, planning, is_certain
+
+
+def _link_pose(pose: tuple[float, ...]) -> Pose:
+    """Return the pose of 12 numbers: the rotation row by row, then the position."""
+    return Pose(np.array(pose[:9]).reshape(3, 3), np.array(pose[9:]))

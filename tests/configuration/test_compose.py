@@ -302,10 +302,10 @@ def test_a_condition_with_no_label_of_the_file_is_named_by_what_overrides_it(
 def test_two_labels_of_one_condition_are_one_row(write_experiment: Callable[..., None]) -> None:
     write_experiment("mine", '  "as printed": []\n  "{} elites": ["ga.num_elites=0,2"]')
     found = ids("experiment=mine")
-    assert list(found) == ["as printed = 2 elites", "0 elites"]
-    for label in ("as printed", "2 elites", "as printed = 2 elites"):
+    assert list(found) == ["as printed ≡ 2 elites", "0 elites"]
+    for label in ("as printed", "2 elites", "as printed ≡ 2 elites"):
         (picked,) = expand(["experiment=mine"], only=[label])
-        assert [each.label for each in picked.conditions] == ["as printed = 2 elites"]
+        assert [each.label for each in picked.conditions] == ["as printed ≡ 2 elites"]
     capped = ids("experiment=lavoie_stopping", "budget=smoke")
     assert len(set(capped.values())) == len(capped)
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from evoexp.condition import Condition
 from evoexp.configuration.assignment import known_instead
 from evoexp.configuration.interpolations import MARK
-from evoexp.configuration.labels import Crossed, Group, labels_of, refuse_equal_labels
+from evoexp.configuration.labels import Crossed, Group, labels_of, refuse_equal_labels, rejoined
 from evoexp.configuration.overrides import (
     NOT_IDENTITY,
     PLANNER_PARTS,
@@ -87,7 +87,9 @@ class Builder:
         """
         rows = list(self._crossed(overrides))
         refuse_equal_labels(rows)
-        named = [row for row in rows if row.is_named(only)] or rows
+        names = {name for row in rows for name in (row.label, row.entry) if name}
+        picked = rejoined(only, names)
+        named = [row for row in rows if row.is_named(picked)] or rows
         self._refuse_unused(overrides, named)
         members: dict[str, list[Crossed]] = {}
         for row in rows:
@@ -102,13 +104,13 @@ class Builder:
             for same, each in zip(members.values(), built, strict=True)
         ]
         labels = labels_of(groups, self._is_same)
-        known = {*labels, *(name for row in rows for name in (row.label, row.entry) if name)}
-        if unknown := [label for label in only if label not in known]:
+        picked = rejoined(only, known := {*labels, *names})
+        if unknown := [label for label in picked if label not in known]:
             raise UnknownOption("--only", unknown[0], known)
         return {
             label: each
             for label, group, each in zip(labels, groups, built, strict=True)
-            if not only or label in only or any(row.is_named(only) for row in group.members)
+            if not picked or label in picked or any(row.is_named(picked) for row in group.members)
         }
 
     def _built(self, choice: Choice) -> Built:

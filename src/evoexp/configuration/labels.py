@@ -6,7 +6,7 @@ condition. Such a condition has the label of the file's condition that it still 
 by its planner, or by the overriding setting.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from evoexp.configuration.overrides import (
@@ -20,7 +20,7 @@ from evoexp.configuration.overrides import (
 )
 from evoexp.errors import SettingError
 
-SAME = " = "  # between labels of one condition
+SAME = " ≡ "  # between labels of one condition
 PLANNER = ("planner", *AROUND)  # groups whose option is named by the planner that comes of it
 
 
@@ -78,6 +78,22 @@ def refuse_equal_labels(rows: Iterable[Crossed]) -> None:
         if row.label in labels:
             raise SettingError("conditions", "labels that differ", row.label)
         labels.add(row.label)
+
+
+def rejoined(parts: Sequence[str], labels: Container[str]) -> list[str]:
+    """Join the parts of labels that were split at commas which belong to them.
+
+    Args:
+        parts: Labels, or parts of them: the longest label wins.
+        labels: All that there are.
+    """
+    found, start = list[str](), 0
+    while start < len(parts):
+        ends = range(len(parts), start, -1)
+        end = next((k for k in ends if ", ".join(parts[start:k]) in labels), start + 1)
+        found.append(", ".join(parts[start:end]))
+        start = end
+    return found
 
 
 def labels_of(groups: Sequence[Group], holds: Holds) -> list[str]:

@@ -78,6 +78,13 @@ class Container(NamedTuple):
         """Yield (opcode, body) of every record of the data section."""
         return _records(self.content, len(_MAGIC), self.summary_start)
 
+    def places(self) -> Iterator[tuple[int, int, bytes]]:
+        """Yield (opcode, offset, body) of every record of the data section."""
+        start = len(_MAGIC)
+        for opcode, body in self.data_section():
+            yield opcode, start, body
+            start += _HEAD.size + len(body)
+
     def summary_section(self) -> Iterator[tuple[int, bytes]]:
         """Yield (opcode, body) of every record of the summary section, the index of the file."""
         return _records(self.content, self.summary_start, len(self.content) - _TAIL)

@@ -1,16 +1,17 @@
 """Re-checks stored runs: every log as a whole and in its place, and the files beside the logs.
 
 Reads only. A link of a log's chain cannot be computed again from the log, which does not hold what
-entered it: `reproduce` does that by running the replicate again.
+entered it: `reproduce` does that by running the replicate again. Solutions can be evaluated again:
+by whoever knows planners, see `check_logs`.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.attachments import PREFIX
-from evoexp.errors import CorruptLog, StoreError
+from evoexp.errors import CorruptLog, EvoexpError, StoreError
 from evoexp.records import ReplicateSummary
 from evoexp.store.damage import checked_summary, is_set_aside, reason
 from evoexp.store.files import is_temporary
@@ -34,11 +35,18 @@ class LogCheck(NamedTuple):
         name: Of its file.
         problem: What is wrong with it, in one line; empty if nothing is.
         summary: Its own; None where it cannot be read.
+        unevaluated: Why its solutions could not be evaluated; empty if they were, or if something
+            is wrong with the log.
     """
 
     name: str
     problem: str
     summary: ReplicateSummary | None
+    unevaluated: str = ""
+
+
+# yields the contradictions of a log that its solutions show
+Evaluation = Callable[[Path, LogContents], Iterator[str]]
 
 
 class RunCheck(NamedTuple):
@@ -90,26 +98,36 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
     return RunCheck(name, run, problems, leftovers)
 
 
-def check_logs(paths: list[Path], condition_id: str) -> list[LogCheck]:
+def check_logs(
+    paths: list[Path], condition_id: str, evaluate: Evaluation | None = None
+) -> list[LogCheck]:
     """Look at logs of a run, each as a whole.
 
     Args:
         paths: Of the logs; their names tell their replicates.
         condition_id: Of the run, 64 hex digits.
+        evaluate: Evaluates the solutions of a log that is whole; it raises `EvoexpError` where it
+            cannot.
     """
-    found = []
-    for path in paths:
-        summary, problem = None, ""
-        try:
-            log = read_log(path)
-            summary = log.summary
-            problem = next(_contradictions(log, condition_id, int(path.stem)), "")
-        except CorruptLog as error:
-            problem = reason(path, error)
-        if problem and _seems_whole(path, condition_id):
-            problem += DELETE  # forged: `run` does not see it
-        found.append(LogCheck(path.name, problem, summary))
-    return found
+    return [_check_log(path, condition_id, evaluate) for path in paths]
+
+
+def _check_log(path: Path, condition_id: str, evaluate: Evaluation | None) -> LogCheck:
+    summary, problem, unevaluated = None, "", ""
+    try:
+        log = read_log(path)
+        summary = log.summary
+        problem = next(_contradictions(log, condition_id, int(path.stem)), "")
+        if not problem and evaluate is not None:
+            try:
+                problem = next((f"altered: {each}" for each in evaluate(path, log)), "")
+            except EvoexpError as error:
+                unevaluated = reason(path, error)
+    except CorruptLog as error:
+        problem = reason(path, error)
+    if problem and _seems_whole(path, condition_id):
+        problem += DELETE  # forged: `run` does not see it
+    return LogCheck(path.name, problem, summary, unevaluated)
 
 
 def _seems_whole(path: Path, condition_id: str) -> bool:

@@ -52,7 +52,9 @@ def with_message(
     return put_together(parts)
 
 
-def with_attachment(content: bytes, name: str, data: bytes | None, *, beside: bool = False) -> bytes:
+def with_attachment(
+    content: bytes, name: str, data: bytes | None, *, beside: bool = False
+) -> bytes:
     """Return a log with another attachment of a name; None: without it.
 
     Args:
@@ -81,7 +83,9 @@ def with_metadata(content: bytes, name: str, **values: Any) -> bytes:
     for part in parts:
         if part.opcode == Opcode.METADATA and _metadata(part).name == name:
             metadata = _metadata(part)
-            metadata.metadata |= {key: orjson.dumps(value).decode() for key, value in values.items()}
+            metadata.metadata |= {
+                key: orjson.dumps(value).decode() for key, value in values.items()
+            }
             part.body = written(metadata)
     return put_together(parts)
 

@@ -147,6 +147,8 @@ def check(content: bytes, name: str) -> Container:
     opcode, length, summary_start, _, summary_crc = _FOOTER.unpack_from(
         content, len(content) - _TAIL
     )
+    if (opcode, length, summary_start) == (Opcode.FOOTER, 20, 0):
+        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP of another program")
     data_end = summary_start - _DATA_END.size
     if (opcode, length) != (Opcode.FOOTER, 20) or not len(_MAGIC) <= data_end <= len(
         content
@@ -155,7 +157,7 @@ def check(content: bytes, name: str) -> Container:
     view = memoryview(content)
     opcode, length, data_crc = _DATA_END.unpack_from(content, data_end)
     if not (data_crc and summary_crc) and (opcode, length) == (Opcode.DATA_END, 4):
-        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without checksums")
+        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP of another program")
     if zlib.crc32(view[summary_start : -len(_MAGIC) - 4]) != summary_crc:
         raise CorruptLog(f"{name}: altered: the checksum of its summary section is wrong")
     if (opcode, length) != (Opcode.DATA_END, 4) or zlib.crc32(view[:data_end]) != data_crc:

@@ -6,14 +6,17 @@ by whoever knows planners, see `check_logs`.
 """
 
 import hashlib
+import math
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.attachments import PREFIX
 from evoexp.errors import CorruptLog, EvoexpError, StoreError
 from evoexp.records import ReplicateSummary
-from evoexp.store.damage import checked_summary, is_set_aside, reason
+from evoexp.store.busy_runs import is_being_written
+from evoexp.store.damage import MAX_NAMED, checked_summary, is_set_aside, reason
 from evoexp.store.files import is_temporary
 from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES
 from evoexp.store.log_reader import LogContents, read_log
@@ -87,6 +90,8 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
         problems = damaged_files(run)
     except StoreError as error:
         return RunCheck(name, None, {CONFIG: reason(path / CONFIG, error)}, leftovers)
+    if (lost := _lost(run)) and not is_being_written(run):
+        problems[REPLICATES] = lost
     if damage := table_damage(run):
         problems["summary.parquet"] = damage
     for replicate in sorted(run.failed()):
@@ -96,6 +101,23 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
             failure = run.failure_path(replicate)
             problems[failure.name] = reason(failure, error)
     return RunCheck(name, run, problems, leftovers)
+
+
+def _lost(run: RunDirectory) -> str:
+    """Tell which replicates were asked for and left neither log nor failure; empty: none."""
+    try:
+        asked = max((plan.num_replicates for plan in run.plans()), default=0)
+    except StoreError:
+        return ""
+    there = {k for k in run.completed() | run.failed() if k < asked}
+    if len(there) >= asked:
+        return ""
+    first = list(islice((k for k in range(asked) if k not in there), MAX_NAMED))
+    more = f" and {asked - len(there) - len(first)} more" if asked - len(there) > len(first) else ""
+    return (
+        f"missing: {', '.join(map(str, first))}{more} of {asked} replicates that were asked for "
+        "(gone, or not run yet)"
+    )
 
 
 def check_logs(
@@ -168,8 +190,21 @@ def _contradictions(log: LogContents, condition_id: str, replicate: int) -> Iter
         for name in _REPEATED:
             if repr(getattr(last, name)) != repr(getattr(log.summary, name)):
                 yield f"altered: {name} of its summary is not that of its last generation"
+    missing = _improved(log) - {solution.generation for solution in log.solutions}
+    if missing:
+        yield f"altered: no solution of generation {min(missing)}, whose best cost is a better one"
     if not log.solutions or repr(log.solutions[-1].cost) != repr(log.summary.best_cost):
         yield "altered: its last solution does not have the best cost"
+
+
+def _improved(log: LogContents) -> set[int]:
+    """Return the generations in which the best cost improved, the first one included."""
+    best, improved = math.inf, {row.index for row in log.generations[:1]}
+    for row in log.generations:
+        if row.best_cost < best:
+            best = row.best_cost
+            improved.add(row.index)
+    return improved
 
 
 def _leftovers(path: Path) -> Iterator[str]:

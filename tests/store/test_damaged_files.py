@@ -94,7 +94,7 @@ def test_a_damaged_log_is_left_out_and_set_aside(
         assert summary_table(run)["replicate"].to_pylist() == [0, 2]
     assert (whole_logs(run), lost_replicates(run)) == ({0, 2}, {1})
     with run.lock(), pytest.warns(DamagedStore, match="and run again: 0001.mcap") as said:
-        mend(run, CONFIG)
+        mend(run, CONFIG, range(3))
     assert len(said) == 1
     assert "kept as 0001.mcap.damaged" in str(said[0].message)
     assert os.path.lexists(run.replicates / "0001.mcap.damaged")
@@ -156,7 +156,7 @@ def test_a_log_of_another_version_is_left_out_and_left_alone(
     with pytest.warns(DamagedStore, match="written by a newer evoexp"):
         assert summary_table(run).num_rows == 1
     with run.lock(), pytest.raises(StoreError, match="0001.mcap: written by a newer evoexp"):
-        mend(run, CONFIG)
+        mend(run, CONFIG, range(3))
     assert run.log_path(1).exists()
 
 
@@ -170,7 +170,7 @@ def test_a_damaged_failure_stays_a_failure(run: RunDirectory, add: Add, content:
     assert [row["status"] for row in rows] == ["done", "failed"]
     assert rows[1]["stop_reason"].startswith("unknown: 0001.failed.json: damaged")
     with run.lock(), pytest.warns(DamagedStore, match=r"0001\.failed\.json\.damaged"):
-        mend(run, CONFIG)
+        mend(run, CONFIG, range(3))
     assert run.failed() == set()
 
 
@@ -221,7 +221,7 @@ def test_a_lost_file_of_the_configuration_is_taken_from_a_log(
     assert attachments.File(sha256=sha256).content == content
     assert list(damaged_files(run)) == [f"files/{sha256}"]
     with run.lock(), pytest.warns(DamagedStore, match="written again"):
-        mend(run, config)
+        mend(run, config, range(3))
     run.create(config, {}, files)
     assert path.read_bytes() == content
     assert not damaged_files(run)
@@ -258,7 +258,7 @@ def test_a_lost_configuration_is_taken_from_a_log(
         pytest.warns(DamagedStore, match="and written again: config.json"),
         pytest.warns(DamagedStore, match="and run again: 0000.mcap"),
     ):
-        mend(run, CONFIG)
+        mend(run, CONFIG, range(3))
     run.create(CONFIG, manifest)
     assert not damaged_files(run, CONFIG)
     assert (run.config_json(), run.manifest()) == (CONFIG, manifest)
@@ -298,7 +298,7 @@ def test_a_damaged_run_hides_no_other(run: RunDirectory, tmp_path: Path) -> None
 def test_damaged_plans_are_set_aside(run: RunDirectory, content: str) -> None:
     (run.path / "plans.json").write_text(content)
     with run.lock(), pytest.warns(DamagedStore, match="plans.json"):
-        mend(run, CONFIG)
+        mend(run, CONFIG, range(3))
     run.note_plan(3)
     assert run.plans()[0].num_replicates == 3
 
@@ -308,7 +308,7 @@ def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
     run.replicates.touch()
     assert (run.completed(), summary_table(run).num_rows) == (set(), 0)
     with run.lock(), pytest.warns(DamagedStore, match="replicates .damaged: not a directory"):
-        mend(run, CONFIG)
+        mend(run, CONFIG, range(3))
     run.create(CONFIG, {})
     assert run.replicates.is_dir()
 

@@ -1,13 +1,14 @@
 """Runs stored replicates again and compares: MATCH, or the first generation that differs.
 
-Two things are compared: the search, link by link of the chain, and whatever else a summary says:
-verdict, clearance, lengths, terms, counts; all but times. In an equal environment both must agree
-to the bit, elsewhere numbers of the summary to `TOLERANCE`; the answer says which. Elsewhere a
-planner whose reproducibility is `environment` is compared by all its numbers where bits differ.
+Two things are compared: the search, link by link of the chain, and everything else that a log
+holds: summary, generations, solutions, fronts, attachments, content digest; all but times. In an
+equal environment both must agree to the bit, elsewhere numbers to `TOLERANCE`; the answer says
+which. Elsewhere a planner whose reproducibility is `environment` is compared by all its numbers
+where bits differ.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ from evoexp.errors import CorruptLog, MissingDistribution
 from evoexp.records import GenerationRow, ReplicateSummary, flatten
 from evoexp.registry import missing
 from evoexp.store.damage import reason
+from evoexp.store.digests import array_bytes
 from evoexp.store.log import ARRAY
 from evoexp.store.log_reader import LogContents, decode_array, read_log
 from evoexp.store.manifest import differences
@@ -30,17 +32,22 @@ TIMES = ("certificate_s", "cpu_s", "wall_s")
 ELSEWHERE = "in another environment"
 OLDER = "the log is older than exact boxes"
 _CHAINED = ("digest", "chain")  # compared as the search
+_CONFIG, _CONTENT = "configuration", "content digest"
 # Rounding decides which of two equally close places is found, and in how many steps: where bits may
 # differ, these are named and decide nothing.
 _UNDECIDED = ("clearance_at", "clearance_pair", "penetration_pair", "certificate_queries")
 _COST = "cost "  # begins a fingerprint that is no digest
 
 
+_PLAIN = (str, int, float, type(None))  # values of which a difference is told
+_LONGEST = 60  # characters of one
+
+
 class FieldDifference(NamedTuple):
-    """A field in which a summary or a generation differs from its re-execution.
+    """A field or a record in which a log differs from its re-execution.
 
     Attributes:
-        name: Of the field.
+        name: Of the field, behind the record that it belongs to.
         was: Its stored value.
         now: The value found again.
         size: Of the difference [-], see `difference`; inf of what is no number.
@@ -56,11 +63,19 @@ class FieldDifference(NamedTuple):
         """Whether it is a number that agrees to `TOLERANCE`, or decides nothing."""
         return self.size <= TOLERANCE or self.name in _UNDECIDED
 
+    @property
+    def is_count(self) -> bool:
+        """Whether it counts steps, of which rounding decides how many lead to the same end."""
+        ints = type(self.was) is int and type(self.now) is int
+        return self.name.endswith("evaluations") or (ints and "num_feasible" not in self.name)
+
     def __str__(self) -> str:
         """Return the difference in words."""
         if math.isfinite(self.size):
             return f"{self.name} differs by {self.size:.1e}"
-        return f"{self.name} was {self.was!r}, is {self.now!r}"
+        if not all(isinstance(value, _PLAIN) for value in (self.was, self.now)):
+            return f"{self.name} differs"
+        return f"{self.name} was {_short(self.was)}, is {_short(self.now)}"
 
 
 class Comparison(NamedTuple):
@@ -73,7 +88,7 @@ class Comparison(NamedTuple):
         digest_matches: Whether the ends of both chains agree (they include the last population).
         num_generations: Generations compared, the initial one included.
         environment: Differences between then and now, one line each.
-        fields: Differences of the summary and of the generations, in their order.
+        fields: Differences of everything but the chain, in the order of `field_differences`.
         inexact: Why these are compared to `TOLERANCE`; empty: to the bit.
         farthest: Where numbers are compared instead of chains: the number that differs most, and
             by how much [-]; None: chains are compared.
@@ -171,16 +186,22 @@ def reproduce_log(path: Path) -> Comparison:
     return _reproduce(path, read_log(path))
 
 
-def _reproduce(path: Path, stored: LogContents) -> Comparison:
-    if packages := missing(stored.environment.get("components", {})):
+def stored_condition(path: Path, log: LogContents) -> Condition:
+    """Return the condition of a log, built from the log alone; see `reproduce_log`."""
+    if packages := missing(log.environment.get("components", {})):
         raise MissingDistribution(str(path), packages)
-    keep_all(data for name, data in stored.attachments.items() if name.startswith(PREFIX))
-    condition = Condition.from_json(stored.config_json)
-    if condition.id != stored.condition_id:
+    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
+    condition = Condition.from_json(log.config_json)
+    if condition.id != log.condition_id:
         raise CorruptLog(
             f"{path}: its configuration has hash {condition.id[:12]}, it claims "
-            f"{stored.condition_id[:12]}"
+            f"{log.condition_id[:12]}"
         )
+    return condition
+
+
+def _reproduce(path: Path, stored: LogContents) -> Comparison:
+    condition = stored_condition(path, stored)
     refuse_large(condition, machine_memory())
     again = read_log(run_replicate(condition, stored.replicate).content)
     found = compare(stored, again)
@@ -194,7 +215,7 @@ def compare(stored: LogContents, again: LogContents) -> Comparison:
     """Compare two logs of one replicate: link by link, and field by field."""
     environment = tuple(map(str, differences(stored.environment, again.environment)))
     is_older = EXACT_BOXES not in stored.environment
-    return Comparison(
+    found = Comparison(
         stored.condition_id,
         stored.replicate,
         first_divergence(stored.generations, again.generations),
@@ -204,32 +225,63 @@ def compare(stored: LogContents, again: LogContents) -> Comparison:
         tuple(field_differences(stored, again)),
         ELSEWHERE if environment else OLDER if is_older else "",
     )
+    digests = stored.content_digest, again.content_digest
+    if found.search_matches and not found.fields and digests[0] != digests[1]:
+        return found._replace(fields=(FieldDifference(_CONTENT, *digests, math.inf),))
+    return found
 
 
 def field_differences(stored: LogContents, again: LogContents) -> Iterator[FieldDifference]:
-    """Yield the differences of all that two logs of one replicate say, but for times and chain."""
-    yield from _differing(flatten(stored.summary), flatten(again.summary), "")
-    for before, now in zip(stored.generations, again.generations, strict=False):
-        yield from _differing(flatten(before), flatten(now), f"generation {before.index}: ")
+    """Yield the differences of all that two logs of one replicate hold, but for times and chain."""
+    before, now = dict(_records(stored)), dict(_records(again))
+    for name in dict.fromkeys([*before, *now]):
+        if name in before and name in now:
+            yield from differing(before[name], now[name], f"{name}: " if name else "")
+        else:
+            said = ("there", "missing") if name in before else ("missing", "there")
+            yield FieldDifference(name, *said, math.inf)
 
 
-def _differing(
-    before: dict[str, Any], now: dict[str, Any], prefix: str
+def _records(log: LogContents) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield all records of a log by different names, the summary's being empty."""
+    yield "", flatten(log.summary) | {_CONFIG: log.config_json}
+    for generation in log.generations:
+        yield f"generation {generation.index}", flatten(generation)
+    for k, solution in enumerate(log.solutions, 1):
+        yield f"solution {k}, of generation {solution.generation}", flatten(solution)
+    for k, front in enumerate(log.fronts, 1):
+        place = f"of generation {front.generation}, population {front.population}"
+        yield f"front {k}, {place}", flatten(front)
+    for name, data in log.attachments.items():
+        is_array = name.endswith(ARRAY)
+        yield f"attachment {name}", {"values": decode_array(data) if is_array else data}
+
+
+def differing(
+    before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = ""
 ) -> Iterator[FieldDifference]:
+    """Yield the fields of two records that differ in any bit, but for times and chain."""
     for name in dict.fromkeys([*before, *now]):
         if name in TIMES or name in _CHAINED:
             continue
         was, found = before.get(name), now.get(name)
         if _bits(was) != _bits(found):
-            both = all(isinstance(value, float) for value in (was, found))
-            yield FieldDifference(
-                f"{prefix}{name}", was, found, difference(was, found) if both else math.inf
-            )
+            numbers = all(isinstance(value, float | np.ndarray) for value in (was, found))
+            size = difference(was, found) if numbers else math.inf
+            # two numbers that differ in the sign of a zero, or arrays in their kind
+            yield FieldDifference(f"{prefix}{name}", was, found, size)
 
 
 def _bits(value: Any) -> Any:
     """Return a value that equals another one's if all bits do; every NaN is one."""
+    if isinstance(value, np.ndarray):
+        return value.shape, value.dtype.kind, array_bytes(value)
     return repr(value) if isinstance(value, float) else value
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
 def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) -> int | None:
@@ -244,13 +296,13 @@ def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) ->
 
 
 def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
-    """Return the number that differs most between two logs: its name, and its `difference` [-]."""
-    before, now = dict(_numbers(stored)), dict(_numbers(again))
-    if unmatched := sorted(before.keys() ^ now.keys()):
-        return unmatched[0], math.inf
-    found = [(name, difference(before[name], now[name])) for name in before]
-    said = _differing(_said(stored), _said(again), "")
-    return max([*found, *((each.name, each.size) for each in said)], key=lambda item: item[1])
+    """Return the value that differs most between two logs: its name, and by how much [-].
+
+    Counts are left out, and what `_UNDECIDED` names. Without a difference the name is empty.
+    """
+    found = (each for each in field_differences(stored, again) if not each.is_count)
+    sizes = ((each.name, each.size) for each in found if each.name not in _UNDECIDED)
+    return max(sizes, key=lambda item: item[1], default=("", 0.0))
 
 
 def difference(one: Any, two: Any) -> float:
@@ -287,26 +339,3 @@ def same_fingerprint(one: str, two: str) -> bool:
             difference(float(one.removeprefix(_COST)), float(two.removeprefix(_COST))) <= TOLERANCE
         )
     return one == two
-
-
-def _said(log: LogContents) -> dict[str, Any]:
-    """Return the fields of a summary that rounding cannot change by more than `TOLERANCE`.
-
-    Not counts: rounding decides how many steps a library takes to the same end.
-    """
-    return {
-        name: value
-        for name, value in flatten(log.summary).items()
-        if type(value) is not int and name not in _UNDECIDED and not name.endswith("evaluations")
-    }
-
-
-def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
-    """Yield the numbers of a log: costs, solution, arrays; `_said` has the summary's others."""
-    yield "cost", log.summary.best_cost
-    yield "feasible", log.generations[-1].num_feasible
-    yield "best cost of each generation", [row.best_cost for row in log.generations]
-    yield "solution", log.solutions[-1].values
-    yield from (
-        (name, decode_array(data)) for name, data in log.attachments.items() if name.endswith(ARRAY)
-    )

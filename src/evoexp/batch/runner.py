@@ -102,7 +102,8 @@ class Batch:
         with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
             for key, run in self.runs.items():
-                mend(run, self._wanted[key][0].to_json())
+                condition, count, _ = self._wanted[key]
+                mend(run, condition.to_json(), lost[key] | set(range(count)))
             self.jobs = self._missing(lost)
             num_workers = self.num_workers
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))

@@ -11,16 +11,19 @@ from rich.console import Console
 from evoexp import shipped
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
 from evoexp.commands.hashes import with_candidates
+from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.errors import AmbiguousHash, UnknownHash
+from evoexp.store.identity import TAKEN
 from evoexp.store.manifest import differences
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.summaries import summary_table
 
 ABSENT = "–"
-QUANTITIES = ("best_cost", "evaluations", "collision_queries", "clearance", "cpu_s")
-ORIGIN = ("condition", "experiment", "label", "budget", "options", "command", "git")
+TIMES = ("cpu_s",)
+QUANTITIES = ("best_cost", "evaluations", "collision_queries", "clearance", *TIMES)
+ORIGIN = ("condition", "experiment", "label", "budget", "options", "command", "git", TAKEN)
 KEYS = ("a", "b", "settings", "environment", "results", "same_replicates")
 
 
@@ -46,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             name,
             metavar=name.upper(),
-            help="any unique prefix of a run's hash, or of a shipped condition's",
+            help="any unique prefix of a run's hash, or of a shipped condition's; or an archive of "
+            "runs, RUNS.tar[:HASH]",
         )
     parser.add_argument(
         "--json", action="store_true", help=f"print JSON: one mapping ({', '.join(KEYS)})"
@@ -54,7 +58,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Compare; exit code 0 if nothing differs, 1 if anything does, as `diff` does."""
+    """Compare; exit code as that of `diff`: 0 nothing differs, 1 something, 2 cannot be compared.
+
+    Times differ always and do not count.
+    """
     one, two = _side(arguments.a), _side(arguments.b)
     settings = list(changed(one.settings, two.settings))
     environment = _environment(one, two)
@@ -76,8 +83,9 @@ def main(arguments: argparse.Namespace) -> int:
                 f"{len(same)} of {len(common)} common replicates are the same, bit for bit",
                 soft_wrap=True,
             )
-    differ = settings or environment or len(same) < len(common) or one.rows.keys() ^ two.rows.keys()
-    return 1 if differ else 0
+    measured = [each for each in results if each[0] not in TIMES and repr(each[1]) != repr(each[2])]
+    other = len(same) < len(common) or one.rows.keys() != two.rows.keys()
+    return 1 if settings or environment or measured or other else 0
 
 
 def changed(one: Any, two: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
@@ -105,12 +113,18 @@ def _is_around(outer: Any, inner: Any) -> bool:
 
 
 def _side(prefix: str) -> Side:
-    """Find a condition: stored here, else shipped.
+    """Find a condition: in an archive, stored here, else shipped.
 
     Raises:
-        UnknownHash: If it is neither.
+        UnknownHash: If it is nowhere, or in an archive of several runs of which none is chosen.
         AmbiguousHash: If a prefix means several.
     """
+    if packed := in_archive(prefix):
+        with looked_into(*packed) as runs:
+            if len(runs) > 1:
+                choices = ", ".join(f"{prefix}:{run.hash12}" for run in runs[:NAMED])
+                raise UnknownHash(f"{prefix}: holds {len(runs)} runs; choose one: {choices}")
+            return _stored(runs[0])
     try:
         run = resolve(outputs_root(), prefix)
     except UnknownHash as error:
@@ -123,6 +137,10 @@ def _side(prefix: str) -> Side:
         words = [f"experiment={row.experiment}", f"budget={row.budget}"]
         condition: Condition = expansions.expand(words, only=[row.label])[0].conditions[0].condition
         return Side(condition.id, json.loads(condition.to_json()), None, {})
+    return _stored(run)
+
+
+def _stored(run: RunDirectory) -> Side:
     return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), _rows(run))
 
 

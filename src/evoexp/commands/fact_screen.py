@@ -4,6 +4,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from evoexp.store.identity import TAKEN
 from evoexp.validation import MOST_QUERIES, TARGET
 
 INDENT = 13  # columns of the names on the left
@@ -74,6 +75,8 @@ def _origin(origin: Mapping[str, Any], was_run: bool) -> Iterator[str]:
     names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
     if origin.get("budget"):
         names.append(f"budget {origin['budget']}")
+    if archive := origin.get(TAKEN):
+        yield f"out of {archive}, according to which this is:"
     if names:
         yield ", ".join(names)
     places: dict[str, list[str]] = {}
@@ -81,7 +84,7 @@ def _origin(origin: Mapping[str, Any], was_run: bool) -> Iterator[str]:
         places.setdefault(option["origin"], []).append(f"{group}={option['name']}")
     for place, options in places.items():
         yield f"{place}: {' '.join(options)}"
-    if was_run and origin.get("command"):
+    if was_run and origin.get("command") and not archive:  # somebody's command is none to be typed
         yield origin["command"]
     if origin.get("log"):
         yield f"{origin['log']}, replicate {origin['replicate']}"

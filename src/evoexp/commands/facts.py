@@ -17,8 +17,10 @@ from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError
+from evoexp.extras import lacking
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, Registration, component_modules, registered
+from evoexp.store.identity import TAKEN
 from evoexp.store.kept_facts import kept_fact
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
@@ -32,7 +34,8 @@ KEYS = {
     "condition": "hash, 64 hex digits",
     "shipped_as": "names of the condition in shipped experiments: experiment, label, budget",
     "components": "component, revision, installed_revision, package",
-    "origin": "experiment, label, budget, command, options taken, log, code",
+    "origin": "experiment, label, budget, command, options taken, log, code; taken_from: an "
+    "archive, on whose word all of this stands",
     "environment": "versions, platform, cpu, differences from the environment here; null: not run",
     "result": "replicates planned, done, failed; costs, effort; null: not run here",
     "verdict": "replicates certified, refuted, undecided, without motion; clearance; null: not run",
@@ -49,6 +52,9 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
         experiment: The experiment.
         label: Of the condition.
         command: That runs it.
+
+    Raises:
+        EvoexpError: If the condition cannot be built: its parts do not fit.
     """
     condition = next(each.condition for each in experiment.conditions if each.label == label)
     origin = {
@@ -62,7 +68,10 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
     rows = summary_table(run).to_pylist() if run.completed() or run.failed() else []
     planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
     around = run.manifest() if rows else None
-    return _facts(condition.to_json(), origin, around, rows, planned)
+    config_json = condition.to_json()
+    if not lacking(config_json):  # else a note says how to install it
+        _find_notes(config_json)  # raises where the parts do not fit
+    return _facts(config_json, origin, around, rows, planned)
 
 
 def stored_facts(run: RunDirectory) -> dict[str, Any]:
@@ -70,7 +79,8 @@ def stored_facts(run: RunDirectory) -> dict[str, Any]:
     manifest = run.manifest()
     known = origin_of(manifest, run.condition_id)
     named = {name: known[name] for name in ORIGIN if known[name]}
-    origin = named | {name: manifest[name] for name in ("command", "options") if name in manifest}
+    others = ("command", "options", TAKEN)
+    origin = named | {name: manifest[name] for name in others if name in manifest}
     origin |= {"code": manifest.get("git"), "directory": str(run.path)}
     config_json = run.config_json()
     found = _facts(config_json, origin, manifest, summary_table(run).to_pylist(), None)
@@ -233,12 +243,21 @@ def _shapes(path: Path) -> dict[str, list[int]]:
 
 def _notes(config_json: bytes) -> list[str]:
     """Return the remarks on a condition's settings, or the reason why there can be none."""
+    try:
+        return _find_notes(config_json)
+    except EvoexpError as error:  # of another revision, or a package that is not installed
+        return [str(error)]
+
+
+def _find_notes(config_json: bytes) -> list[str]:
+    """Return the remarks on a condition's settings.
+
+    Raises:
+        EvoexpError: If the condition cannot be built.
+    """
 
     def find() -> list[str]:
         return Condition.from_json(config_json).notes()
 
-    try:
-        modules = component_modules(json.loads(config_json))
-        return list(kept_fact("notes", config_json, modules, find))
-    except EvoexpError as error:  # of another revision, or a package that is not installed
-        return [str(error)]
+    modules = component_modules(json.loads(config_json))
+    return list(kept_fact("notes", config_json, modules, find))

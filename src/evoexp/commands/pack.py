@@ -1,7 +1,13 @@
-"""`evoexp pack`: stored runs as one file, which `reproduce` and `report` accept elsewhere."""
+"""`evoexp pack`: stored runs as one file, which other commands accept elsewhere.
+
+`report` and `compare` take its runs into the store; `show`, `diff` and `reproduce` only look into
+it.
+"""
 
 import argparse
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from evoexp.commands.console import plain_console
@@ -43,8 +49,7 @@ def main(arguments: argparse.Namespace) -> int:
     size = path.stat().st_size / 1e6
     plain_console().print(
         f"{printable(str(path))}: {len(runs)} run{'s' * (len(runs) > 1)}, {count} logs, "
-        f"{size:.2f} MB; elsewhere: evoexp reproduce {printable(path.name)}, or evoexp report "
-        f"{printable(path.name)}",
+        f"{size:.2f} MB; elsewhere: evoexp show, reproduce or report {printable(path.name)}",
         soft_wrap=True,
     )
     return 0
@@ -53,6 +58,39 @@ def main(arguments: argparse.Namespace) -> int:
 def is_archive(word: str) -> bool:
     """Return whether a word of a command is an archive of runs."""
     return word.endswith(ENDING) and Path(word).is_file()
+
+
+def in_archive(word: str) -> tuple[Path, str] | None:
+    """Return archive and prefix of a hash of a word `RUNS.tar` or `RUNS.tar:HASH`; else None."""
+    head, _, prefix = word.rpartition(":")
+    for path, wanted in ((word, ""), (head, prefix)):
+        if is_archive(path):
+            return Path(path), wanted
+    return None
+
+
+@contextmanager
+def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
+    """Give the runs of an archive while the body runs; the store stays as it is.
+
+    Args:
+        path: Of the archive.
+        prefix: Of the hash of the only run to be given; empty: all.
+
+    Raises:
+        UnknownHash: If no run of it, or several, begin with the prefix.
+    """
+    with tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True) as folder:
+        runs = [taken.run for taken in take_in(path, Path(folder))]
+        chosen = [run for run in runs if run.condition_id.startswith(prefix.lower())]
+        if prefix and len(chosen) != 1:
+            held = ", ".join(run.hash12 for run in runs[:NAMED])
+            more = f", … {len(runs) - NAMED} more" if len(runs) > NAMED else ""
+            raise UnknownHash(
+                f"hash: '{prefix}' must begin one run of {printable(str(path))}, begins "
+                f"{len(chosen)} (holds: {held}{more})"
+            )
+        yield chosen
 
 
 def unpacked(words: Sequence[str]) -> list[str]:

@@ -29,9 +29,15 @@ from evoexp.commands.console import (
     plain_console,
 )
 from evoexp.commands.hashes import with_candidates
-from evoexp.commands.pack import is_archive, unpacked
+from evoexp.commands.pack import in_archive, looked_into
 from evoexp.configuration import expansions
-from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
+from evoexp.errors import (
+    AmbiguousHash,
+    NothingStored,
+    RevisionMismatch,
+    UnknownHash,
+    printable,
+)
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
 FEW = 8  # replicates below this are run here, without worker processes
@@ -41,8 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
         "what",
-        metavar="HASH|LOG.mcap|RUNS.tar",
-        help="any unique prefix of a run's hash, a replicate's log, or an archive of runs",
+        metavar="HASH|LOG.mcap|RUNS.tar[:HASH]",
+        help="any unique prefix of a run's hash, a replicate's log, or an archive of runs, which "
+        "is looked into and not taken into the store",
     )
     parser.add_argument("--replicate", type=int, metavar="K", help="only this replicate of the run")
 
@@ -51,10 +58,16 @@ def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
     console = plain_console()
     path = Path(arguments.what)
-    if is_archive(arguments.what):
-        runs = [resolve(outputs_root(), name) for name in unpacked([arguments.what])]
-        rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
-        return _report(console, rows)
+    if packed := in_archive(arguments.what):
+        with looked_into(*packed) as runs:
+            rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
+        code = _report(console, rows)
+        console.print(
+            f"{printable(str(packed[0]))}: its logs were compared where they are; nothing was "
+            f"taken into {outputs_root()}",
+            soft_wrap=True,
+        )
+        return code
     if path.suffix == ".mcap" or path.is_file():
         return _report(console, [reproduce_log(path)])
     try:

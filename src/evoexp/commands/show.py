@@ -3,7 +3,7 @@
 import argparse
 import itertools
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +22,12 @@ from evoexp.commands.console import (
 from evoexp.commands.fact_screen import compact, screen, typed_parts
 from evoexp.commands.facts import KEYS, composed_facts, log_facts, stored_facts
 from evoexp.commands.hashes import with_candidates
+from evoexp.commands.pack import in_archive, looked_into
 from evoexp.commands.replicate_table import replicate_table
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
-from evoexp.errors import AmbiguousHash, SettingError, UnknownHash
+from evoexp.errors import AmbiguousHash, SettingError, UnknownHash, printable
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
 MAX_CHANGES = 6  # settings per row of a table of conditions
@@ -35,10 +36,10 @@ MAX_CHANGES = 6  # settings per row of a table of conditions
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "HASH | LOG.mcap | KEY=VALUE", "+"
+    words.metavar, words.nargs = "HASH | LOG.mcap | RUNS.tar[:HASH] | KEY=VALUE", "+"
     words.help = (
-        "any unique prefix of a run's hash, a replicate's log, or an experiment with overrides as "
-        "for run, which is composed and not run"
+        "any unique prefix of a run's hash, a replicate's log, an archive of runs, which is looked "
+        "into, or an experiment with overrides as for run, which is composed and not run"
     )
     parser.add_argument(
         "--all", action="store_true", help="all settings, replicates and the whole manifest, too"
@@ -66,6 +67,8 @@ def main(arguments: argparse.Namespace) -> int:
             for experiment in experiments
             for label, _ in experiment.conditions
         ]
+    elif packed := in_archive(" ".join(arguments.overrides)):
+        return _show_archive(arguments, *packed)
     elif len(arguments.overrides) > 1:
         raise SettingError("show", "given one hash or log", " ".join(arguments.overrides))
     elif (path := Path(arguments.overrides[0])).suffix == ".mcap" or path.is_file():
@@ -73,21 +76,60 @@ def main(arguments: argparse.Namespace) -> int:
     else:
         run, facts = _by_hash(arguments.overrides[0])
         found = [facts]
-    if arguments.json:
-        print_json(found if len(found) > 1 else found[0])
-        return 0
     console = plain_console()
-    if len(found) > 1 and not arguments.all:
+    if len(found) > 1 and not (arguments.all or arguments.json):
         for experiment in experiments:
             console.print(_conditions(experiment, found))
         console.print("one condition on a screen: --only LABEL", soft_wrap=True)
         return 0
+    _print_screens(console, arguments, found, [run] * len(found))
+    return 0
+
+
+def _show_archive(arguments: argparse.Namespace, path: Path, prefix: str) -> int:
+    """Show the runs of an archive, which stay where they are."""
+    console = plain_console()
+    with looked_into(path, prefix) as runs:
+        found = [stored_facts(run) for run in runs]
+        for facts in found:
+            facts["origin"]["directory"] = str(path)
+        if len(found) > 1 and not (arguments.all or arguments.json):
+            console.print(_packed(found))
+            which = f"{printable(str(path))}:{runs[0].hash12}"
+            console.print(f"one run on a screen: evoexp show {which}", soft_wrap=True)
+        else:
+            _print_screens(console, arguments, found, runs)
+    return 0
+
+
+def _packed(found: Sequence[dict[str, Any]]) -> Table:
+    """Return a table of the runs of an archive."""
+    table = new_table()
+    add_hash_column(table)
+    add_columns(table, "experiment", "condition")
+    add_columns(table, "done", "solved", right=True)
     for facts in found:
+        origin, result = facts["origin"], facts["result"] or {"done": 0, "solved": 0}
+        names = (str(origin.get(name) or "–") for name in ("experiment", "label"))
+        counts = (str(result[name]) for name in ("done", "solved"))
+        table.add_row(facts["condition"][:12], *names, *counts)
+    return table
+
+
+def _print_screens(
+    console: Console,
+    arguments: argparse.Namespace,
+    found: Sequence[dict[str, Any]],
+    runs: Sequence[RunDirectory | None],
+) -> None:
+    if arguments.json:
+        print_json(found if len(found) > 1 else found[0])
+        return
+    for facts, run in zip(found, runs, strict=True):
         for line in screen(facts, console.width):
             console.print(line, soft_wrap=True)
         if arguments.all:
             _print_all(console, facts, run)
-    return 0
 
 
 def _by_hash(prefix: str) -> tuple[RunDirectory | None, dict[str, Any]]:

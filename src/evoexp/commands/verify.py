@@ -25,9 +25,10 @@ from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, resol
 from evoexp.store.verification import LogCheck, RunCheck, check_logs, check_rows, check_run
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
+MANY = 200  # logs, likewise: their solutions are evaluated
 PART = 64  # logs per task of a worker
 SHOWN = 4  # problems of a run
-RUN_KEYS = ("hash", "logs", "problems", "leftovers", "mend")
+RUN_KEYS = ("hash", "logs", "problems", "leftovers", "mend", "unevaluated")
 
 
 class Checked(NamedTuple):
@@ -39,6 +40,7 @@ class Checked(NamedTuple):
         problems: File → what is wrong with it.
         leftovers: Files that are no part of a run.
         mend: The command that mends it; empty if nothing is wrong or no command does.
+        unevaluated: Why solutions of logs could not be evaluated; empty if all were.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Checked(NamedTuple):
     problems: dict[str, str]
     leftovers: list[str]
     mend: str
+    unevaluated: str
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,6 +86,11 @@ def main(arguments: argparse.Namespace) -> int:
             listed = ", ".join(run.leftovers[:SHOWN])
             more = f", … {len(run.leftovers) - SHOWN} more" if run.leftovers[SHOWN:] else ""
             console.print(f"no part of run {run.name}: {listed}{more}", soft_wrap=True)
+        if run.unevaluated:
+            console.print(
+                f"run {run.name}: its solutions were not evaluated: {run.unevaluated}",
+                soft_wrap=True,
+            )
     logs, problems = sum(r.num_logs for r in found), sum(len(r.problems) for r in found)
     found_in = f"{problems} damaged file{'s' * (problems > 1)} in {len(damaged)} of them"
     said = found_in if damaged else "all is well"
@@ -111,15 +119,24 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
         if run.run
         for start in range(0, len(own), PART)
     ]
+    checks: Iterator[list[LogCheck]] = iter(())
     size = sum(path.lstat().st_size for own in paths for path in own)
-    if size < LARGE or len(parts) < 2:
-        checks: Iterator[list[LogCheck]] = itertools.starmap(check_logs, parts)
+    if not parts:
+        pass  # an empty store needs no planner
+    elif (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2:
+        checks = itertools.starmap(_check, parts)
     else:
-        tasks = (joblib.delayed(check_logs)(*part) for part in parts)
+        tasks = (joblib.delayed(_check)(*part) for part in parts)
         checks = in_workers(min(num_cores(), len(parts)), tasks, ordered=True)
     flat = itertools.chain.from_iterable(checks)
     for own in paths:
         yield list(itertools.islice(flat, len(own)))
+
+
+def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:
+    from evoexp.batch.stored_solutions import contradictions  # planners, which take long to load
+
+    return check_logs(paths, condition_id, contradictions)
 
 
 def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
@@ -131,7 +148,8 @@ def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
         known = found.run.command if found.run else COMMAND
         rows = shipped.find(found.name) if known == COMMAND else []
         mend = rows[0].command if rows else known
-    return Checked(found.name, len(logs), problems, found.leftovers, mend)
+    unevaluated = next((log.unevaluated for log in logs if log.unevaluated), "")
+    return Checked(found.name, len(logs), problems, found.leftovers, mend, unevaluated)
 
 
 def _table(runs: Sequence[Checked]) -> Table:

@@ -5,6 +5,7 @@ clock or a file; its randomness is an argument. `PlannerDefaults` answers what m
 alike; everything else a planner writes itself. `evoexp.testing` checks every obligation.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -221,6 +222,13 @@ class PlannerDefaults:
     def security_margin(self, problem: Any) -> float:
         """Return the problem's margin."""
         return float(problem.security_margin)
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the recorded cost of a solution, given its terms as `evaluate` names them.
+
+        NaN: they do not tell it. `verify` compares it with the stored cost where that is finite.
+        """
+        return terms.get("cost", math.nan)
 
     def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
         """Return none: every solution of the documented shape is one of the task."""

@@ -1,6 +1,6 @@
 """A planner that stands beside another one and shares its problem: a control, or a reference."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -89,6 +89,10 @@ class WrappedPlanner(PlannerDefaults, Component):
     def evaluate(self, problem: Any, solution: FloatArray) -> dict[str, float]:
         """Return the wrapped planner's terms of a solution."""
         return self.planner.evaluate(problem, solution)
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the wrapped planner's cost."""
+        return float(getattr(self.planner, "cost_of_terms", super().cost_of_terms)(terms))
 
     def shape(self, problem: Any) -> Shape:
         """Return the wrapped planner's shape of a solution."""

@@ -1,31 +1,45 @@
 """Archives of stored runs: one tar file that another store takes in.
 
 An archive holds `runs/<hash12>/…` as a store does, so `tar` can read it, too. The same runs give
-the same bytes. Nothing of an archive is trusted: names are matched, sizes are limited, every log is
-checked against its place before it is taken in.
+the same bytes. Nothing of an archive is trusted: it holds plain files only, whose heads are all
+checked before anything is read; names are matched, sizes are limited, and memory is taken for the
+bytes that are there, of one file and of at most `MOST_WAITING` bytes of logs that wait. Every log
+is checked against its place before it is taken in.
 """
 
 import hashlib
 import io
+import json
 import os
 import re
 import tarfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from evoexp.attachments import PREFIX
 from evoexp.errors import CorruptLog, EvoexpError, printable
-from evoexp.input_files import MAX_INPUT
+from evoexp.input_files import MAX_INPUT, MEGABYTE
 from evoexp.store.container import MAX_LOG
 from evoexp.store.damage import checked_summary
-from evoexp.store.files import write_files
-from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES
+from evoexp.store.files import write_file, write_files
+from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES, TAKEN
 from evoexp.store.plans import PLANS
 from evoexp.store.run_directory import HASH_LENGTH, RunDirectory
 
 MOST_FILES = 2_000_000  # of an archive
-MOST_AT_ONCE = 64  # logs that are taken in together
+MOST_WAITING = 64 * MEGABYTE  # [B] of logs that are taken in together
+MAX_TEXT = 8 * MEGABYTE  # [B] of a configuration, a manifest, or plans
+_PIECE = MEGABYTE  # [B] that are read at once
+_BLOCK = tarfile.BLOCKSIZE
+_PLAIN = (tarfile.REGTYPE, tarfile.AREGTYPE)
+_COMPRESSED = {
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"PK\x03\x04": "zip",
+}
 _HASH = f"[0-9a-f]{{{HASH_LENGTH}}}"
 _BESIDE = re.compile(rf"runs/({_HASH})/({CONFIG}|{MANIFEST}|{PLANS}|{PREFIX}[0-9a-f]{{64}})")
 _LOG = re.compile(rf"runs/({_HASH})/{REPLICATES}/((?:[1-9][0-9]*)?[0-9]{{4}})\.mcap")
@@ -101,27 +115,35 @@ def take_in(path: Path, outputs: Path) -> list[TakenRun]:
         ArchiveError: If it is no archive of runs, or damaged; what came before the damage is taken.
         Busy: If another process writes one of the runs.
     """
-    found: dict[str, _Arrival] = {}
-    for name, content in _entries(path):
-        if match := _BESIDE.fullmatch(name):
-            hash12, rest = match.groups()
-            arrival = found.get(hash12)
-            if arrival is None:
-                if rest != CONFIG:
-                    raise ArchiveError(f"{_shown(path)}: damaged: {name} comes before {CONFIG}")
-                found[hash12] = _Arrival(path, outputs, hash12, content)
-            else:
-                arrival.beside[rest] = content
-        elif match := _LOG.fullmatch(name):
-            arrival = found.get(match[1])
-            if arrival is None:
-                raise ArchiveError(f"{_shown(path)}: damaged: {name} comes before {CONFIG}")
-            arrival.add(int(match[2]), content)
+    try:
+        with open(path, "rb") as file:
+            return _take_in(path, outputs, file)
+    except OSError as error:
+        if error.filename not in (None, str(path)):  # of the store, not of the archive
+            raise
+        reason = (error.strerror or str(error)).lower()
+        raise ArchiveError(f"{_shown(path)}: cannot be read ({reason})") from None
+
+
+def _take_in(path: Path, outputs: Path, file: BinaryIO) -> list[TakenRun]:
+    arrivals: dict[str, _Arrival] = {}
+    for member in list(_members(path, file)):
+        place = _BESIDE.fullmatch(member.name) or _LOG.fullmatch(member.name)
+        assert place is not None, "its name was matched"
+        hash12, rest = place.groups()
+        arrival = arrivals.get(hash12)
+        content, sha256 = _content(file, member)
+        if arrival is None:
+            if rest != CONFIG:
+                raise ArchiveError(f"{_shown(path)}: damaged: {member.name} comes before {CONFIG}")
+            arrivals[hash12] = _Arrival(path, outputs, hash12, content)
+        elif member.is_log:
+            arrival.add(int(rest), content)
         else:
-            raise ArchiveError(f"{_shown(path)}: no archive of runs: holds '{printable(name)}'")
-    if not found:
+            arrival.add_beside(rest, content, sha256)
+    if not arrivals:
         raise ArchiveError(f"{_shown(path)}: no archive of runs: it is empty")
-    return [arrival.finish() for arrival in found.values()]
+    return [arrival.finish() for arrival in arrivals.values()]
 
 
 class _Arrival:
@@ -134,11 +156,39 @@ class _Arrival:
                 f"{_shown(path)}: damaged: {CONFIG} of run {hash12} has another hash"
             )
         self.run = RunDirectory(outputs, condition_id)
-        self.beside: dict[str, bytes] = {}
         self._path, self._config = path, config_json
+        self._beside: dict[str, bytes] = {}
         self._waiting: dict[int, bytes] = {}
-        self._added = self._kept = 0
+        self._size = self._added = self._kept = 0
         self._begun = False
+
+    def add_beside(self, name: str, content: bytes, sha256: str) -> None:
+        """Take a file beside the configuration in: one that it refers to at once.
+
+        Args:
+            name: In the run's directory.
+            content: Of the file.
+            sha256: Of its content.
+        """
+        if not name.startswith(PREFIX):
+            self._beside[name] = content if name != MANIFEST else self._foreign(content)
+        elif name != PREFIX + sha256 or sha256.encode() not in self._config:
+            what = "does not have the hash that is its name, or its run does not refer to it"
+            raise ArchiveError(f"{_shown(self._path)}: damaged: {name[:30]}… {what}")
+        elif not (place := self.run.path / name).exists():
+            with self.run.lock():
+                place.parent.mkdir(exist_ok=True)
+                write_file(place, content)
+
+    def _foreign(self, manifest: bytes) -> bytes:
+        """Return somebody's manifest with the name of the archive that it comes from."""
+        try:
+            notes: Any = json.loads(manifest)
+            marked = dict(notes) | {TAKEN: self._path.name.encode("unicode_escape").decode()}
+        except (ValueError, TypeError, RecursionError):
+            text = f"{MANIFEST} of run {self.run.hash12} is no JSON object"
+            raise ArchiveError(f"{_shown(self._path)}: damaged: {text}") from None
+        return json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
 
     def add(self, replicate: int, content: bytes) -> None:
         """Take a log in, later and with others."""
@@ -146,8 +196,14 @@ class _Arrival:
         if replicate in self.run.completed():
             self._kept += 1
             return
+        try:
+            checked_summary(content, self.run.condition_id, replicate)
+        except CorruptLog as error:
+            name = f"{self.run.hash12}, replicate {replicate}"
+            raise ArchiveError(f"{_shown(self._path)}: damaged: {name}: {error}") from None
         self._waiting[replicate] = content
-        if len(self._waiting) >= MOST_AT_ONCE:
+        self._size += len(content)
+        if self._size >= MOST_WAITING:
             self._write()
 
     def finish(self) -> TakenRun:
@@ -157,87 +213,109 @@ class _Arrival:
         return TakenRun(self.run, self._added, self._kept)
 
     def _begin(self) -> None:
-        """Write configuration and the files beside it, where they are not there."""
+        """Write configuration, manifest and plans, where they are not there."""
         if self._begun:
             return
         self._begun = True
-        files = {}
-        for name, content in self.beside.items():
-            if name.startswith(PREFIX):
-                if name != PREFIX + hashlib.sha256(content).hexdigest():
-                    text = f"{name[:30]}… does not have the hash that is its name"
-                    raise ArchiveError(f"{_shown(self._path)}: damaged: {text}")
-                files[self.run.path / name] = content
-        files |= {
-            self.run.path / name: self.beside[name]
-            for name in (MANIFEST, PLANS)
-            if name in self.beside
-        }
+        files = {self.run.path / name: content for name, content in self._beside.items()}
         files[self.run.path / CONFIG] = self._config
         with self.run.lock():
             self.run.replicates.mkdir(parents=True, exist_ok=True)
-            new = {place: content for place, content in files.items() if not place.exists()}
-            for place in new:
-                place.parent.mkdir(exist_ok=True)
-            write_files(new)
+            write_files({place: each for place, each in files.items() if not place.exists()})
             self.run.check()
 
     def _write(self) -> None:
-        """Write logs that wait, each checked in a temporary place first."""
-        if not self._waiting:
-            return
-        logs, self._waiting = self._waiting, {}
-        with self.run.lock():
-            for replicate, content in logs.items():
-                trial = self.run.replicates / f".{replicate:04d}.mcap.arriving.tmp"
-                trial.write_bytes(content)
-                try:
-                    checked_summary(trial, self.run.condition_id, replicate)
-                except CorruptLog as error:
-                    reason = str(error).removeprefix(f"{trial}: ")
-                    name = f"{self.run.hash12}, replicate {replicate}"
-                    raise ArchiveError(f"{_shown(self._path)}: damaged: {name}: {reason}") from None
-                finally:
-                    trial.unlink(missing_ok=True)
-            self.run.write_logs(logs)
+        """Write the logs that wait."""
+        logs, self._waiting, self._size = self._waiting, {}, 0
+        if logs:
+            with self.run.lock():
+                self.run.write_logs(logs)
         self._added += len(logs)
 
 
-def _entries(path: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of the files of an archive, one by one."""
+class _Member(NamedTuple):
+    """A file of an archive.
+
+    Attributes:
+        name: `runs/<hash12>/…`.
+        start: Offset of its content [B].
+        size: [B] of its content.
+    """
+
+    name: str
+    start: int
+    size: int
+
+    @property
+    def is_log(self) -> bool:
+        """Whether it is a replicate's log."""
+        return _LOG.fullmatch(self.name) is not None
+
+
+def _members(path: Path, file: BinaryIO) -> Iterator[_Member]:
+    """Yield the files of an archive by their heads alone; each is plain, and wholly there.
+
+    `tarfile` itself follows links, extended heads and sparse files of any size.
+    """
+    end, names = file.seek(0, os.SEEK_END), set[str]()
+    file.seek(0)
+    if kind := next((k for sign, k in _COMPRESSED.items() if _begins(file, sign)), ""):
+        raise ArchiveError(f"{_shown(path)}: no archive of runs: compressed ({kind}); unpack it")
+    start = 0
+    while start + 2 * _BLOCK <= end:
+        file.seek(start)
+        head = file.read(_BLOCK)
+        if not any(head):
+            if any(file.read(_BLOCK)):
+                break
+            return
+        entry = _entry(path, head)
+        if not _BESIDE.fullmatch(entry.name) and not _LOG.fullmatch(entry.name):
+            text = printable(entry.name.replace("\n", "\\n"))
+            raise ArchiveError(f"{_shown(path)}: no archive of runs: holds '{text}'")
+        if entry.name in names or len(names) >= MOST_FILES:
+            what = f"holds {entry.name} twice" if entry.name in names else "too many files"
+            raise ArchiveError(f"{_shown(path)}: no archive of runs: {what}")
+        names.add(entry.name)
+        yield _Member(entry.name, start + _BLOCK, entry.size)
+        start += _BLOCK + -(-entry.size // _BLOCK) * _BLOCK
+    raise ArchiveError(f"{_shown(path)}: no archive of runs, or a damaged one: it is cut off")
+
+
+def _entry(path: Path, head: bytes) -> tarfile.TarInfo:
+    """Return the head of a plain file of a size that is read."""
     try:
-        _check_end(path)
-        with tarfile.open(path, "r:") as archive:
-            for count, entry in enumerate(archive):
-                if not entry.isfile() or count >= MOST_FILES:
-                    what = "more files than an archive has" if entry.isfile() else "no regular file"
-                    raise ArchiveError(f"{_shown(path)}: no archive of runs: {what}")
-                limit = MAX_LOG if entry.name.endswith(".mcap") else MAX_INPUT
-                if entry.size > limit:
-                    raise ArchiveError(f"{_shown(path)}: no archive of runs: a file is too large")
-                content = archive.extractfile(entry)
-                assert content is not None
-                data = content.read()
-                if len(data) != entry.size:
-                    raise ArchiveError(f"{_shown(path)}: damaged: it is cut off")
-                yield entry.name, data
+        entry = tarfile.TarInfo.frombuf(head, "utf-8", "backslashreplace")
     except tarfile.TarError as error:
         raise ArchiveError(f"{_shown(path)}: no archive of runs ({error})") from None
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise ArchiveError(f"{_shown(path)}: cannot be read ({reason})") from None
+    if entry.type not in _PLAIN:
+        raise ArchiveError(
+            f"{_shown(path)}: no archive of runs: no regular file, "
+            f"'{printable(entry.name)}' is of kind {entry.type!r}"
+        )
+    is_text = entry.name.endswith((CONFIG, MANIFEST, PLANS))
+    limit = MAX_LOG if entry.name.endswith(".mcap") else MAX_TEXT if is_text else MAX_INPUT
+    if not 0 <= entry.size <= limit:
+        raise ArchiveError(f"{_shown(path)}: no archive of runs: a file is too large")
+    return entry
 
 
-def _check_end(path: Path) -> None:
-    """Raise where a file does not end as archives do: with two empty blocks."""
-    end = 2 * tarfile.BLOCKSIZE
-    with open(path, "rb") as file:
-        size = file.seek(0, os.SEEK_END)
-        file.seek(max(size - end, 0))
-        if size < end or any(file.read(end)):
-            raise ArchiveError(
-                f"{_shown(path)}: no archive of runs, or a damaged one: it is cut off"
-            )
+def _begins(file: BinaryIO, sign: bytes) -> bool:
+    """Return whether a file begins so; it is at its beginning before and after."""
+    found = file.read(len(sign)) == sign
+    file.seek(0)
+    return found
+
+
+def _content(file: BinaryIO, member: _Member) -> tuple[bytes, str]:
+    """Return the content of a file of an archive, and its SHA-256, computed as it arrives."""
+    pieces, digest, rest = [], hashlib.sha256(), member.size
+    file.seek(member.start)
+    while rest and (piece := file.read(min(rest, _PIECE))):
+        digest.update(piece)
+        pieces.append(piece)
+        rest -= len(piece)
+    return b"".join(pieces), digest.hexdigest()
 
 
 def _shown(path: Path) -> str:

@@ -78,6 +78,13 @@ class Container(NamedTuple):
         """Yield (opcode, body) of every record of the data section."""
         return _records(self.content, len(_MAGIC), self.summary_start)
 
+    def places(self) -> Iterator[tuple[int, int, bytes]]:
+        """Yield (opcode, offset, body) of every record of the data section."""
+        start = len(_MAGIC)
+        for opcode, body in self.data_section():
+            yield opcode, start, body
+            start += _HEAD.size + len(body)
+
     def summary_section(self) -> Iterator[tuple[int, bytes]]:
         """Yield (opcode, body) of every record of the summary section, the index of the file."""
         return _records(self.content, self.summary_start, len(self.content) - _TAIL)
@@ -140,6 +147,8 @@ def check(content: bytes, name: str) -> Container:
     opcode, length, summary_start, _, summary_crc = _FOOTER.unpack_from(
         content, len(content) - _TAIL
     )
+    if (opcode, length, summary_start) == (Opcode.FOOTER, 20, 0):
+        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP of another program")
     data_end = summary_start - _DATA_END.size
     if (opcode, length) != (Opcode.FOOTER, 20) or not len(_MAGIC) <= data_end <= len(
         content
@@ -148,7 +157,7 @@ def check(content: bytes, name: str) -> Container:
     view = memoryview(content)
     opcode, length, data_crc = _DATA_END.unpack_from(content, data_end)
     if not (data_crc and summary_crc) and (opcode, length) == (Opcode.DATA_END, 4):
-        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without checksums")
+        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP of another program")
     if zlib.crc32(view[summary_start : -len(_MAGIC) - 4]) != summary_crc:
         raise CorruptLog(f"{name}: altered: the checksum of its summary section is wrong")
     if (opcode, length) != (Opcode.DATA_END, 4) or zlib.crc32(view[:data_end]) != data_crc:

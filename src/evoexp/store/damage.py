@@ -25,16 +25,17 @@ def warn(text: str) -> None:
     warnings.warn(text, DamagedStore, stacklevel=3)
 
 
-def checked_summary(path: Path, condition_id: str, replicate: int) -> ReplicateSummary:
-    """Return the summary of the log in the place of a replicate.
+def checked_summary(source: Path | bytes, condition_id: str, replicate: int) -> ReplicateSummary:
+    """Return the summary of the log in the place of a replicate, or of its bytes.
 
     Raises:
         CorruptLog: The log is damaged, or it is of another condition or replicate.
     """
-    summary = read_summary(path)
+    summary = read_summary(source)
     if (summary.condition, summary.replicate) != (condition_id, replicate):
         theirs = f"replicate {summary.replicate} of {summary.condition[:12]}"
-        raise CorruptLog(f"{path}: holds {theirs}, which does not belong here")
+        name = "log" if isinstance(source, bytes) else source
+        raise CorruptLog(f"{name}: holds {theirs}, which does not belong here")
     return summary
 
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +14,10 @@ from evoexp.store.log_reader import LogContents, read_log
 
 CONFIG, MANIFEST, REPLICATES = "config.json", "manifest.json", "replicates"
 RESTORED = "restored_from"  # the entry of a restored manifest that names a log
+TAKEN = "taken_from"  # the entry of a manifest out of an archive that names the archive
+_TEXTS = ("experiment", "label", "budget", "command", TAKEN)  # entries of a manifest
+_SECTIONS = ("versions", "platform", "cpu", "components", "git", "options")
+_LONGEST = 20_000  # characters of a text
 _ID = re.compile("[0-9a-f]{64}")
 _OF_NOTHING = hashlib.sha256().hexdigest()  # an empty file of a configuration has this name
 
@@ -136,6 +140,8 @@ def lost_files(path: Path, config_json: bytes) -> Iterator[tuple[Path, str]]:
 def checked_manifest(path: Path, condition_id: str) -> dict[str, Any]:
     """Return the content of a run directory's `manifest.json`.
 
+    It may come from anybody: its texts are one line each, without control characters.
+
     Raises:
         DamagedFile: It is missing, damaged, or of another condition than the one given.
     """
@@ -143,7 +149,27 @@ def checked_manifest(path: Path, condition_id: str) -> dict[str, Any]:
     if found.get("condition", condition_id) != condition_id:
         theirs = str(found["condition"])[:12]
         raise DamagedFile(f"{path / MANIFEST}: is of run {theirs}, which does not belong here")
+    if wrong := next(_misshapen(found), ""):
+        raise DamagedFile(f"{path / MANIFEST}: damaged: {wrong}")
     return found
+
+
+def _misshapen(manifest: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the entries of a manifest that are not of their kind."""
+    for name in _TEXTS:
+        text = manifest.get(name) or ""
+        if not isinstance(text, str) or not text.isprintable() or len(text) > _LONGEST:
+            yield f"{name} is no line of text"
+    for name in _SECTIONS:
+        if not isinstance(manifest.get(name) or {}, dict):
+            yield f"{name} is no mapping"
+    options = manifest.get("options")
+    for group, option in options.items() if isinstance(options, dict) else ():
+        texts = [option.get(key) for key in ("name", "origin")] if isinstance(option, dict) else [0]
+        if not all(isinstance(each, str) and each.isprintable() for each in (group, *texts)):
+            yield "options are no names and origins"
+        elif ".." in f"{group}{texts[0]}" or group.startswith("/") or str(texts[0])[:1] == "/":
+            yield "options name files elsewhere"  # a report reads those that are shipped
 
 
 def restored_manifest(path: Path, condition_id: str) -> dict[str, Any]:

@@ -104,7 +104,7 @@ def read_log(source: Source) -> LogContents:
     with unreadable_is_corrupt(name):
         index = _index(container)
         run = _run(container, index, name)
-        attachments = {a.name: a.data for a in _bodies(container, Opcode.ATTACHMENT, Attachment)}
+        attachments = _attachments(container, index, name)
         messages, content_digest = _messages(container, index)
         generations = messages.get(written.GENERATION_TOPIC, ())
         metadata = _metadata(container, index, written.SUMMARY, name)
@@ -279,8 +279,27 @@ def _summary(metadata: dict[str, str], run: dict[str, str], name: str) -> Replic
     return summary
 
 
-def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
-    return (parse(record, body) for kind, body in container.data_section() if kind == opcode)
+def _attachments(container: Container, index: _Index, name: str) -> dict[str, bytes]:
+    """Return all attachments by name, after comparing the index with the records it points to.
+
+    Readers that follow the index must see what is verified here: no record stands in the file
+    twice, under another name or beside its index.
+    """
+    attachments, metadata, chunks = list[tuple[int, Attachment]](), list[tuple[str, int]](), []
+    for opcode, start, body in container.places():
+        if opcode == Opcode.ATTACHMENT:
+            attachments.append((start, parse(Attachment, body)))
+        elif opcode == Opcode.METADATA:
+            _refuse_long(body)
+            metadata.append((parse(Metadata, body).name, start))
+        elif opcode == Opcode.CHUNK:
+            chunks.append(start)
+    named = [(each.name, start) for start, each in attachments]
+    if named != list(index.attachments.items()) or metadata != list(index.metadata.items()):
+        raise CorruptLog(f"{name}: altered: its index does not tell the records that it holds")
+    if chunks != [chunk.chunk_start_offset for chunk in index.chunks]:
+        raise CorruptLog(f"{name}: altered: its index does not tell the messages that it holds")
+    return {each.name: each.data for _, each in attachments}
 
 
 def _messages(container: Container, index: _Index) -> tuple[dict[str, list[Message]], str]:

@@ -4,6 +4,7 @@ Only for who holds the lock; reading commands never rename anything.
 """
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 
 from evoexp.errors import StoreError
@@ -19,7 +20,7 @@ from evoexp.store.identity import (
 )
 from evoexp.store.plans import PLANS
 from evoexp.store.run_directory import RunDirectory, is_stored
-from evoexp.store.summaries import damaged_logs, whole_logs
+from evoexp.store.summaries import damaged_logs, replicate_of, whole_logs
 
 
 def damaged_files(run: RunDirectory, config_json: bytes | None = None) -> dict[str, str]:
@@ -63,10 +64,15 @@ def needs_mending(run: RunDirectory, config_json: bytes) -> bool:
     return bool(damaged_files(run, config_json) or damaged_logs(run))
 
 
-def mend(run: RunDirectory, config_json: bytes) -> None:
-    """Set aside every damaged file of a run, and say so in a line; logs lost so run again.
+def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
+    """Set aside every damaged file of a run, and say so in a line.
 
     The caller holds the run's lock, and writes configuration and manifest again.
+
+    Args:
+        run: Whose.
+        config_json: The canonical form of its condition.
+        again: Replicates that run again if their log is damaged.
 
     Raises:
         StoreError: A log is of another version of evoexp, and not damaged.
@@ -78,11 +84,17 @@ def mend(run: RunDirectory, config_json: bytes) -> None:
             if is_of_another_version(run.replicates / name):
                 raise StoreError(f"run {run.hash12}: {run.replicates / name}: {logs[name]}")
         prefix = f"{run.replicates.name}/"
-        _set_aside(run, {prefix + name: why for name, why in logs.items()}, "run again")
+        for then, is_again in (("run again", True), ("set aside: never asked for", False)):
+            some = {name for name in logs if (replicate_of(name) in again) is is_again}
+            if some:
+                _set_aside(run, {prefix + n: why for n, why in logs.items() if n in some}, then)
 
 
 def lost_replicates(run: RunDirectory) -> set[int]:
-    """Return the replicates that were asked for once and whose log is damaged."""
+    """Return the replicates that were asked for once and whose log is damaged.
+
+    Others, which somebody put there, are set aside and not run again.
+    """
     try:
         asked = max((plan.num_replicates for plan in run.plans()), default=0)
     except DamagedFile:

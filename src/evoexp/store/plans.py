@@ -35,7 +35,7 @@ def read_plans(path: Path) -> list[Plan]:
         found = [(each["num_replicates"], each["stored"]) for each in read_object(path)["plans"]]
     except (KeyError, TypeError) as error:
         raise DamagedFile(f"{path}: damaged: no list of plans") from error
-    if not all(isinstance(number, int) for plan in found for number in plan):
+    if not all(type(number) is int and number >= 0 for plan in found for number in plan):
         raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
     return [Plan(*each) for each in found]
 

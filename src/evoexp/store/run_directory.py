@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -18,6 +19,7 @@ from evoexp.store.identity import (
     MANIFEST,
     REPLICATES,
     RESTORED,
+    TAKEN,
     DamagedFile,
     checked_manifest,
     config_id,
@@ -33,6 +35,7 @@ from evoexp.store.run_lock import RunLock
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
 COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
+_RUN = COMMAND.split()[:2]
 _log_name, _failure_name = "{:04d}.mcap".format, "{:04d}.failed.json".format
 _LOG = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.mcap")
 _FAILED = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.failed\.json")
@@ -198,11 +201,16 @@ class RunDirectory:
 
     @property
     def command(self) -> str:
-        """The command that runs the missing replicates, as the manifest has it."""
+        """The command that runs the missing replicates, as the manifest has it.
+
+        A manifest out of somebody's archive is not believed: its command is none to be typed.
+        """
         try:
-            return str(checked_manifest(self.path, self.condition_id).get("command") or COMMAND)
-        except DamagedFile:
+            notes = checked_manifest(self.path, self.condition_id)
+            words = shlex.split(str(notes.get("command") or ""))
+        except (DamagedFile, ValueError):
             return COMMAND
+        return shlex.join(words) if words[:2] == _RUN and TAKEN not in notes else COMMAND
 
     def plans(self) -> list[Plan]:
         """Return how many replicates were asked for, in the order in which that was done.

@@ -1,18 +1,22 @@
 """Re-checks stored runs: every log as a whole and in its place, and the files beside the logs.
 
 Reads only. A link of a log's chain cannot be computed again from the log, which does not hold what
-entered it: `reproduce` does that by running the replicate again.
+entered it: `reproduce` does that by running the replicate again. Solutions can be evaluated again:
+by whoever knows planners, see `check_logs`.
 """
 
 import hashlib
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.attachments import PREFIX
-from evoexp.errors import CorruptLog, StoreError
+from evoexp.errors import CorruptLog, EvoexpError, StoreError
 from evoexp.records import ReplicateSummary
-from evoexp.store.damage import checked_summary, is_set_aside, reason
+from evoexp.store.busy_runs import is_being_written
+from evoexp.store.damage import MAX_NAMED, checked_summary, is_set_aside, reason
 from evoexp.store.files import is_temporary
 from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES
 from evoexp.store.log_reader import LogContents, read_log
@@ -34,11 +38,18 @@ class LogCheck(NamedTuple):
         name: Of its file.
         problem: What is wrong with it, in one line; empty if nothing is.
         summary: Its own; None where it cannot be read.
+        unevaluated: Why its solutions could not be evaluated; empty if they were, or if something
+            is wrong with the log.
     """
 
     name: str
     problem: str
     summary: ReplicateSummary | None
+    unevaluated: str = ""
+
+
+# yields the contradictions of a log that its solutions show
+Evaluation = Callable[[Path, LogContents], Iterator[str]]
 
 
 class RunCheck(NamedTuple):
@@ -79,6 +90,8 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
         problems = damaged_files(run)
     except StoreError as error:
         return RunCheck(name, None, {CONFIG: reason(path / CONFIG, error)}, leftovers)
+    if (lost := _lost(run)) and not is_being_written(run):
+        problems[REPLICATES] = lost
     if damage := table_damage(run):
         problems["summary.parquet"] = damage
     for replicate in sorted(run.failed()):
@@ -90,26 +103,53 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
     return RunCheck(name, run, problems, leftovers)
 
 
-def check_logs(paths: list[Path], condition_id: str) -> list[LogCheck]:
+def _lost(run: RunDirectory) -> str:
+    """Tell which replicates were asked for and left neither log nor failure; empty: none."""
+    try:
+        asked = max((plan.num_replicates for plan in run.plans()), default=0)
+    except StoreError:
+        return ""
+    there = {k for k in run.completed() | run.failed() if k < asked}
+    if len(there) >= asked:
+        return ""
+    first = list(islice((k for k in range(asked) if k not in there), MAX_NAMED))
+    more = f" and {asked - len(there) - len(first)} more" if asked - len(there) > len(first) else ""
+    return (
+        f"missing: {', '.join(map(str, first))}{more} of {asked} replicates that were asked for "
+        "(gone, or not run yet)"
+    )
+
+
+def check_logs(
+    paths: list[Path], condition_id: str, evaluate: Evaluation | None = None
+) -> list[LogCheck]:
     """Look at logs of a run, each as a whole.
 
     Args:
         paths: Of the logs; their names tell their replicates.
         condition_id: Of the run, 64 hex digits.
+        evaluate: Evaluates the solutions of a log that is whole; it raises `EvoexpError` where it
+            cannot.
     """
-    found = []
-    for path in paths:
-        summary, problem = None, ""
-        try:
-            log = read_log(path)
-            summary = log.summary
-            problem = next(_contradictions(log, condition_id, int(path.stem)), "")
-        except CorruptLog as error:
-            problem = reason(path, error)
-        if problem and _seems_whole(path, condition_id):
-            problem += DELETE  # forged: `run` does not see it
-        found.append(LogCheck(path.name, problem, summary))
-    return found
+    return [_check_log(path, condition_id, evaluate) for path in paths]
+
+
+def _check_log(path: Path, condition_id: str, evaluate: Evaluation | None) -> LogCheck:
+    summary, problem, unevaluated = None, "", ""
+    try:
+        log = read_log(path)
+        summary = log.summary
+        problem = next(_contradictions(log, condition_id, int(path.stem)), "")
+        if not problem and evaluate is not None:
+            try:
+                problem = next((f"altered: {each}" for each in evaluate(path, log)), "")
+            except EvoexpError as error:
+                unevaluated = reason(path, error)
+    except CorruptLog as error:
+        problem = reason(path, error)
+    if problem and _seems_whole(path, condition_id):
+        problem += DELETE  # forged: `run` does not see it
+    return LogCheck(path.name, problem, summary, unevaluated)
 
 
 def _seems_whole(path: Path, condition_id: str) -> bool:
@@ -150,8 +190,21 @@ def _contradictions(log: LogContents, condition_id: str, replicate: int) -> Iter
         for name in _REPEATED:
             if repr(getattr(last, name)) != repr(getattr(log.summary, name)):
                 yield f"altered: {name} of its summary is not that of its last generation"
+    missing = _improved(log) - {solution.generation for solution in log.solutions}
+    if missing:
+        yield f"altered: no solution of generation {min(missing)}, whose best cost is a better one"
     if not log.solutions or repr(log.solutions[-1].cost) != repr(log.summary.best_cost):
         yield "altered: its last solution does not have the best cost"
+
+
+def _improved(log: LogContents) -> set[int]:
+    """Return the generations in which the best cost improved, the first one included."""
+    best, improved = math.inf, {row.index for row in log.generations[:1]}
+    for row in log.generations:
+        if row.best_cost < best:
+            best = row.best_cost
+            improved.add(row.index)
+    return improved
 
 
 def _leftovers(path: Path) -> Iterator[str]:

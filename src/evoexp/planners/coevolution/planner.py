@@ -10,7 +10,7 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 (robots × (K + 2) × 2) [deg], start and goal included.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import ClassVar, Literal, Self
 
@@ -297,6 +297,10 @@ class Coevolution(PlannerDefaults, Component):
             terms[f"out_of_range_robot_{r + 1}_deg"] = beyond
             terms[f"fastest_turn_robot_{r + 1}_deg"] = float(turns[r].max())
         return terms
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the cost of the team."""
+        return terms["team_cost"]
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start and goal of every robot with the task's, and links with [0, π]."""

@@ -15,7 +15,7 @@ that stays there, at the cost inf. The individuals of SP1 cost their objective o
 in a generation of SP1 costs inf.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -240,6 +240,10 @@ class RedundantGa(PlannerDefaults, Component):
             for name, value in zip(CONTACT, contact, strict=True):
                 named[f"contact_{name}_sp{k + 1}"] = float(value)
         return named
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the cost of the second sub-path."""
+        return terms["of_sp2"]
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare the start with the task's, and all postures with the joint limits."""

@@ -5,6 +5,7 @@ are uniform within the joints' limits. A solution is flat: node by node, joint b
 [deg], start and goal included; the start alone: no path was found, and there is no motion.
 """
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -122,6 +123,10 @@ class NodePaths(PlannerDefaults, EdgeSettings):
         straight = distance(problem.start, problem.goal)
         ratio = {"length_ratio": terms["length_deg"] / straight} if straight > 0.0 else {}
         return terms | ratio
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the length, the cost of a path that is free."""
+        return terms["length_deg"]
 
     def departures(self, problem: ArmProblem, solution: FloatArray) -> list[str]:
         """Compare start and goal of every arm with the task's, and angles with their limits."""

@@ -11,7 +11,7 @@ the lengths of the plans that its iterations complete, inf elsewhere; its popula
 plan so far.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -143,6 +143,10 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         via, goal = self._errors(problem, path)
         return terms | {"via_error": via, "goal_error": goal}
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the length, the cost of a plan that is free."""
+        return terms["length_deg"]
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start, joint limits and the two places of the tip with the task's."""

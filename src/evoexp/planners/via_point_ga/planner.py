@@ -9,7 +9,7 @@ A population is an array (nq, N + 1, individuals), individuals innermost. A solu
 arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start and goal included.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -137,6 +137,10 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         at = problem.collision.clearance(strings)
         between = problem.collision.clearance(sampled(strings, SAMPLES_BETWEEN))
         return terms | _least_distances(problem, at, between)
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the cost that gives the fitness (Eq. 7)."""
+        return self.objective.fitness_offset - terms["fitness"]
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start and goal of every arm with the task's, and angles with their limits."""

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import joblib
 from rich.table import Table
 
 from evoexp import shipped
-from evoexp.batch.workers import in_workers, num_cores
+from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import (
     add_columns,
     add_hash_column,
@@ -114,9 +113,16 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
     size = sum(path.lstat().st_size for own in paths for path in own)
     if size < LARGE or len(parts) < 2:
         checks: Iterator[list[LogCheck]] = itertools.starmap(check_logs, parts)
-    else:
-        tasks = (joblib.delayed(check_logs)(*part) for part in parts)
-        checks = in_workers(min(num_cores(), len(parts)), tasks, ordered=True)
+        yield from _by_run(paths, checks)
+        return
+    with Workers(min(num_cores(), len(parts))) as workers:
+        yield from _by_run(paths, in_order(workers, check_logs, parts))
+
+
+def _by_run(
+    paths: Sequence[Sequence[Path]], checks: Iterator[list[LogCheck]]
+) -> Iterator[list[LogCheck]]:
+    """Yield the checks of every run's logs."""
     flat = itertools.chain.from_iterable(checks)
     for own in paths:
         yield list(itertools.islice(flat, len(own)))

@@ -8,6 +8,7 @@ keeps nobody waiting. The end of a worker is told by the system, whatever it hel
 import contextlib
 import os
 import pickle
+import select
 import selectors
 import signal
 import socket
@@ -16,7 +17,8 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import IO, Any, NamedTuple, Protocol, Self
 
 from evoexp.batch.worker_server import HEADER, Answer, send
@@ -202,7 +204,9 @@ class Workers:
         self._fill()
         finished: list[Any] = []
         while True:
-            while (worker := self._idle()) and (task := work.next_task(self._num_running)):
+            while worker := self._idle():
+                if (task := work.next_task(self._num_running)) is None:
+                    break
                 worker.give(function, task)
             yield from finished  # the workers are busy meanwhile
             finished = []
@@ -274,10 +278,10 @@ class Workers:
         if worker.process is not None:
             return
         self._num_lost += 1
-        with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError):
-            self._door.setblocking(False)
-            raise pickle.loads(self._door.recv(_CHUNK))  # why the server cannot load libraries
-        self._door.setblocking(True)
+        if self._door in select.select([self._door], [], [], 0.0)[0]:
+            with contextlib.suppress(ConnectionError):
+                if reason := self._door.recv(_CHUNK):  # why the server cannot load libraries
+                    raise pickle.loads(reason)
         if self._num_lost > MOST_LOST * self.number:
             raise WorkerError("worker processes die before they have begun")
 
@@ -286,16 +290,22 @@ class Workers:
         while len(self._workers) < self.number:
             ours, theirs = socket.socketpair()
             files = [theirs.fileno(), *([first.fileno()] if first else [])]
-            try:
-                socket.send_fds(self._door, [b"w"], files)
-            except ConnectionError:  # the server has died
-                self._end_server()
-                self._start_server()
-                socket.send_fds(self._door, [b"w"], files)
-            theirs.close()
+            with theirs:  # where the server dies now, it is the end of the worker's, too
+                if not self._asked(files):
+                    self._end_server()
+                    self._start_server()
+                    self._asked(files)
             worker = _Worker(ours)
             self._workers.append(worker)
             self._selector.register(ours, selectors.EVENT_READ, worker)
+
+    def _asked(self, files: Sequence[int]) -> bool:
+        """Ask the server for a worker with these files; return whether it lives."""
+        try:
+            socket.send_fds(self._door, [b"w"], files)
+        except ConnectionError:
+            return False
+        return True
 
     def _start_server(self) -> None:
         self._door, theirs = socket.socketpair()
@@ -316,28 +326,25 @@ class Workers:
 
 
 class _InOrder:
-    """Tasks whose results are yielded in order; one whose worker dies is done once more."""
+    """Calls whose results are yielded in order; one whose worker dies is made once more."""
 
-    def __init__(self, tasks: Iterable[tuple[Any, ...]]) -> None:
-        self._waiting = deque(enumerate(tasks))
-        self._running: dict[int, int] = {}  # id of a task → its place
+    def __init__(self, calls: Iterable[tuple[Any, ...]]) -> None:
+        self._waiting = deque((place, call) for place, call in enumerate(calls))
         self._died: set[int] = set()
 
-    def next_task(self, num_running: int) -> tuple[Any, ...] | None:
-        if not self._waiting:
-            return None
-        place, task = self._waiting.popleft()
-        self._running[id(task)] = place
-        return task
+    def next_task(self, num_running: int) -> tuple[int, tuple[Any, ...]] | None:
+        return self._waiting.popleft() if self._waiting else None
 
-    def end_task(self, task: tuple[Any, ...], end: Any | Died) -> tuple[int, Any] | None:
-        place = self._running.pop(id(task))
+    def end_task(
+        self, task: tuple[int, tuple[Any, ...]], end: Any | Died
+    ) -> tuple[int, Any] | None:
+        place, _ = task
         if not isinstance(end, Died):
             return place, end
         if place in self._died:
             raise WorkerError(f"a {DIED_TWICE}")
         self._died.add(place)
-        self._waiting.appendleft((place, task))
+        self._waiting.appendleft(task)
         return None
 
 
@@ -351,11 +358,16 @@ def in_order(
     """
     early: dict[int, Any] = {}
     place = 0
-    for ended, result in workers.results(function, _InOrder(tasks)):
+    call = partial(_called, function)
+    for ended, result in workers.results(call, _InOrder(tasks)):
         early[ended] = result
         while place in early:
             yield early.pop(place)
             place += 1
+
+
+def _called(function: Callable[..., Any], place: int, arguments: tuple[Any, ...]) -> Any:
+    return function(*arguments)
 
 
 def num_cores() -> int:

@@ -15,7 +15,6 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
 import yaml
-from joblib.externals.loky import get_reusable_executor
 
 from evoexp.cli import main
 from evoexp.commands.command_parser import COMMANDS, command_parser
@@ -173,7 +172,6 @@ def test_commands_are_commands(page: Path) -> None:
 def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.delenv("EVOEXP_OUTPUTS", raising=False)
     monkeypatch.chdir(tmp_path)
-    get_reusable_executor().shutdown(wait=True)  # workers stay in the folder that they began in
     with mpl.rc_context():
         yield tmp_path
     plt.close("all")

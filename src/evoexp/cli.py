@@ -1,21 +1,20 @@
 """The command line: parses words, calls one command, turns errors into one line and an exit code.
 
 Exit codes: 0 done; 1 a replicate or a comparison failed; 2 the command could not be done;
-130 interrupted by Ctrl-C, 143 by SIGTERM.
+130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by a terminal that closed.
 """
 
 import contextlib
 import errno
-import importlib
 import os
 import sys
-import warnings
 from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.frame_memory import called_in_one_piece
 from evoexp.commands.interruption import Interrupted, Interruption
+from evoexp.commands.memory_shortage import refuse_too_little, shortage
 from evoexp.commands.quick_end import leave, leave_at_once
 from evoexp.commands.standard_streams import (
     OUTPUT,
@@ -27,12 +26,8 @@ from evoexp.commands.standard_streams import (
 from evoexp.errors import EvoexpError
 from evoexp.numeric.garbage import search_less
 
-WITH_WORKERS = ("reproduce",)  # `run` starts them by itself, if there is anything to run
 KEPT = "finished replicates are kept, the same command runs the others"
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  # full, or defective
-
-# Whoever interrupts a batch gives up running tasks on purpose; joblib warns of them.
-GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully executed)"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Args:
         arguments: Words of the command; None: those that this process was started with. Its
-            signals, its standard streams and its worker processes are then ours.
+            signals, its standard streams and its temporary files are then ours.
     """
     interruption, is_process = Interruption(), arguments is None
     if is_process:
@@ -50,7 +45,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         open_streams()
         search_less()
         interruption.hear()
-        warnings.filterwarnings("ignore", GIVEN_UP, UserWarning)
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         try:
@@ -58,7 +52,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         finally:
             sys.stdout.flush()  # here, where an error is explained
         if is_process:
-            _end_workers()
             settle_streams()
             interruption.end()
             leave(code)
@@ -69,8 +62,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             code = _explain(error, words, interruption)
         finally:
             interruption.leave()
-            if is_process:
-                _end_workers()
         if is_process and interruption.number is not None:
             settle_streams()
             leave_at_once(code)
@@ -89,10 +80,12 @@ def _run(words: Sequence[str], is_process: bool) -> int:
         parser.print_help()
         return 0
     chosen = words[0]
-    if is_process and chosen in WITH_WORKERS and not {"-h", "--help"} & set(words):
-        importlib.import_module("evoexp.batch.workers").start_server()
+    refuse_too_little()
+    if is_process:
+        from evoexp.commands.temporary_folder import use_temporary_folder
+
+        use_temporary_folder()
     given = command_parser(chosen).parse_intermixed_args(words[1:])
-    given.is_process = is_process
     with contextlib.ExitStack() as stack:
         if folders := getattr(given, "config_dir", ()):
             from evoexp.configuration.search_path import searched_first
@@ -100,13 +93,6 @@ def _run(words: Sequence[str], is_process: bool) -> int:
             stack.enter_context(searched_first(folders))
         stack.enter_context(damage_in_lines())
         return int(command_module(chosen).main(given))
-
-
-def _end_workers() -> None:
-    """End the worker processes, if there are any, whatever they do."""
-    workers = sys.modules.get("evoexp.batch.workers")
-    if workers is not None:
-        workers.end_all()
 
 
 def _explain(error: BaseException, words: Sequence[str], interruption: Interruption) -> int:
@@ -124,8 +110,8 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
     if isinstance(error, EvoexpError):
         complain(str(error))
         return 2
-    if isinstance(error, MemoryError):
-        complain(f"out of memory: {error or 'the system gives no more'}")
+    if text := shortage(error):
+        complain(text)
         return 2
     if not isinstance(error, OSError) or error.errno is None:
         raise error

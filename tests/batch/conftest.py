@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from batch_samples import WORDS, digests, run
-from joblib.externals.loky import get_reusable_executor
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -27,14 +26,6 @@ def installed(plug_in: Path) -> Iterator[None]:
     """Install it in this process and in the workers that it starts."""
     with on_path(plug_in, HERE):
         yield
-
-
-@pytest.fixture
-def fresh_workers() -> Iterator[None]:
-    """Have workers that know this test's environment; they keep that of their start."""
-    get_reusable_executor().shutdown(wait=True)
-    yield
-    get_reusable_executor().shutdown(wait=True)
 
 
 @pytest.fixture

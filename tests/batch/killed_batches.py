@@ -67,9 +67,7 @@ def started(words: Sequence[str], outputs: Path) -> Iterator[subprocess.Popen[st
     """Start a command in a group of its own; nothing of it is left behind."""
     process = subprocess.Popen(
         words,
-        # what a killed process leaves of joblib's folders goes with the outputs
-        env=os.environ
-        | {"EVOEXP_OUTPUTS": str(outputs), "JOBLIB_TEMP_FOLDER": str(outputs.parent)},
+        env=os.environ | {"EVOEXP_OUTPUTS": str(outputs), "TMPDIR": str(outputs.parent)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -133,7 +131,7 @@ def _processes(main: int) -> dict[str, list[int]]:
             state, parent, group = rest.split()[:3]
             if int(group) == main and state != "Z":
                 parents[int(directory.name)] = int(parent)
-                if int(parent) == main and b"forkserver" in (directory / "cmdline").read_bytes():
+                if int(parent) == main and b"worker_server" in (directory / "cmdline").read_bytes():
                     servers.append(int(directory.name))
     workers = [process for process, parent in parents.items() if parent in servers]
     return {"main": [main], "server": servers, "worker": workers}

@@ -37,7 +37,6 @@ def test_workers_lose_nothing_but_what_hangs_or_eats_memory(
     undisturbed: dict[int, str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    fresh_workers: None,
 ) -> None:
     monkeypatch.setenv("FAULTY", "slow:1;slow_once:4;deaf:6;eat:8")
     monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))

@@ -3,27 +3,23 @@
 import json
 import math
 import os
-import subprocess
-import sys
+import time
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import joblib
 import pytest
 from batch_samples import WORDS, digests, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
-from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from evoexp.batch import jobs, live_curves, workers
+from evoexp.batch import jobs, live_curves
 from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, fan_out
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate, run_together
 from evoexp.batch.replicate_limits import ReplicateLimits
-from evoexp.batch.workers import in_workers, loading
+from evoexp.batch.workers import Workers
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -115,32 +111,6 @@ def test_a_condition_is_built_once_per_process(
     assert len(calls) == 1
     again = run_replicate(faulty, 2).content
     assert read_log(outcomes[2].content).content_digest == read_log(again).content_digest
-
-
-def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
-    code = (
-        "import sys, evoexp.batch.jobs; print(*sorted({name.split('.')[0] for name in "
-        "sys.modules}))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & set(done.stdout.split())
-
-
-def test_a_worker_that_dies_while_it_loads_is_replaced(fresh_workers: None) -> None:
-    with loading(2, os._exit, 1):
-        pass
-    assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
-
-
-def test_workers_that_die_before_they_are_given_anything_are_replaced(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def in_dead_workers(*arguments: Any) -> None:
-        raise TerminatedWorkerError("killed while the pool was filled")
-
-    monkeypatch.setattr(workers, "in_workers", in_dead_workers)
-    with loading(2, abs, 1) as loaded:
-        assert loaded is None
 
 
 def test_a_batch_tells_how_its_replicates_converge(
@@ -313,16 +283,19 @@ def test_what_a_killed_writer_left_is_cleared_away(faulty: Condition, tmp_path: 
     assert not left.exists()
 
 
+def test_a_clock_that_is_set_back_changes_nothing(
+    faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outputs = tmp_path / "outputs"
+    run(outputs, (faulty, 6))
+    for path in RunDirectory(outputs, faulty.id).path.rglob("*"):
+        os.utime(path, (4e9, 4e9))  # written in what is now the future
+    monkeypatch.setattr(time, "time", lambda: 0.0)
+    run(outputs, (faulty, 12))
+    assert digests(outputs, faulty) == undisturbed
+
+
 # Workers
-
-
-def test_workers_have_one_thread_per_library_whoever_started_them(fresh_workers: None) -> None:
-    names = ("OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_")
-    before = [os.environ.get(name) for name in names]
-    found = list(in_workers(2, [joblib.delayed(os.getenv)(name) for name in names], True))
-    assert found[:2] == ["1", "1"]
-    assert found[2] == str(2**28)
-    assert [os.environ.get(name) for name in names] == before
 
 
 def test_a_killed_worker_costs_its_own_replicate_a_retry(
@@ -330,7 +303,6 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
     undisturbed: dict[int, str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    fresh_workers: None,
 ) -> None:
     monkeypatch.setenv("FAULTY", "kill_once:3;kill:7;raise:9")
     monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))
@@ -343,9 +315,7 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
         9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
     }
     assert (tmp_path / "3").read_text() == "1"
-    assert (tmp_path / "7").read_text() in ("2", "3"), (
-        "twice alone, and before that perhaps in the pool"
-    )
+    assert (tmp_path / "7").read_text() in ("2", "3"), "twice alone, and perhaps among others"
     expected = {k: digest for k, digest in undisturbed.items() if k not in reasons}
     assert digests(tmp_path / "outputs", faulty) == expected
     assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]
@@ -477,5 +447,6 @@ def test_a_replicate_that_fails_among_others_is_their_only_loss(
 
 
 def test_no_jobs_are_no_outcomes() -> None:
-    assert list(fan_out([], 1)) == []
-    assert list(fan_out([], 4)) == []
+    assert list(fan_out([], None)) == []
+    with Workers(2) as workers:
+        assert list(fan_out([], workers)) == []

@@ -3,8 +3,6 @@
 import subprocess
 import sys
 
-import pytest
-
 
 def ended(code: str) -> tuple[int, str]:
     """Run code that ends by `leave(3)`; return exit code and what was printed."""
@@ -25,8 +23,3 @@ def test_threads_are_waited_for() -> None:
         "ThreadPoolExecutor(1).submit(lambda: (sleep(0.2), print('written', flush=True)))"
     )
     assert ended(code) == (3, "written\n")
-
-
-@pytest.mark.parametrize("module", ["evoexp.batch.workers"])
-def test_where_there_are_workers_python_ends_by_itself(module: str) -> None:
-    assert ended(f"import {module}") == (0, "went on\n")

@@ -66,15 +66,17 @@ def run_in_workers(jobs: list[Job], files: tuple[bytes, ...], num_workers: int) 
     from evoexp.attachments import keep_all
     from evoexp.batch.fan_out import fan_out
     from evoexp.batch.jobs import Job as Task
+    from evoexp.batch.workers import Workers
     from evoexp.condition import Condition
     from evoexp.store.log_reader import read_log
 
     keep_all(files)
     tasks = [Task(Condition.from_json(config).id, config, k, files) for config, k in jobs]
-    for outcomes in fan_out(tasks, num_workers):
-        for outcome in outcomes:
-            assert not outcome.failed, outcome.traceback
-            yield read_log(outcome.content).summary
+    with Workers(num_workers) as workers:
+        for outcomes in fan_out(tasks, workers):
+            for outcome in outcomes:
+                assert not outcome.failed, outcome.traceback
+                yield read_log(outcome.content).summary
 
 
 def row(summary: Any) -> dict[str, Any]:

@@ -1,15 +1,14 @@
 """Fans jobs out to worker processes."""
 
-import contextlib
-import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
 from evoexp.batch.replicate_limits import ReplicateLimits
+from evoexp.batch.workers import DIED_TWICE, Died, Workers
 
 # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
 TASK_S = 0.2
@@ -18,60 +17,88 @@ MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
 
 def fan_out(
     jobs: Sequence[Job],
-    num_workers: int,
+    workers: Workers | None,
     limits: ReplicateLimits = NO_LIMITS,
     curves: Path | None = None,
 ) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes; yield outcomes as they come.
 
-    A worker that dies takes the pool with it, and everything in flight: each of those jobs then
-    runs alone, so that only the one that kills its worker fails; the others go on in a new pool.
-    A job that took too long or too much memory runs once more at the end, alone.
+    A worker that dies costs its own task: each job of that runs again in a task of its own. A job
+    whose worker died of it alone, or that took too long or too much memory, runs once more at the
+    end, beside no other.
 
     Args:
         jobs: The replicates.
-        num_workers: Worker processes; 1: they run in this process.
+        workers: Worker processes; None: they run in this process.
         limits: Of each replicate.
         curves: Folder for the convergence of those that are running; None: it is not told.
     """
-    if num_workers == 1:
+    if workers is None:
         for job in jobs:
             outcomes = run_jobs([job], limits, curves=curves)
             yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
-    import joblib  # which takes long to load
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    from evoexp.batch.workers import in_workers
-
-    waiting = deque(jobs)
-    by_key = {job.key: job for job in jobs}
-    again: list[Job] = []
-    run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True, curves=curves))
-    while waiting:
-        in_flight: dict[tuple[str, int], Job] = {}
-        bundles = Bundles(waiting, in_flight, num_workers)
-        try:
-            for outcomes in in_workers(num_workers, (run(bundle) for bundle in bundles)):
-                bundles.took(outcomes)
-                again += [by_key[each.key] for each in outcomes if each.may_pass]
-                yield [each for each in outcomes if not each.may_pass]
-        except TerminatedWorkerError:
-            for job in list(in_flight.values()):
-                yield [_run_alone(job, limits)]
-    for job in again:
-        yield [_run_alone(job, limits)]
+    run = partial(run_jobs, limits=limits, in_worker=True, curves=curves)
+    yield from workers.results(run, _Replicates(jobs, workers.number, limits))
 
 
-def loading(
-    num_workers: int, load: Callable[..., None], *arguments: Any
-) -> contextlib.AbstractContextManager[None]:
-    """Call `load` in every worker while the body runs; without workers do nothing."""
-    if num_workers == 1:
-        return contextlib.nullcontext()
-    from evoexp.batch import workers
+class _Replicates:
+    """Jobs on their way through workers."""
 
-    return workers.loading(num_workers, load, *arguments)
+    def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
+        self._limits, self._waiting = limits, deque(jobs)
+        self._bundles = Bundles(self._waiting, {}, num_workers)
+        self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
+        self._last: deque[Job] = deque()  # to be run a last time
+        self._bundled_no_more: set[tuple[str, int]] = set()  # suspects, and those of a last time
+        self._tried_last: set[tuple[str, int]] = set()
+
+    def next_task(self, num_running: int) -> tuple[list[Job]] | None:
+        """Return the next jobs for a worker; those of a last time run beside nothing."""
+        if self._suspects:
+            return ([self._suspects.popleft()],)
+        if bundle := next(iter(self._bundles), None):
+            return (bundle,)
+        return ([self._last.popleft()],) if self._last and not num_running else None
+
+    def end_task(self, task: tuple[Any, ...], end: list[Outcome] | Died) -> list[Outcome] | None:
+        """Take in the outcomes of jobs; return those that stand."""
+        (jobs,) = task
+        is_bundle = jobs[0].key not in self._bundled_no_more
+        if isinstance(end, Died):
+            if is_bundle:
+                self._bundles.lost(jobs)
+            return self._after_death(jobs, end.seconds)
+        if is_bundle:
+            self._bundles.took(end)
+        final = []
+        for job, outcome in zip(jobs, end, strict=False):  # the other jobs have not begun
+            if outcome.may_pass and job.key not in self._tried_last:
+                self._try_last(job)
+            else:
+                final.append(outcome)
+        return final
+
+    def _after_death(self, jobs: list[Job], seconds: float) -> list[Outcome]:
+        """Let the jobs of a task whose worker died run again; return a failure that is final."""
+        (job, *others) = jobs
+        if others:
+            self._suspects += jobs
+            self._bundled_no_more.update(job.key for job in jobs)
+        elif job.key not in self._tried_last:
+            self._try_last(job)
+        else:
+            reason, timeout_s = DIED_TWICE, self._limits.timeout_s
+            if timeout_s is not None and seconds >= timeout_s:
+                reason = f"{self._limits.reason}, in compiled code: its process was ended"
+            trace = f"The worker process was terminated {seconds:.1f} s after it began."
+            return [Outcome(job.condition_id, job.replicate, reason, trace, b"", seconds)]
+        return []
+
+    def _try_last(self, job: Job) -> None:
+        self._last.append(job)
+        self._bundled_no_more.add(job.key)
+        self._tried_last.add(job.key)
 
 
 class Bundles:
@@ -119,28 +146,3 @@ class Bundles:
         self._bundles.pop(bundle[0].key)
         for job in bundle:
             self._in_flight.pop(job.key, None)
-
-
-def _run_alone(job: Job, limits: ReplicateLimits) -> Outcome:
-    """Run one job in a process of its own, and once more if that dies.
-
-    Which job had brought the pool down is not known.
-    """
-    import joblib
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    from evoexp.batch.workers import in_workers
-
-    run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True))
-    trace, begun = "", time.perf_counter()
-    for _ in range(2):
-        begun = time.perf_counter()
-        try:
-            ((outcome,),) = in_workers(2, [run([job])])
-            return cast(Outcome, outcome)
-        except TerminatedWorkerError as error:
-            trace = str(error)
-    reason = "worker process died twice"
-    if limits.timeout_s is not None and time.perf_counter() - begun >= limits.timeout_s:
-        reason = f"{limits.reason}, in compiled code: its process was ended"
-    return Outcome(job.condition_id, job.replicate, reason, trace, b"", 0.0)

@@ -5,9 +5,10 @@ mark of completion, so an interrupted batch is resumed by asking for it again.
 """
 
 import contextlib
+import json
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from evoexp.batch.jobs import Job, Outcome
 from evoexp.batch.known_times import LongestTimes, are_short
@@ -16,12 +17,15 @@ from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
-from evoexp.registry import guests
+from evoexp.registry import component_modules, guests
 from evoexp.store.identity import MANIFEST, restored_manifest
 from evoexp.store.manifest import manifest
 from evoexp.store.mending import lost_replicates, mend, needs_mending
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import whole_logs, write_summary
+
+if TYPE_CHECKING:
+    from evoexp.batch.workers import Workers
 
 LEAST_MEMORY = 1.0 * GIGABYTE  # [B] that a replicate may take where nothing is set
 
@@ -55,6 +59,7 @@ class Batch:
             curves: Folder for the convergence of replicates while they run; None: it is not told.
         """
         self._curves = curves
+        self._workers: Workers | None = None
         self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
@@ -96,33 +101,32 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
-        from evoexp.batch.fan_out import loading
         from evoexp.batch.first_compilation import compile_all, load_and_compile
 
-        with lock_all(self.runs.values()):
+        with lock_all(self.runs.values()), contextlib.ExitStack() as stack:
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
             for key, run in self.runs.items():
                 condition, count, _ = self._wanted[key]
                 mend(run, condition.to_json(), lost[key] | set(range(count)))
             self.jobs = self._missing(lost)
-            num_workers = self.num_workers
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
-            on_cluster = self._settings.backend == "dask"
-            with loading(1 if on_cluster else num_workers, load_and_compile, config_jsons, files):
-                wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
-                create_all(
-                    (run, text, _manifest(run, text) | notes, own.files())
-                    for run, own, _, notes in wanted
-                    for text in (own.to_json(),)
-                )
-                for key in dict.fromkeys(job.condition_id for job in self.jobs):
-                    self.runs[key].note_plan(self._wanted[key][1])
-                if self._settings.address is None:  # else the workers are elsewhere
-                    compile_all(config_jsons)
+            workers = self._workers or stack.enter_context(self.workers())
+            if workers is not None:
+                workers.start(load_and_compile, config_jsons, files)
+            wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
+            create_all(
+                (run, text, _manifest(run, text) | notes, own.files())
+                for run, own, _, notes in wanted
+                for text in (own.to_json(),)
+            )
+            for key in dict.fromkeys(job.condition_id for job in self.jobs):
+                self.runs[key].note_plan(self._wanted[key][1])
+            if self._settings.address is None:  # else the workers are elsewhere
+                compile_all(config_jsons)
             times = LongestTimes()
             try:
-                for outcomes in self._spread(num_workers):
+                for outcomes in self._spread(workers):
                     times.add(outcomes)
                     yield from self._store(outcomes)
                 times.keep({key: each[0].to_json() for key, each in self._wanted.items()})
@@ -134,16 +138,38 @@ class Batch:
                 raise
             self._summarise_all()
 
-    def _spread(self, num_workers: int) -> Iterator[list[Outcome]]:
+    @contextlib.contextmanager
+    def workers(self) -> Iterator["Workers | None"]:
+        """Have worker processes for `run` while the body runs: they load libraries meanwhile.
+
+        None where there is one worker, or where a cluster starts them.
+        """
+        if self.num_workers == 1 or self._settings.backend == "dask":
+            yield None
+            return
+        from evoexp.batch.workers import Workers
+
+        texts = dict.fromkeys(job.condition_json for job in self.jobs)
+        modules = dict.fromkeys(
+            name for text in texts for name in component_modules(json.loads(text))
+        )
+        ours = [name for name in modules if name.startswith("evoexp.")]  # none of a guest's
+        with Workers(self.num_workers, ours) as self._workers:
+            try:
+                yield self._workers
+            finally:
+                self._workers = None
+
+    def _spread(self, workers: "Workers | None") -> Iterator[list[Outcome]]:
         """Run the jobs where the settings say."""
-        limits = self._limits(num_workers)
+        limits = self._limits()
         if self._settings.backend == "dask":
             from evoexp.batch.cluster import cluster_fan_out
 
             return cluster_fan_out(self.jobs, self._settings, limits)
         from evoexp.batch.fan_out import fan_out
 
-        return fan_out(self.jobs, num_workers, limits, self._curves)
+        return fan_out(self.jobs, workers, limits, self._curves)
 
     @property
     def num_workers(self) -> int:
@@ -165,8 +191,8 @@ class Batch:
             for key, (_, count, _) in self._wanted.items()
         )
 
-    def _limits(self, num_workers: int) -> ReplicateLimits:
-        allowed = allowed_memory(self._settings, num_workers)
+    def _limits(self) -> ReplicateLimits:
+        allowed = allowed_memory(self._settings, self.num_workers)
         least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
         return ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
 

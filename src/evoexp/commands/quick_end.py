@@ -6,18 +6,15 @@ ends.
 
 import atexit
 import os
-import sys
 import threading
 from typing import NoReturn
 
 
-def leave(code: int) -> None:
+def leave(code: int) -> NoReturn:
     """End this process as Python does: threads first, then functions registered for its end.
 
-    Nothing is done where there are worker processes. Standard output and error are flushed already.
+    Standard output and error are flushed already.
     """
-    if "evoexp.batch.workers" in sys.modules:
-        return
     getattr(threading, "_shutdown", lambda: None)()
     leave_at_once(code)
 

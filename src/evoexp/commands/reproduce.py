@@ -1,12 +1,12 @@
 """`evoexp reproduce`: run replicates again and say MATCH, or the first generation that differs."""
 
 import argparse
+import contextlib
 import itertools
 from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import joblib
 from rich.console import Console
 from rich.text import Text
 
@@ -20,7 +20,7 @@ from evoexp.batch.reproduction import (
     reproduce_stored,
     same_fingerprint,
 )
-from evoexp.batch.workers import in_workers, num_cores
+from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import (
     add_columns,
     add_hash_column,
@@ -110,14 +110,15 @@ def _spans(numbers: Sequence[int]) -> Iterator[str]:
 
 def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison | DamagedLog]:
     waiting = deque((run.log_path(k), run.condition_id, k) for k in replicates)
-    found: list[Comparison | DamagedLog] = []
-    # the first one compiles, before any worker does
-    while waiting and not any(isinstance(each, Comparison) for each in found):
-        found.append(reproduce_stored(*waiting.popleft()))
-    if len(waiting) < FEW:
-        return found + [reproduce_stored(*each) for each in waiting]
-    tasks = (joblib.delayed(reproduce_stored)(*each) for each in waiting)
-    return [*found, *in_workers(num_cores(), tasks, ordered=True)]
+    compared: list[Comparison | DamagedLog] = []
+    with contextlib.ExitStack() as stack:
+        workers = stack.enter_context(Workers(num_cores())) if len(waiting) > FEW else None
+        # the first one compiles, before any worker does
+        while waiting and not any(isinstance(each, Comparison) for each in compared):
+            compared.append(reproduce_stored(*waiting.popleft()))
+        if workers is None:
+            return compared + [reproduce_stored(*each) for each in waiting]
+        return [*compared, *in_order(workers, reproduce_stored, waiting)]
 
 
 def _report(console: Console, rows: Sequence[Comparison | DamagedLog]) -> int:

@@ -4,7 +4,6 @@ import argparse
 import contextlib
 import functools
 import importlib
-import json
 import shlex
 import sys
 import tempfile
@@ -28,7 +27,6 @@ from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
-from evoexp.registry import component_modules
 from evoexp.report.pages import page_registration
 from evoexp.report.standing_reports import StandingReport, inputs_of_reports
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -76,11 +74,10 @@ def main(arguments: argparse.Namespace) -> int:
         batch = Batch(
             wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
         )
-        if batch.num_workers > 1:
-            _start_server(arguments, batch)
-        batch.prepare()
-        left = batch.num_left_failed
-        failures = _run(batch, wanted, console, curves)
+        with batch.workers():
+            batch.prepare()
+            left = batch.num_left_failed
+            failures = _run(batch, wanted, console, curves)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         console.print(
@@ -163,18 +160,6 @@ def _that_can_run(experiment: Experiment, console: Console) -> list[Labelled]:
     if all(lacks.values()):
         raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
     return [each for each in experiment.conditions if not lacks[each.label]]
-
-
-def _start_server(arguments: argparse.Namespace, batch: Batch) -> None:
-    """Let workers be forked from a server that loads what they need meanwhile."""
-    if arguments.is_process:
-        from evoexp.batch.workers import start_server  # and joblib
-
-        config_jsons = dict.fromkeys(job.condition_json for job in batch.jobs)
-        modules = dict.fromkeys(
-            module for each in config_jsons for module in component_modules(json.loads(each))
-        )
-        start_server(each for each in modules if each.startswith("evoexp."))  # none of a guest's
 
 
 def _command(arguments: argparse.Namespace) -> str:

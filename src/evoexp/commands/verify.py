@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import joblib
 from rich.table import Table
 
 from evoexp import shipped
-from evoexp.batch.workers import in_workers, num_cores
+from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import (
     add_columns,
     add_hash_column,
@@ -119,15 +118,18 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
         if run.run
         for start in range(0, len(own), PART)
     ]
-    checks: Iterator[list[LogCheck]] = iter(())
     size = sum(path.lstat().st_size for own in paths for path in own)
-    if not parts:
-        pass  # an empty store needs no planner
-    elif (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2:
-        checks = itertools.starmap(_check, parts)
-    else:
-        tasks = (joblib.delayed(_check)(*part) for part in parts)
-        checks = in_workers(min(num_cores(), len(parts)), tasks, ordered=True)
+    if (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2:
+        yield from _by_run(paths, itertools.starmap(_check, parts))
+        return
+    with Workers(min(num_cores(), len(parts))) as workers:
+        yield from _by_run(paths, in_order(workers, _check, parts))
+
+
+def _by_run(
+    paths: Sequence[Sequence[Path]], checks: Iterator[list[LogCheck]]
+) -> Iterator[list[LogCheck]]:
+    """Yield the checks of every run's logs."""
     flat = itertools.chain.from_iterable(checks)
     for own in paths:
         yield list(itertools.islice(flat, len(own)))

@@ -1,0 +1,219 @@
+"""Workers share nothing, are replaced when they die, and end with whoever started them."""
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from evoexp.batch.workers import DIED_TWICE, WorkerError, Workers, in_order
+from evoexp.numeric.garbage import NEW_OBJECTS
+from worker_tasks import end, end_once, fork_and_die, loaded, loaded_packages, refuse
+
+PATIENCE_S = 60.0  # [s] for anything that a busy machine may take long for
+
+
+def test_results_come_in_order_and_each_task_is_done_once() -> None:
+    with Workers(2) as workers:
+        assert list(in_order(workers, abs, ((-k,) for k in range(20)))) == list(range(20))
+        assert list(in_order(workers, abs, [])) == []
+        pids = set(in_order(workers, os.getpid, [()] * 20))
+    assert 1 <= len(pids) <= 2
+    assert not [process for process in pids if is_running(process)]
+
+
+def test_workers_have_one_thread_per_library_whoever_started_them() -> None:
+    names = ("OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_")
+    before = [os.environ.get(name) for name in names]
+    with Workers(2) as workers:
+        found = list(in_order(workers, os.getenv, ((name,) for name in names)))
+    assert found == ["1", "1", str(2**28)]
+    assert [os.environ.get(name) for name in names] == before
+
+
+def test_workers_look_for_garbage_rarely_and_not_among_libraries() -> None:
+    with Workers(1) as workers:
+        (threshold,) = in_order(workers, gc.get_threshold, [()])
+        (frozen,) = in_order(workers, gc.get_freeze_count, [()])
+    assert threshold[0] == NEW_OBJECTS
+    assert frozen > len(sys.modules)
+
+
+def test_an_error_of_a_task_is_raised_with_its_text() -> None:
+    """Though some cannot be made of their text alone."""
+    with Workers(1) as workers:
+        with pytest.raises(LookupError, match="^nobody") as raised:
+            list(in_order(workers, refuse, [("nobody",)]))
+        assert "in refuse" in raised.value.__notes__[0]
+        with pytest.raises(Exception, match=r"^ga\.population_size: must be positive, was -1$"):
+            list(in_order(workers, refuse, [("setting",)]))
+        with pytest.raises(RuntimeError, match="pickle"):
+            list(in_order(workers, threading.Lock, [()]))
+
+
+@pytest.mark.parametrize("way", ["kill", "exit"])
+def test_a_task_whose_worker_dies_is_done_once_more(way: str, tmp_path: Path) -> None:
+    with Workers(2) as workers:
+        tasks = [(k, str(tmp_path), way) for k in range(6)]
+        assert list(in_order(workers, end_once, tasks)) == list(range(6))
+        with pytest.raises(WorkerError, match=DIED_TWICE):
+            list(in_order(workers, end, [("kill",)]))
+        assert list(in_order(workers, abs, [(-1,)])) == [1]
+
+
+def test_a_worker_that_dies_while_it_loads_is_replaced() -> None:
+    with Workers(2) as workers:
+        workers.start(os._exit, 1)
+        assert list(in_order(workers, abs, ((-k,) for k in range(4)))) == [0, 1, 2, 3]
+
+
+def test_an_error_while_workers_load_is_left_to_the_tasks() -> None:
+    with Workers(2) as workers:
+        workers.start(refuse, "while it loads")
+        assert list(in_order(workers, abs, ((-k,) for k in range(4)))) == [0, 1, 2, 3]
+
+
+def test_what_workers_load_may_be_large() -> None:
+    with Workers(2) as workers:
+        workers.start(loaded, bytes(10**7), bytes(5))
+        assert set(in_order(workers, os.getenv, [("LOADED",)] * 4)) == {str(10**7 + 5)}
+
+
+def test_a_server_that_dies_is_started_again(tmp_path: Path) -> None:
+    with Workers(2) as workers:
+        workers._server.kill()  # while it loads
+        assert list(in_order(workers, abs, ((-k,) for k in range(4)))) == [0, 1, 2, 3]
+        workers._server.kill()
+        workers._server.wait()
+        tasks = [(k, str(tmp_path), "kill") for k in range(4)]
+        assert list(in_order(workers, end_once, tasks)) == list(range(4))
+
+
+def test_why_the_server_cannot_load_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ImportError, match="no_such_module"), Workers(2, ["no_such_module"]) as some:
+        list(in_order(some, abs, [(1,)]))
+
+
+def test_workers_that_never_begin_are_not_started_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(WorkerError, match="die before they have begun"), Workers(2) as workers:
+        list(in_order(workers, abs, [(1,)]))
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_dead_worker_is_noticed_whoever_inherited_its_socket() -> None:
+    begun = time.monotonic()
+    with Workers(1) as workers, pytest.raises(WorkerError, match=DIED_TWICE):
+        list(in_order(workers, fork_and_die, [(10 * PATIENCE_S,)]))
+    assert time.monotonic() - begun < 10 * PATIENCE_S
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="nobody can be stopped here")
+def test_workers_that_no_longer_answer_keep_nobody_waiting() -> None:
+    with Workers(2) as workers:
+        stopped = set(in_order(workers, os.getpid, [()] * 20))
+        for process in stopped:
+            os.kill(process, signal.SIGSTOP)
+    assert not [process for process in stopped if is_running(process)]
+
+
+# The command's process
+
+BUSY = """
+import os, signal, sys, time
+from evoexp import cli
+from evoexp.batch.workers import Workers, in_order
+
+def command(words, is_process):
+    with Workers(2) as workers:
+        for process in in_order(workers, os.getpid, [()] * 8):
+            print(process)
+        print(workers._server.pid, flush=True)
+        list(in_order(workers, time.sleep, [(3600,)] * 2)) if sys.argv[1] == "wait" else None
+    {last}
+    return 0
+
+cli._run = command
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGKILL", "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
+def test_workers_end_with_their_parent_whatever_they_do(name: str) -> None:
+    number = getattr(signal, name)
+    code = BUSY.format(last="pass")
+    with subprocess.Popen(
+        [sys.executable, "-c", code, "wait"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: (
+            [signal.signal(n, signal.SIG_DFL) for n in (number, signal.SIGINT)]
+            if name not in ("SIGKILL",)
+            else None
+        ),
+    ) as process:
+        assert process.stdout is not None and process.stderr is not None
+        processes = {int(process.stdout.readline()) for _ in range(9)}
+        process.send_signal(number)
+        complaint = process.stderr.read()
+        code_of_end = process.wait(PATIENCE_S)
+    orderly = name in ("SIGINT", "SIGTERM", "SIGHUP")
+    assert code_of_end == (128 + number if orderly else -number)
+    assert complaint == ("evoexp: interrupted\n" if orderly else "")
+    assert not [one for one in processes if is_running(one)]
+
+
+LOCKED = """
+import os, signal, sys, threading
+from evoexp import cli
+from evoexp.commands import interruption
+
+def command(words, is_process):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        threading.Event().wait(60)
+    finally:
+        threading.Event().wait()  # a library that waits for somebody who is gone
+
+interruption.CLOSING_S = 0.5
+cli._run = command
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer here")
+def test_an_interrupted_command_leaves_whatever_libraries_wait_for() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOCKED], capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    assert done.returncode == 128 + signal.SIGTERM
+    assert done.stderr.splitlines()[-1] == "evoexp: interrupted"
+
+
+def is_running(number: int, patience_s: float = 20.0) -> bool:
+    """Return whether a process is still there after some time; a zombie is not."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        try:
+            os.kill(number, 0)
+        except ProcessLookupError:
+            return False
+        stat = Path(f"/proc/{number}/stat")
+        if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
+            return False
+        time.sleep(0.1)
+    return True
+
+
+def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
+    with Workers(1) as workers:
+        (names,) = in_order(workers, loaded_packages, [()])
+    assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & names

@@ -1,0 +1,93 @@
+"""Calls for worker processes, which can be killed before they answer, or while they do."""
+
+import hashlib
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp.errors import SettingError
+
+KILOBYTE, MEGABYTE = 10**3, 10**6
+LEAST, MOST = KILOBYTE, 50 * MEGABYTE  # [B] of a result
+
+
+class Struck(NamedTuple):
+    """A task whose worker is killed once.
+
+    Attributes:
+        number: Seeds the result.
+        size: Of the result [B].
+        delay_s: From the end of the computation to the kill by another process [s]; None: the
+            worker kills itself while it computes.
+        flag: A file that tells that it was killed; None: it is not.
+    """
+
+    number: int
+    size: int
+    delay_s: float | None
+    flag: Path | None
+
+
+def content(number: int, size: int) -> bytes:
+    """Return the result of a task."""
+    return random.Random(number).randbytes(size)
+
+
+def work(task: Struck) -> tuple[int, bytes, str]:
+    """Compute a result; at its first time, have this process killed."""
+    if task.flag is not None and not task.flag.exists():
+        task.flag.touch()
+        if task.delay_s is None:
+            os.kill(os.getpid(), signal.SIGKILL)
+        _kill_later(task.delay_s or 0.0)
+    computed = content(task.number, task.size)
+    return task.number, computed, hashlib.sha256(computed).hexdigest()
+
+
+def _kill_later(delay_s: float) -> None:
+    """Let another process kill this one; it has inherited all that is open here."""
+    worker = os.getpid()
+    if os.fork() == 0:
+        time.sleep(delay_s)
+        os.kill(worker, signal.SIGKILL)
+        time.sleep(0.1)  # what it holds outlives the worker
+        os._exit(0)
+
+
+def refuse(what: str) -> None:
+    if what == "setting":
+        raise SettingError("ga.population_size", "positive", -1)
+    raise LookupError(what)
+
+
+def end_once(number: int, flags: str, way: str) -> int:
+    flag = Path(flags) / str(number)
+    if not flag.exists():
+        flag.touch()
+        end(way)
+    return number
+
+
+def end(way: str) -> None:
+    if way == "exit":
+        raise SystemExit(3)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def loaded(*parts: bytes) -> None:
+    os.environ["LOADED"] = str(sum(map(len, parts)))
+
+
+def fork_and_die(seconds: float) -> None:
+    if os.fork() == 0:
+        time.sleep(seconds)
+        os._exit(0)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def loaded_packages() -> set[str]:
+    return {name.partition(".")[0] for name in sys.modules}

@@ -268,7 +268,7 @@ def state(**joints: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("file", ["scene", "request"])
 def test_a_robot_that_its_virtual_joint_moves_is_refused(file: str, tmp_path: Path) -> None:
     def prepare_with(own: dict[str, Any]) -> None:
-        transforms = [SELF, moved("shelf", "world") | {"transform": place}]
+        transforms = [SELF, moved("shelf", "world") | {"transform": copy.deepcopy(place)}]
         asked, message = request(), scene(fixed_frame_transforms=transforms)
         if file == "scene":
             message["robot_state"] = own

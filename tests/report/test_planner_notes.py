@@ -1,4 +1,4 @@
-"""The planners' notes on a page."""
+"""The notes on conditions on a page."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -7,8 +7,8 @@ from evoexp.report import motion_pictures
 
 
 def shown(label: str, *notes: str) -> Any:
-    planner = SimpleNamespace(notes=lambda problem: [f"{problem}: {note}" for note in notes])
-    return SimpleNamespace(condition=SimpleNamespace(label=label, prepared=(planner, "robot")))
+    condition = SimpleNamespace(notes=lambda: [f"robot: {note}" for note in notes])
+    return SimpleNamespace(condition=SimpleNamespace(label=label, condition=condition))
 
 
 def test_equal_notes_stand_in_one_row() -> None:

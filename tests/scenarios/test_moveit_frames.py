@@ -268,7 +268,7 @@ def state(**joints: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("file", ["scene", "request"])
 def test_a_robot_that_its_virtual_joint_moves_is_refused(file: str, tmp_path: Path) -> None:
     def prepare_with(own: dict[str, Any]) -> None:
-        transforms = [SELF, moved("shelf", "world", 0, 0, 1)]
+        transforms = [SELF, moved("shelf", "world") | {"transform": copy.deepcopy(place)}]
         asked, message = request(), scene(fixed_frame_transforms=transforms)
         if file == "scene":
             message["robot_state"] = own
@@ -278,13 +278,13 @@ def test_a_robot_that_its_virtual_joint_moves_is_refused(file: str, tmp_path: Pa
         found.prepare()
 
     words = [*write_robot(tmp_path), *COVERED]
+    place = {"translation": [1, 0, 0], "rotation": [0, 0, 0.6, 0.8]}
     prepare_with(state())
     prepare_with(state(header={"frame_id": "/world"}))
-    place = {"translation": [0, 0, 1], "rotation": [0, 0, 0, 1]}
     prepare_with(state(header={"frame_id": "shelf"}, transforms=[place]))  # it stands at the origin
     for own, named in (
-        (state(transforms=[place]), r"a robot at the origin .*, was 'one at \(0, 0, 1\) m"),
-        (state(header={"frame_id": "shelf"}), r"was 'one at \(0, 0, -1\) m"),
+        (state(transforms=[place]), r"a robot at the origin .*, was 'one at \(1, 0, 0\) m"),
+        (state(header={"frame_id": "shelf"}), r"was 'one at \(-0.28, 0.96, 0\) m"),
         (state(header={"frame_id": "odd"}), r"stands still .* was 'odd'"),
         (state(transforms=[]), r"a transform per joint of .*, was 0"),
     ):

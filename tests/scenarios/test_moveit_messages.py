@@ -271,3 +271,11 @@ def test_meshes_that_a_scene_names_are_found_as_a_urdf_s(
     (package / "part.obj").write_text("no mesh")
     with pytest.raises(SettingError, match=r"scenario\.scene: .*part\.obj"):
         problem(tmp_path, by_path).prepare()
+
+
+def test_the_start_of_the_request_comes_before_the_state_of_the_scene(tmp_path: Path) -> None:
+    joints = {"name": ["turn", "nail"], "position": [0.7, 0.2]}
+    asked = request()
+    asked["start_state"]["joint_state"] = {"name": ["turn"], "position": [0.1]}
+    found = problem(tmp_path, scene(robot_state={"joint_state": joints}), asked)
+    assert found.scenario.state == {"turn": 0.1, "nail": 0.2}  # type: ignore[attr-defined]

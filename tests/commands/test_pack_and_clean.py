@@ -64,6 +64,18 @@ def test_clean_deletes_what_it_lists_and_only_if_told_so(evoexp: Evoexp, stored:
     assert "nothing to delete" in evoexp("clean", "all").out
 
 
+@pytest.mark.parametrize(("count", "more"), [(20, ""), (21, " (1 more than shown)")])
+def test_clean_counts_what_it_does_not_show(
+    evoexp: Evoexp, stored: Path, count: int, more: str
+) -> None:
+    run = find_runs(stored)[0]
+    for k in range(count):
+        (run.replicates / f".{k:04d}.mcap.1.tmp").write_text("")
+    said = evoexp("clean").out
+    assert f"\n{count} files or folders{more}, 0.00 MB" in said
+    assert said.count(".mcap.1.tmp") == 20
+
+
 def test_clean_leaves_a_run_that_is_written(evoexp: Evoexp, stored: Path) -> None:
     run = find_runs(stored)[0]
     rest = run.replicates / "0001.mcap.damaged"

@@ -45,6 +45,14 @@ def test_the_file_comes_before_the_robot_and_this_one_before_the_command_line(
             "must name joints of the robot (shoulder, elbow), was elbo; did you mean 'elbow'?",
         ),
         (
+            "joint_limits: {elbo: {max_velocity: 1}, wrist: {max_velocity: 1}}",
+            "(shoulder, elbow), was elbo, wrist; did you mean 'elbow'?",
+        ),
+        (
+            "joint_limits: {elbow: {max_velocity: 0}}",
+            "joint_limits.elbow.max_velocity must be a number above 0, was 0",
+        ),
+        (
             "joint_limits: {elbow: {max_velocity: -1}}",
             "joint_limits.elbow.max_velocity must be a number above 0, was -1",
         ),

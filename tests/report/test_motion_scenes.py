@@ -79,6 +79,9 @@ def test_every_motion_has_its_pictures(name: str) -> None:
         table = motion_tables.covers_table([(name, shown, covers)])
         assert (table["element"] == "cover").sum() == len(covers)
         pictures.append(lambda: motion_scenes.draw_covers(table))
+    for axes in pictures[0]().axes:  # the whole way is within the picture
+        for name_of_axis, limits in (("x", axes.get_xlim()), ("y", axes.get_ylim())):
+            assert limits[0] < way[name_of_axis].min() <= way[name_of_axis].max() < limits[1]
     for picture in pictures:
         assert len(drawn(picture, ("png",), 40)["png"]) > 2000
 

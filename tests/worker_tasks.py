@@ -22,7 +22,7 @@ class Struck(NamedTuple):
         number: Seeds the result.
         size: Of the result [B].
         delay_s: From the end of the computation to the kill by another process [s]; None: the
-            worker kills itself while it computes.
+            worker kills itself before it.
         flag: A file that tells that it was killed; None: it is not.
     """
 
@@ -43,8 +43,10 @@ def work(task: Struck) -> tuple[int, bytes, str]:
         task.flag.touch()
         if task.delay_s is None:
             os.kill(os.getpid(), signal.SIGKILL)
+        computed = content(task.number, task.size)
         _kill_later(task.delay_s or 0.0)
-    computed = content(task.number, task.size)
+    else:
+        computed = content(task.number, task.size)
     return task.number, computed, hashlib.sha256(computed).hexdigest()
 
 

@@ -11,6 +11,7 @@ results can be compared with those of an undisturbed run.
 import multiprocessing
 import os
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -70,12 +71,11 @@ def is_first(replicate: int) -> bool:
 
 
 def in_worker() -> bool:
-    return multiprocessing.parent_process() is not None
+    return forked_from_server() or multiprocessing.parent_process() is not None  # that of dask
 
 
 def forked_from_server() -> bool:
-    origin = multiprocessing.parent_process()
-    return origin is not None and origin.pid != os.getppid()
+    return any("worker_server" in word for word in sys.orig_argv)
 
 
 def die(replicate: int, once: bool) -> None:

@@ -35,7 +35,7 @@ KEYS = {
     "result": "replicates planned, done, failed; costs, effort; null: not run here",
     "verdict": "replicates certified, refuted, undecided, without motion; clearance; null: not run",
     "settings": "the canonical form of the condition",
-    "notes": "remarks of the planner",
+    "notes": "remarks of the robot and the planner",
 }
 """Key → its value, in the order of the screen."""
 
@@ -230,14 +230,26 @@ def _shapes(path: Path) -> dict[str, list[int]]:
 
 
 def _notes(config_json: bytes) -> list[str]:
-    """Return the planner's remarks on its settings, or the reason why there can be none."""
+    """Return remarks of robot and planner, or the reason why the planner has none."""
 
     def find() -> list[str]:
-        planner, problem = Condition.from_json(config_json).prepare()
-        return list(planner.notes(problem))
+        condition = Condition.from_json(config_json)
+        planner, problem = condition.prepare()
+        return [*_robot_notes(condition), *planner.notes(problem)]
 
     try:
         modules = component_modules(json.loads(config_json))
         return list(kept_fact("notes", config_json, modules, find))
     except EvoexpError as error:  # of another revision, or a package that is not installed
-        return [str(error)]
+        reason = str(error)
+    try:
+        return [*_robot_notes(Condition.from_json(config_json)), reason]
+    except EvoexpError:
+        return [reason]
+
+
+def _robot_notes(condition: Condition) -> list[str]:
+    """Return the remarks of a robot; a guest's may have none."""
+    from evoexp.robots.assembly import Robot  # and Pinocchio
+
+    return condition.robot.notes() if isinstance(condition.robot, Robot) else []

@@ -228,14 +228,17 @@ class Condition(NamedTuple):
         return _prepare(self)
 
     def notes(self) -> list[str]:
-        """Return the remarks of planner and scenario on settings and problem, one per line.
+        """Return the remarks of robot, planner and scenario, one per line.
 
         Raises:
             SettingError: If the parts contradict each other.
         """
+        from evoexp.robots.assembly import Robot  # and Pinocchio
+
         planner, problem = self.prepare()
         of_scenario = getattr(self.scenario, "notes", None)
         return [
+            *(self.robot.notes() if isinstance(self.robot, Robot) else ()),
             *planner.notes(problem),
             *(of_scenario(self.robot) if callable(of_scenario) else ()),
         ]

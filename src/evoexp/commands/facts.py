@@ -40,7 +40,7 @@ KEYS = {
     "result": "replicates planned, done, failed; costs, effort; null: not run here",
     "verdict": "replicates certified, refuted, undecided, without motion; clearance; null: not run",
     "settings": "the canonical form of the condition",
-    "notes": "remarks of the planner",
+    "notes": "remarks of robot, planner and scenario",
 }
 """Key → its value, in the order of the screen."""
 

@@ -58,6 +58,10 @@ class Arms(Robot):
             ]
         return settings
 
+    def notes(self) -> list[str]:
+        """Join the remarks of the arms."""
+        return list(dict.fromkeys(note for chain in self.arms for note in chain.notes()))
+
     def chains(self) -> tuple[Arm, ...]:
         """Return the arms; a URDF may bring several."""
         return tuple(arm for chain in self.arms for arm in chain.chains())

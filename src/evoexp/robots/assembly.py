@@ -173,6 +173,10 @@ class Robot(Component):
         """Return the named states of each arm."""
         return tuple(own for chain in self.chains() for own in chain.states())
 
+    def notes(self) -> list[str]:
+        """Remark on what the description leaves open."""
+        return []
+
     def build(self) -> Assembly:
         """Append all arms to one model.
 

@@ -22,7 +22,7 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain, LinkFrames
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
-from evoexp.robots.joint_choice import joint_roles, standing_values
+from evoexp.robots.joint_choice import JointRoles, joint_roles, standing_values
 from evoexp.robots.mesh_checks import whole_mesh
 from evoexp.robots.mesh_pieces import (
     Decomposition,
@@ -36,9 +36,10 @@ from evoexp.robots.robot_data import robot_file
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
 from evoexp.robots.urdf_bodies import built_bodies
+from evoexp.robots.urdf_notes import check_room, urdf_notes
 from evoexp.robots.urdf_reading import check_tree, read_urdf
 from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
-from evoexp.robots.urdf_text import file_content, parsed_xml, read_joints
+from evoexp.robots.urdf_text import JointText, file_content, parsed_xml, read_joints
 from evoexp.validation import Positive, Settings
 
 MESH = "link/collision/geometry/mesh"
@@ -197,8 +198,8 @@ class Urdf(Chain):
         check_tree(root, "robot.path")
         joints = read_joints(root, "robot.path")
         srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
-        groups = self.groups or ((self.group,) if self.group else ())
-        roles = joint_roles(joints, srdf, self.joints, groups, self.base, several=bool(self.groups))
+        roles = self._roles(joints, srdf)
+        check_room(root, roles, "robot.path")
         values = standing_values(self.fixed, joints, roles)
         model = self._model()
         tree = UrdfTree(
@@ -215,6 +216,18 @@ class Urdf(Chain):
     def states(self) -> tuple[ArmStates, ...]:
         """Return the named states of each arm."""
         return tuple(own for chain in self.chains() for own in chain.states())
+
+    def notes(self) -> list[str]:
+        """Remark on what the URDF leaves open: bodies, limits, units."""
+        root = self._root()
+        joints = read_joints(root, "robot.path")
+        srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
+        meshes = {mesh.name: mesh.file.content for mesh in self.meshes}
+        return list(urdf_notes(root, self._roles(joints, srdf), self._rules(), meshes))
+
+    def _roles(self, joints: dict[str, JointText], srdf: Srdf | None) -> JointRoles:
+        groups = self.groups or ((self.group,) if self.group else ())
+        return joint_roles(joints, srdf, self.joints, groups, self.base, several=bool(self.groups))
 
     def _tips(self, found: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
         """Return the frame of each arm's tool, empty if none is named, and the field that chose it.

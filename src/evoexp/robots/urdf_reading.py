@@ -252,4 +252,7 @@ def _check_joint(joint: Any, field: str) -> None:
         lower, upper = (float(limit.get(side, "0")) for side in ("lower", "upper"))
         if lower > upper:
             must = "a URDF whose lower limits do not exceed the upper ones"
-            raise SettingError(field, must, f"joint '{name}': {lower:g} to {upper:g}")
+            absent = (
+                "" if len(limit.keys() & {"lower", "upper"}) == 2 else " (an absent limit is 0)"
+            )
+            raise SettingError(field, must, f"joint '{name}': {lower:g} to {upper:g}{absent}")

@@ -16,6 +16,10 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
+# fields of a summary that no two runs of a replicate share [s]
+TIMES = ("certificate_s", "cpu_s", "wall_s")
+
+
 class Generation(NamedTuple):
     """One generation of one replicate, as a planner yields it.
 

@@ -98,6 +98,24 @@ def test_a_damaged_replicate_beyond_those_asked_for_runs_again(
     assert evoexp("reproduce", run.hash12).code == 0
 
 
+def test_a_damaged_log_that_was_never_asked_for_is_set_aside_alone(
+    evoexp: Evoexp, run: RunDirectory
+) -> None:
+    """Two replicates were asked for: 0 and 1."""
+    shutil.copy(run.log_path(1), run.log_path(3))
+    run.log_path(2).write_bytes(b"")
+    said = evoexp("run", *PLANAR, "--no-report")
+    assert said.code == 0 and "nothing to run" in said.out
+    (line,) = lines(said.err)
+    assert f"run {run.hash12}: damaged, and set aside: never asked for: 0002.mcap" in line
+    assert run.completed() == {0, 1}
+    assert {path.name for path in run.replicates.glob("*.damaged")} == {
+        "0002.mcap.damaged",
+        "0003.mcap.damaged",
+    }
+    assert evoexp("verify", run.hash12).code == 0
+
+
 def test_two_logs_that_changed_places(
     evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,14 +1,21 @@
 """`evoexp diff`: two runs beside each other."""
 
 import json
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from command_samples import Evoexp
 from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.commands.diff import changed
-from evoexp.store.run_directory import find_runs
+from evoexp.shipped import shipped
+from evoexp.store.archive import pack
+from evoexp.store.log import SUMMARY
+from evoexp.store.run_directory import RunDirectory, find_runs
+from forged_logs import with_metadata
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers(-3, 3) | st.text("ab", max_size=2),
@@ -42,6 +49,56 @@ def test_a_run_does_not_differ_from_itself(evoexp: Evoexp, stored: Path) -> None
     assert said.code == 0
     assert "settings: the same" in said.out and "environment: the same" in said.out
     assert "2 of 2 common replicates are the same, bit for bit" in said.out
+
+
+@pytest.fixture
+def pair(stored: Path, tmp_path: Path) -> tuple[RunDirectory, Path]:
+    """Return a stored run, and an archive of the same run."""
+    run = find_runs(stored)[0]
+    pack([run], tmp_path / "same.tar")
+    return run, tmp_path / "same.tar"
+
+
+def renamed(run: RunDirectory) -> None:
+    manifest = json.loads((run.path / "manifest.json").read_text())
+    manifest["versions"]["numpy"] = "0.1"
+    (run.path / "manifest.json").write_text(json.dumps(manifest))
+
+
+def changed_summary(run: RunDirectory, **values: object) -> None:
+    log = run.log_path(1)
+    log.write_bytes(with_metadata(log.read_bytes(), SUMMARY, **values))
+
+
+DIFFERENCES: dict[str, tuple[Callable[[RunDirectory], object], int]] = {
+    "nothing": (lambda run: None, 0),
+    "times": (lambda run: changed_summary(run, cpu_s=9.0, wall_s=9.0), 0),
+    "environment": (renamed, 1),
+    "a replicate less": (lambda run: run.log_path(1).unlink(), 1),
+    "digest": (lambda run: changed_summary(run, digest="0" * 32), 1),
+    "a result": (lambda run: changed_summary(run, clearance=0.125), 1),
+    "a verdict": (lambda run: changed_summary(run, certified=None), 1),
+    "no configuration": (lambda run: shutil.rmtree(run.path), 2),
+}
+
+
+@pytest.mark.parametrize("what", DIFFERENCES)
+def test_the_exit_code_is_that_of_diff(
+    evoexp: Evoexp, pair: tuple[RunDirectory, Path], what: str
+) -> None:
+    """0: nothing differs, 1: something does, by itself; 2: they cannot be compared."""
+    run, archive = pair
+    change, code = DIFFERENCES[what]
+    change(run)
+    for words in ((run.hash12, str(archive)), (str(archive), run.hash12)):
+        assert evoexp("diff", *words).code == code
+
+
+def test_settings_alone_differ(evoexp: Evoexp, stored: Path) -> None:
+    """Both have no results here."""
+    assert evoexp("diff", "4da921", "4da921").code == 0
+    row = next(row for row in shipped() if row.condition_id[:6] != "4da921")
+    assert evoexp("diff", "4da921", row.condition_id[:12]).code == 1
 
 
 def test_settings_results_and_environment_are_named(evoexp: Evoexp, stored: Path) -> None:

@@ -1,12 +1,16 @@
 """`evoexp pack`, archives as words of `reproduce` and `report`, and `evoexp clean`."""
 
 import json
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from command_samples import Evoexp, content
 
-from evoexp.store.run_directory import find_runs
+from evoexp.store.archive import pack
+from evoexp.store.run_directory import RunDirectory, find_runs
+from forged_logs import Row, with_message
 
 
 @pytest.fixture
@@ -23,10 +27,123 @@ def test_an_archive_is_reproduced_and_reported_elsewhere(
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "elsewhere"))
     said = evoexp("reproduce", str(packed))
     assert said.code == 0 and "4 of 4 MATCH" in said.out
-    assert evoexp("verify").code == 0
+    assert "its logs were compared where they are; nothing was taken into" in said.out
+    assert not (tmp_path / "elsewhere").exists()
     said = evoexp("report", str(packed))
     assert said.code == 0
     assert list((tmp_path / "elsewhere" / "reports").glob("*/index.md"))
+
+
+def test_show_and_diff_look_into_an_archive(
+    evoexp: Evoexp, packed: Path, stored: Path, refused: Callable[..., str]
+) -> None:
+    one, two = find_runs(stored)[:2]
+    shutil.rmtree(stored)
+    said = evoexp("show", str(packed))
+    assert said.code == 0 and one.hash12 in said.out and two.hash12 in said.out
+    assert f"one run on a screen: evoexp show {packed}:" in said.out
+    for words in ((f"{packed}:{one.hash12[:6]}",), (f"{packed}:{one.hash12[:6]}", "--all")):
+        said = evoexp("show", *words)
+        assert said.code == 0 and said.out.startswith(f"condition    {one.condition_id}")
+        assert f"stored in {packed}".replace(" ", "") in "".join(said.out.split())
+    names = [each["condition"] for each in json.loads(evoexp("show", str(packed), "--json").out)]
+    assert sorted(names) == sorted([one.condition_id, two.condition_id])
+    assert evoexp("diff", f"{packed}:{one.hash12}", f"{packed}:{one.hash12}").code == 0
+    assert evoexp("diff", f"{packed}:{one.hash12}", f"{packed}:{two.hash12}").code == 1
+    assert f"choose one: {packed}:" in refused("diff", str(packed), f"{packed}:{one.hash12}")
+    assert "begins 0 (holds: " in refused("show", f"{packed}:ffff")
+    assert not stored.exists()
+
+
+def test_an_archive_is_compared_and_not_what_is_stored_already(
+    evoexp: Evoexp, stored: Path, tmp_path: Path
+) -> None:
+    """Its log would stay behind the stored one, which is whole."""
+    run = find_runs(stored)[0]
+    elsewhere = RunDirectory(tmp_path / "elsewhere", run.condition_id)
+    shutil.copytree(run.path, elsewhere.path)
+    log = elsewhere.log_path(1)
+    log.write_bytes(with_message(log.read_bytes(), "/generation", lower_mean))
+    pack([elsewhere], tmp_path / "forged.tar")
+    said = evoexp("reproduce", str(tmp_path / "forged.tar"))
+    assert said.code == 1 and "1 of 2 MATCH" in said.out
+    assert evoexp("reproduce", run.hash12).code == 0
+
+
+def lower_mean(row: Row) -> Row:
+    return row | {"mean_cost": row["mean_cost"] - 1.0}
+
+
+def with_manifest(run: RunDirectory, **entries: object) -> None:
+    path = run.path / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | entries))
+
+
+EVIL = "evoexp run experiment=x; rm -rf ~"
+
+
+def test_the_texts_of_an_archive_are_shown_as_its_own(
+    evoexp: Evoexp, stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = find_runs(stored)[0]
+    with_manifest(run, command=EVIL, label="[red]mine[/red]")
+    pack([run], tmp_path / "theirs.tar")
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "elsewhere"))
+    assert evoexp("report", str(tmp_path / "theirs.tar")).code == 0
+    said = evoexp("show", run.hash12)
+    assert "out of theirs.tar, according to which this is:" in said.out
+    assert "rm -rf" not in said.out and "[red]mine[/red]" in said.out
+    RunDirectory(tmp_path / "elsewhere", run.condition_id).log_path(1).write_bytes(b"")
+    for words in (("verify",), ("list",), ("show", run.hash12)):
+        said = evoexp(*words)
+        assert "rm -rf" not in said.out + said.err
+        assert "mend: evoexp run experiment=" in said.out or words != ("verify",)
+
+
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [
+        (EVIL, "evoexp run 'experiment=x;' rm -rf '~'"),
+        ("rm -rf ~", "evoexp run experiment=…"),
+        ("evoexp run 'experiment=x", "evoexp run experiment=…"),
+        ("evoexp run `id` $(id) | sh", "evoexp run '`id`' '$(id)' '|' sh"),
+        ("evoexp run x\nrm -rf ~", "evoexp run experiment=…"),
+        ("evoexp run x\x1b[2J", "evoexp run experiment=…"),
+        (["evoexp", "run"], "evoexp run experiment=…"),
+    ],
+)
+def test_a_command_of_a_manifest_is_one_command(stored: Path, command: object, shown: str) -> None:
+    run = find_runs(stored)[0]
+    with_manifest(run, command=command)
+    assert run.command == shown
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {"label": "a\nb"},
+        {"label": "a\x1b[31mb"},
+        {"label": "a\u202eb"},
+        {"experiment": 7},
+        {"options": ["a"]},
+        {"options": {"robot": "x"}},
+        {"options": {"robot": {"name": "x\n", "origin": "evoexp"}}},
+        {"options": {"robot": {"name": "../../x", "origin": "evoexp"}}},
+        {"options": {"/etc": {"name": "x", "origin": "evoexp"}}},
+        {"git": "main"},
+        {"versions": [1]},
+    ],
+)
+def test_a_manifest_of_other_kinds_is_damaged(
+    evoexp: Evoexp, stored: Path, entries: dict[str, object]
+) -> None:
+    run = find_runs(stored)[0]
+    with_manifest(run, **entries)
+    (problems,) = (r["problems"] for r in json.loads(evoexp("verify", run.hash12, "--json").out))
+    assert problems["manifest.json"].startswith("damaged: ")
+    for words in (("list",), ("show", run.hash12), ("report", run.hash12)):
+        said = evoexp(*words)
+        assert said.code == 0 and "Traceback" not in said.err and "\x1b" not in said.out
 
 
 def test_what_cannot_be_packed_is_refused(evoexp: Evoexp, stored: Path, tmp_path: Path) -> None:

@@ -212,3 +212,23 @@ def test_list_json_has_stable_keys(evoexp: Evoexp, stored: Path, tmp_path: Path)
     assert [list(each) for each in listed["runs"]] == [list(RUN_KEYS)] * 3
     assert [bool(each["damage"]) for each in listed["runs"]] == [True, False, False]
     assert listed["runs"][1]["done"] == 2
+
+
+UNFIT = {
+    "settings that do not fit": (*PLANAR, "planner.num_new_trajectories=1000"),
+    "a start in collision": (*PLANAR, "scenario.q_start=[[0,0],[180,0]]"),
+    "a robot that is not there": (*PLANAR, "robot=urdf", "robot.path=none.urdf"),
+}
+
+
+@pytest.mark.parametrize("more", [(), ("--json",), ("--only", "via-point GA"), ("--all",)])
+@pytest.mark.parametrize("what", UNFIT)
+def test_what_cannot_be_built_is_refused(
+    refused: Refused, what: str, more: tuple[str, ...]
+) -> None:
+    assert refused("show", *UNFIT[what], *more)
+
+
+def test_what_needs_an_extra_is_shown(evoexp: Evoexp, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(facts, "lacking", lambda config_json: "nsga2 needs pip install evoexp[…]")
+    assert evoexp("show", *UNFIT["settings that do not fit"]).code == 0

@@ -17,10 +17,12 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.commands import verify
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.store import log as log_module
 from evoexp.store import run_directory, summaries, verification
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
+from forged_logs import Row, with_message
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 
@@ -121,11 +123,14 @@ def test_every_damage_is_found_and_mended_by_the_command_it_names(
     assert expected[:30] in said.out
     assert said.out.count("mend: evoexp run experiment=") == 1
     assert content(stored) == before, "reads only"
-    (problem,) = [
+    problems = [
         f"{name}: {text}"
         for each in json.loads(evoexp("verify", run.hash12[:6], "--json").out)
         for name, text in each["problems"].items()
     ]
+    if fault == "another place":  # leaves its own empty
+        assert problems.pop(0).startswith("replicates: missing: 1 of 2 replicates")
+    (problem,) = problems
     assert problem.startswith(expected)
     if problem.endswith("; delete it, then run again"):
         (run.summary_path if fault == "an altered row" else run.log_path(1)).unlink()
@@ -139,6 +144,48 @@ def test_a_whole_store(evoexp: Evoexp, run: RunDirectory, stored: Path) -> None:
         assert (said.code, said.err) == (0, "")
         runs, logs = (3, 6) if not words else (1, 2)
         assert said.out == f"{runs} runs, {logs} logs: all is well\n"
+
+
+def test_a_log_that_is_gone_is_missed(evoexp: Evoexp, run: RunDirectory) -> None:
+    run.note_plan(3)
+    said = evoexp("verify", run.hash12)
+    assert said.code == 1
+    text = " ".join(said.out.replace("│", " ").split())
+    assert "missing: 2 of 3 replicates that were asked for (gone, or not run yet)" in text
+    assert "mend: evoexp run experiment=rana_planar" in text
+    run.write_failure(2, "no memory", "none")
+    assert evoexp("verify", run.hash12).code == 0, "a failure is known"
+    run.log_path(0).unlink()
+    with run.lock():
+        assert evoexp("verify", run.hash12).code == 0, "another process is writing it"
+    assert "missing: 0 of 3 replicates" in " ".join(evoexp("verify").out.split())
+
+
+def test_a_replaced_solution_is_named(evoexp: Evoexp, run: RunDirectory) -> None:
+    log = run.log_path(1)
+    log.write_bytes(with_message(log.read_bytes(), "/solution", moved))
+    said = evoexp("verify", run.hash12, "--json")
+    (checked,) = json.loads(said.out)
+    assert said.code == 1 and checked["unevaluated"] == ""
+    assert checked["problems"]["0001.mcap"].startswith("altered: solution of generation ")
+    assert checked["problems"]["0001.mcap"].endswith("; delete it, then run again")
+    said = evoexp("reproduce", run.hash12)
+    assert said.code == 1 and "values differs by" in " ".join(said.out.split())
+
+
+def moved(row: Row) -> Row:
+    row["values"][3] += 1e-3
+    return row
+
+
+def test_solutions_of_other_revisions_are_not_evaluated_and_no_damage(
+    evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ViaPointGa, "revision", ViaPointGa.revision + 1)
+    said = evoexp("verify", run.hash12)
+    assert said.code == 0
+    assert f"run {run.hash12}: its solutions were not evaluated: " in said.out
+    assert "was revision" in said.out and "all is well" in said.out
 
 
 def test_leftovers_are_named_and_no_damage(evoexp: Evoexp, run: RunDirectory) -> None:

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
-from evoexp.batch.reproduction import ELSEWHERE, OLDER, TIMES, compare
+from evoexp.batch.reproduction import ELSEWHERE, OLDER, compare
 from evoexp.cli import main
 from evoexp.configuration import compose
-from evoexp.records import ReplicateSummary
+from evoexp.records import TIMES, ReplicateSummary
 from evoexp.store import log as log_module
 from evoexp.store.log_reader import LogContents, read_log
 

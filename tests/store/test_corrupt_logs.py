@@ -5,10 +5,11 @@ import zlib
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
+from mcap.writer import CompressionType, IndexType, Writer
 from store_samples import CONDITION, CONFIG, generations, summary, write
 
 from evoexp.errors import CorruptLog
@@ -69,9 +70,18 @@ def test_something_else(reader: Reader, content: bytes) -> None:
     refusal(reader, content[: len(content) // 2] + bytes(len(content) // 2))
 
 
-def foreign(checksums: bool) -> bytes:
+NO_SUMMARY = {
+    "index_types": IndexType.NONE,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
+
+
+def foreign(checksums: bool, **options: Any) -> bytes:
     buffer = BytesIO()
-    writer = Writer(buffer, enable_data_crcs=checksums)
+    writer = Writer(buffer, enable_data_crcs=checksums, **options)
     writer.start()
     channel = writer.register_channel(
         "/generation", "json", writer.register_schema("other", "jsonschema", b"{}")
@@ -84,7 +94,9 @@ def foreign(checksums: bool) -> bytes:
 @pytest.mark.parametrize("reader", READERS)
 def test_foreign_mcap(reader: Reader) -> None:
     assert "evoexp.run" in refusal(reader, foreign(checksums=True))
-    assert "not a log of evoexp" in refusal(reader, foreign(checksums=False))
+    for options in ({}, NO_SUMMARY, {"compression": CompressionType.LZ4}, {"use_chunking": False}):
+        text = refusal(reader, foreign(checksums=False, **options))
+        assert text.endswith("not a log of evoexp: an MCAP of another program")
 
 
 def test_the_file_is_named(tmp_path: Path, content: bytes) -> None:

@@ -127,6 +127,11 @@ def drawn_globally(generation: Generation) -> Generation:
             "evaluate must name every recorded term of a solution; was without beauty",
         ),
         (
+            "terms_agree_with_evaluate",
+            lambda g: g._replace(best_cost=g.best_cost + 1.0),
+            "cost_of_terms must give the recorded cost of the best solution, ",
+        ),
+        (
             "randomness_comes_from_the_given_generator",
             drawn_globally,
             "random numbers must come from rng, never from a global generator",

@@ -19,7 +19,7 @@ from evoexp.batch.memory_limit import machine_memory, refuse_large
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, MissingDistribution
-from evoexp.records import GenerationRow, ReplicateSummary, flatten
+from evoexp.records import TIMES, GenerationRow, ReplicateSummary, flatten
 from evoexp.registry import missing
 from evoexp.store.damage import reason
 from evoexp.store.digests import array_bytes
@@ -28,7 +28,6 @@ from evoexp.store.log_reader import LogContents, decode_array, read_log
 from evoexp.store.manifest import differences
 
 TOLERANCE = 1e-9  # [-] by which numbers may differ: of their size, or absolutely if it is below 1
-TIMES = ("certificate_s", "cpu_s", "wall_s")
 ELSEWHERE = "in another environment"
 OLDER = "the log is older than exact boxes"
 _CHAINED = ("digest", "chain")  # compared as the search

@@ -15,14 +15,14 @@ from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.errors import AmbiguousHash, UnknownHash
+from evoexp.records import TIMES
 from evoexp.store.identity import TAKEN
 from evoexp.store.manifest import differences
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.summaries import summary_table
 
 ABSENT = "–"
-TIMES = ("cpu_s",)
-QUANTITIES = ("best_cost", "evaluations", "collision_queries", "clearance", *TIMES)
+QUANTITIES = ("best_cost", "evaluations", "collision_queries", "clearance", "cpu_s")
 ORIGIN = ("condition", "experiment", "label", "budget", "options", "command", "git", TAKEN)
 KEYS = ("a", "b", "settings", "environment", "results", "same_replicates")
 
@@ -67,7 +67,7 @@ def main(arguments: argparse.Namespace) -> int:
     environment = _environment(one, two)
     results = list(_results(one, two))
     common = sorted(one.rows.keys() & two.rows.keys())
-    same = [k for k in common if one.rows[k]["digest"] == two.rows[k]["digest"]]
+    same = [k for k in common if _measured(one.rows[k]) == _measured(two.rows[k])]
     if arguments.json:
         values = (one.condition_id, two.condition_id, settings, environment, results, same)
         print_json(dict(zip(KEYS, values, strict=True)))
@@ -83,9 +83,8 @@ def main(arguments: argparse.Namespace) -> int:
                 f"{len(same)} of {len(common)} common replicates are the same, bit for bit",
                 soft_wrap=True,
             )
-    measured = [each for each in results if each[0] not in TIMES and repr(each[1]) != repr(each[2])]
     other = len(same) < len(common) or one.rows.keys() != two.rows.keys()
-    return 1 if settings or environment or measured or other else 0
+    return 1 if settings or environment or other else 0
 
 
 def changed(one: Any, two: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
@@ -142,6 +141,11 @@ def _side(prefix: str) -> Side:
 
 def _stored(run: RunDirectory) -> Side:
     return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), _rows(run))
+
+
+def _measured(row: Mapping[str, Any]) -> str:
+    """Return a replicate's row as text, to the last bit; without condition and times."""
+    return repr({k: v for k, v in row.items() if k not in (*TIMES, "condition") and v is not None})
 
 
 def _rows(run: RunDirectory) -> dict[int, dict[str, Any]]:

@@ -184,10 +184,12 @@ class _Arrival:
         """Return somebody's manifest with the name of the archive that it comes from."""
         try:
             notes: Any = json.loads(manifest)
-            marked = dict(notes) | {TAKEN: self._path.name.encode("unicode_escape").decode()}
-        except (ValueError, TypeError, RecursionError):
+        except (ValueError, RecursionError):
+            notes = None
+        if not isinstance(notes, dict):
             text = f"{MANIFEST} of run {self.run.hash12} is no JSON object"
-            raise ArchiveError(f"{_shown(self._path)}: damaged: {text}") from None
+            raise ArchiveError(f"{_shown(self._path)}: damaged: {text}")
+        marked = notes | {TAKEN: printable(self._path.name.replace("\n", " "))}
         return json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
 
     def add(self, replicate: int, content: bytes) -> None:

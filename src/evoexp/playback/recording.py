@@ -142,10 +142,7 @@ def record(
 
 
 def record_motion(
-    condition: Condition,
-    motion: Motion | None,
-    heading: Heading,
-    limits: SpeedLimits | None = None,
+    condition: Condition, motion: Motion | None, heading: Heading, limits: SpeedLimits | None = None
 ) -> Recording:
     """Return the recording of a motion among the bodies of a condition.
 

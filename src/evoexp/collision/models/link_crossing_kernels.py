@@ -42,6 +42,7 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
 Point = tuple[float, float]
+Members = tuple[Point, FloatArray, Table, IntArray]  # base, points, table and some individuals
 
 MOST_CONFIGURATIONS = 32767  # both counters of a pair share an int32, and counts are int16
 
@@ -212,26 +213,21 @@ def colliding(
 
 @kernel
 def _count_rows(
-    base_1: Point,
-    points_1: FloatArray,
-    table_1: Table,
-    rows: IntArray,
-    base_2: Point,
-    points_2: FloatArray,
-    table_2: Table,
-    columns: IntArray,
+    first: Members,
+    second: Members,
     tau: np.float32,
     tolerance: float,
     counts: NDArray[np.int16],
 ) -> None:
     """Fill counts[rows, columns] from the tables of all of population 1 and of the columns."""
+    (base_1, points_1, table_1, rows), (base_2, points_2, table_2, columns) = first, second
     one, two = borrowed((table_1, table_2))
     size, num_columns = points_1.shape[0] * LANES, len(columns)
     width = (num_columns + LANES - 1) // LANES * LANES
     most, found = np.empty(size), np.empty(2 * LANES * width, dtype=np.float32)
     # eight rows by eight columns at a time
-    for first in range(0, len(rows), LANES):
-        group = rows[first : first + LANES]
+    for place in range(0, len(rows), LANES):
+        group = rows[place : place + LANES]
         farthest_of(one[1], group, size, most)
         for n in range(len(found)):
             found[U(n)] = np.float32(0.0)
@@ -317,26 +313,10 @@ def crossings(
     one, two = new_table(num_1, num, num_1 + LANES), new_table(num_2, num, num_2 // LANES + 1)
     fill_table(points_1, base_1, base_2, np.arange(num_1), scale, True, margin, one)
     # changed rows against all columns, then the other rows against changed columns
-    if len(rows) > 0:
-        everyone = np.arange(num_2)
-        fill_table(points_2, base_2, base_1, everyone, scale, False, margin, two)
-        _count_rows(
-            base_1, points_1, one, rows, base_2, points_2, two, everyone, tau, tolerance, counts
-        )
-    if len(columns) > 0 and len(other_rows) > 0:
-        fill_table(points_2, base_2, base_1, columns, scale, False, margin, two)
-        _count_rows(
-            base_1,
-            points_1,
-            one,
-            other_rows,
-            base_2,
-            points_2,
-            two,
-            columns,
-            tau,
-            tolerance,
-            counts,
-        )
+    for some_rows, some in ((rows, np.arange(num_2)), (other_rows, columns)):
+        if len(some_rows) > 0 and len(some) > 0:
+            fill_table(points_2, base_2, base_1, some, scale, False, margin, two)
+            first, second = (base_1, points_1, one, some_rows), (base_2, points_2, two, some)
+            _count_rows(first, second, tau, tolerance, counts)
     sum_counts(counts, sums_1, sums_2)
     return True

@@ -7,6 +7,7 @@ import pytest
 
 from confinement import confined, no_longer
 from evoexp.configuration import expansions
+from evoexp.configuration.option_files import check_file
 from evoexp.configuration.search_path import searched_first
 from evoexp.errors import EvoexpError
 
@@ -66,6 +67,16 @@ def test_an_option_that_harms_is_refused(
     assert reason in found
     assert "hush" not in found
     assert not (tmp_path / "harm").exists()
+
+
+def test_an_alias_counts_as_what_it_names_alone(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    many = f"x: [{', '.join('1' * 20_000)}]\n"
+    path.write_text(f"{many}a: &a [1, 2]\nb: [*a, *a, *a, *a, *a]\n")
+    check_file(path)
+    path.write_text(f"a: &a [{', '.join('1' * 20_000)}]\nb: [*a, *a, *a, *a, *a]\n")
+    with pytest.raises(EvoexpError, match="at most 100,000 values, aliases unfolded"):
+        check_file(path)
 
 
 def test_nothing_of_the_environment_enters_by_an_override(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -124,6 +124,17 @@ def test_the_study_reads_no_log(outputs: Path, monkeypatch: pytest.MonkeyPatch) 
         drawing.table()
 
 
+def test_a_way_through_subgoals_has_phases_and_is_no_manoeuvre(outputs: Path) -> None:
+    results = smoke_results(outputs, "corsepius_wall")
+    found = page_of(results, page_settings("corsepius_wall"))
+    stems = {drawing.stem for drawing in found.drawings}
+    assert "phases" in stems
+    assert not any(stem.startswith("manoeuvre") for stem in stems)
+    two = results._replace(conditions=results.main[:2])  # enough to be compared
+    swept = page_of(two, page_settings("corsepius_wall", "corsepius_sweep"))
+    assert "effects" in {drawing.stem for drawing in swept.drawings}
+
+
 def test_other_planners_get_the_generic_page(results: Results) -> None:
     for name in ("corsepius", "corsepius_population", "corsepius_sweep"):
         found = page_of(results, ReportSettings(**REPORT | {"figures": name}))  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
-from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
+from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa, sampled
 from evoexp.robots.arms import Arms
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.arm_motion import ArmMotion
@@ -121,6 +121,14 @@ def six_axes(base: tuple[float, float, float]) -> SerialChain:
         for axis, offset in zip(axes, offsets, strict=True)
     )
     return SerialChain(joints=joints, tip=(0.2, 0.0, 0.0), base_position=base)
+
+
+def test_samples_of_a_string_are_its_segments_via_points_included() -> None:
+    strings = np.random.default_rng(0).normal(size=(3, 6))
+    instants = np.linspace(0.0, 5.0, 21)
+    expected = [np.interp(instants, np.arange(6.0), row) for row in strings]
+    np.testing.assert_allclose(sampled(strings, 4), expected, rtol=0.0, atol=1e-14)
+    np.testing.assert_array_equal(sampled(strings, 4)[:, ::4], strings)
 
 
 def test_two_arms_of_six_joints_are_planned_by_the_same_planner() -> None:

@@ -126,6 +126,13 @@ def test_distances_are_those_of_pinocchio(shown: Recording) -> None:
         assert shown.clearance.least[k] == pytest.approx(max(truth, 0.0), abs=1e-5)
 
 
+@pytest.mark.parametrize("name", ["mission", "placement"])
+def test_the_tool_ends_at_the_marked_target(name: str) -> None:
+    shown = recording(name)
+    (target,), (way,) = shown.targets, shown.traces
+    np.testing.assert_allclose(way[-1], target.point, atol=1e-9)
+
+
 def test_all_contacts_are_found_and_match_a_brute_force() -> None:
     shown = refuted()
     contacts = shown.clearance.contacts

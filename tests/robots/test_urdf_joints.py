@@ -359,3 +359,57 @@ def test_by_the_command_line() -> None:
     )
     (condition,) = conditions(*words).values()
     assert condition.robot.canonical()["fixed"] == [["left_finger", 0.02]]
+
+
+CHAIN = (
+    '<robot name="x"><link name="l0"/>{joints}<link name="l4"><collision><geometry>'
+    '<sphere radius="0.1"/></geometry></collision></link></robot>'
+)
+# each follows the one before: multiplier, offset [rad]
+RULES = {"j2": ("j1", 2.0, 0.3), "j3": ("j2", -0.5, 0.7), "j4": ("j3", 1.5, -0.2)}
+
+
+def chain(path: Path, *, follow: bool) -> Urdf:
+    """Write an arm whose joints follow one another, or are all free."""
+    joints = ""
+    for k in range(1, 5):
+        source, multiplier, offset = RULES.get(f"j{k}", ("", 0.0, 0.0))
+        rule = f'<mimic joint="{source}" multiplier="{multiplier}" offset="{offset}"/>'
+        joints += (
+            f'<joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
+            f'<origin xyz="0.3 0 0.1"/><axis xyz="0 {k % 2} {1 - k % 2}"/>'
+            f'<limit lower="-3" upper="3"/>{rule if follow and source else ""}</joint>'
+        )
+        joints += f'<link name="l{k}"/>' if k < 4 else ""
+    path.write_text(CHAIN.format(joints=joints))
+    return Urdf.model_validate(Urdf.read_files({"path": str(path)}, "robot"), strict=False)
+
+
+@pytest.mark.parametrize("standing", [False, True], ids=["moving", "standing"])
+def test_offsets_go_through_chains_of_followers(tmp_path: Path, standing: bool) -> None:
+    """Against the same arm with four free joints, whose values follow the rules one by one."""
+    followers = chain(tmp_path / "follow.urdf", follow=True)
+    free = chain(tmp_path / "free.urdf", follow=False).build()
+    for lead in (-0.6, 0.0, 0.45):
+        values = {"j1": lead}
+        for name, (source, multiplier, offset) in RULES.items():
+            values[name] = multiplier * values[source] + offset
+        expected = placements(free, np.array([values[f"j{k}"] for k in range(1, 5)]))[1][0]
+        if standing:  # a joint before the chain moves, the chain stands
+            text = (tmp_path / "follow.urdf").read_text()
+            turn = (
+                '<link name="ground"/><joint name="j0" type="continuous"><parent link="ground"/>'
+                '<child link="l0"/></joint></robot>'
+            )
+            (tmp_path / "still.urdf").write_text(text.replace("</robot>", turn))
+            fixed = {"j1": lead / DEGREE}
+            settings = {"path": str(tmp_path / "still.urdf"), "joints": ["j0"], "fixed": fixed}
+            followers = Urdf.model_validate(Urdf.read_files(settings, "robot"), strict=False)
+        assembly, q = followers.build(), np.array([0.0 if standing else lead])
+        placed = placements(assembly, q)[1][0]
+        assert np.abs(placed.homogeneous - expected.homogeneous).max() < 1e-12
+        if not standing:
+            origins = forward_kinematics(assembly.table, q[:, None])[1]
+            whole = placements(free, np.array([values[f"j{k}"] for k in range(1, 5)]))[0]
+            for joint in range(1, 5):
+                assert np.abs(origins[joint - 1, :, 0] - whole[joint].translation).max() < 1e-12

@@ -26,6 +26,14 @@ NOT_FINITE = {
     ".dae": re.compile(rb"<float_array[^>]*>[^<]*?(?<![a-z])(?:nan|inf)", re.IGNORECASE),
     ".ply": re.compile(rb"^[-+\d.e \t]*[-+\s](?:nan|inf)", re.IGNORECASE | re.MULTILINE),
 }
+# in an OBJ: several materials; lines that are indented, in capitals or continued, which are lost
+PECULIAR = re.compile(
+    rb"\busemtl\b.*\n(?s:.*)\busemtl\b|^[ \t]+[fv][ \t]|^[FV][ \t]|\\\r?$", re.MULTILINE
+)
+# of a DAE: two of these are one list of triangles, and its instance
+DAE_PARTS = re.compile(
+    rb"<(?:triangles|polylist|polygons|tristrips|trifans|instance_geometry|instance_node)\b"
+)
 DAE_UNIT = re.compile(rb"<unit\s[^>]*\bmeter\s*=\s*[\"']([^\"']*)")
 
 
@@ -43,14 +51,29 @@ def whole_mesh(content: bytes, name: str, field: str) -> bytes:
     """
     ending = Path(name).suffix.lower()
     reason = stand_in(content) or _damage(content, ending)
-    if not reason and _has_parts(content, ending) and unused_vertices(load(content, ending, name)):
+    if not reason and ending == ".obj" and PECULIAR.search(content):
+        plain = _one_part(content)
+        content = content if _same(content, plain, name, field) else plain
+    if not reason and ending == ".dae" and _is_joined_wrongly(content, name, field):
         reason = "parts whose triangles coal joins to other vertices (save it as one mesh, an STL)"
-        if ending == ".obj":
-            content = _one_part(content)
-            reason = reason if unused_vertices(load(content, ending, name)) else ""
     if reason:
         raise SettingError(field, "a URDF whose meshes can be read", f"'{name}': {reason}")
     return content
+
+
+def _is_joined_wrongly(content: bytes, name: str, field: str) -> bool:
+    """Whether a DAE has several parts, and coal reads them wrongly."""
+    several = len(DAE_PARTS.findall(content)) > 2
+    return several and unused_vertices(load(content, ".dae", name, field)) > 0
+
+
+def _same(content: bytes, plain: bytes, name: str, field: str) -> bool:
+    """Whether coal reads as much of an OBJ as of its vertices and faces alone."""
+    try:
+        mesh, other = (load(text, ".obj", name, field) for text in (content, plain))
+    except SettingError:
+        return False
+    return not unused_vertices(mesh) and mesh.num_tris == other.num_tris
 
 
 def load(content: bytes, ending: str, name: str, field: str = "robot.path") -> Any:
@@ -108,24 +131,16 @@ def _damage(content: bytes, ending: str) -> str:
             return f"its header tells {count} triangles, {follow}" if rest >= 0 else "no STL"
         if not re.search(rb"\bfacet\b", content):
             return "no triangles"
-    if ending == ".obj" and not re.search(rb"^\s*f\s", content, re.MULTILINE):
+    if ending == ".obj" and not re.search(rb"^\s*[fF]\s", content, re.MULTILINE):
         return "no triangles"
     return "a vertex that is no finite number" if NOT_FINITE[ending].search(content) else ""
-
-
-def _has_parts(content: bytes, ending: str) -> bool:
-    """Whether a file may have parts that coal joins wrongly."""
-    if ending == ".obj":
-        return content.count(b"usemtl") > 1
-    pattern = rb"<(?:triangles|polylist|polygons|tristrips|trifans|instance_geometry|instance_node)"
-    return ending == ".dae" and len(re.findall(pattern + rb"\b", content)) > 2
 
 
 def _one_part(content: bytes) -> bytes:
     """Leave the vertices of an OBJ file and its faces, without materials, objects and normals."""
     lines = []
-    for line in content.replace(b"\\\n", b" ").splitlines():
-        kind, *words = line.split() or [b""]
+    for line in re.sub(rb"\\\r?\n", b" ", content).splitlines():
+        kind, *words = line.lower().split() or [b""]
         if kind == b"v":
             lines.append(b" ".join([kind, *words[:3]]))
         elif kind == b"f":

@@ -24,7 +24,7 @@ class BodyText(NamedTuple):
 
     def __str__(self) -> str:
         """Name the body in a message."""
-        return " ".join([self.kind, self.mesh, *(f"{size:g}" for size in self.sizes)])
+        return " ".join(filter(None, [self.kind, self.mesh, *(f"{size:g}" for size in self.sizes)]))
 
 
 def body_texts(root: Any) -> dict[str, list[BodyText]]:

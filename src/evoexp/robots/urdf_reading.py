@@ -208,10 +208,9 @@ class _Reader:
 
     def _numbers(self, tag: str, name: str, text: str, where: str) -> str:
         """Check the numbers of an attribute and write them anew."""
-        words, count = text.split(), ATTRIBUTES[tag][name]
-        was = f'<{tag} {name}="{text[:60]}"/>'
+        words, count, here = text.split(), ATTRIBUTES[tag][name], f"as {name} of <{tag}>"
         if len(words) != count:
-            self._refuse(WORDS[count], where, was)
+            self._refuse(f"{WORDS[count]} {here}", where, text[:60])
         values = []
         for word in words:
             if name in UNBOUNDED and INFINITE.fullmatch(word):
@@ -219,12 +218,12 @@ class _Reader:
                 continue
             value = float(word) if NUMBER.fullmatch(word) else np.nan
             if not abs(value) <= LARGEST and not (name in UNBOUNDED and abs(value) > LARGEST):
-                self._refuse(f"finite numbers, at most {LARGEST:g}", where, was)
+                self._refuse(f"finite numbers, at most {LARGEST:g}, {here}", where, text[:60])
             values.append(value)
         if name in POSITIVE and min(values) <= 0.0:
-            self._refuse("numbers greater than 0", where, was)
+            self._refuse(f"numbers greater than 0 {here}", where, text[:60])
         if name == "scale" and 0.0 in values:
-            self._refuse("numbers other than 0", where, was)
+            self._refuse(f"numbers other than 0 {here}", where, text[:60])
         return " ".join(map(repr, values))
 
     def _refuse(self, must: str, where: str, was: str, hint: str = "") -> None:
@@ -252,7 +251,6 @@ def _check_joint(joint: Any, field: str) -> None:
         lower, upper = (float(limit.get(side, "0")) for side in ("lower", "upper"))
         if lower > upper:
             must = "a URDF whose lower limits do not exceed the upper ones"
-            absent = (
-                "" if len(limit.keys() & {"lower", "upper"}) == 2 else " (an absent limit is 0)"
-            )
+            is_whole = {"lower", "upper"} <= set(limit.keys())
+            absent = "" if is_whole else " (an absent limit is 0)"
             raise SettingError(field, must, f"joint '{name}': {lower:g} to {upper:g}{absent}")

@@ -1,0 +1,224 @@
+"""A URDF says nothing that is passed over: it is read as it stands, or refused by link or joint."""
+
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pytest
+
+from evoexp.errors import SettingError
+from evoexp.robots.urdf import Urdf
+
+BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def arm(
+    body: str = BOX, limit: str = LIMIT, more: str = "", head: str = "", joint: str = ""
+) -> str:
+    """Write an arm of one joint, whose second link holds a body."""
+    return (
+        f'<robot name="r"{head}><link name="a">{BOX}</link><link name="b">{body}</link>'
+        f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{joint}'
+        f'<axis xyz="0 0 1"/>{limit}</joint>{more}</robot>'
+    )
+
+
+def collision(shape: str, origin: str = "") -> str:
+    return f"<collision>{origin}<geometry>{shape}</geometry></collision>"
+
+
+def robot(folder: Path, text: str, **settings: Any) -> Urdf:
+    (folder / "r.urdf").write_text(text)
+    found = Urdf.read_files({"path": str(folder / "r.urdf"), **settings}, "robot")
+    return Urdf.model_validate(found, strict=False)
+
+
+def bodies(folder: Path, text: str) -> dict[str, Any]:
+    return {item.name: item for item in robot(folder, text).build().geometry.geometryObjects}
+
+
+SHAPES = "one of box, sphere, cylinder, capsule, mesh in a <geometry>"
+REFUSED = {
+    "an unknown shape": (collision('<ellipsoid radii="1 1 2"/>') + BOX, SHAPES),
+    "no shape": (collision("") + BOX, SHAPES),
+    "two shapes": (collision('<sphere radius="1"/><box size="1 1 1"/>'), SHAPES),
+    "a shape twice": (collision('<sphere radius="1"/><sphere radius="1"/>'), "one <sphere>"),
+    "no geometry": (f"<collision/>{BOX}", "a <geometry> in a <collision>"),
+    "two geometries": (BOX.replace("</coll", "<geometry/></coll"), "one of box"),
+    "a position of two": (collision('<box size="1 1 1"/>', '<origin xyz="1 0"/>'), "three numbers"),
+    "an angle of two": (collision('<box size="1 1 1"/>', '<origin rpy="1 0"/>'), "three numbers"),
+    "a position of none": (collision('<box size="1 1 1"/>', '<origin xyz=""/>'), "three numbers"),
+    "two origins": (collision('<box size="1 1 1"/>', "<origin/><origin/>"), "one <origin>"),
+    "an attribute misspelt": (collision('<box size="1 1 1"/>', '<origin xzy="1 0 0"/>'), "'xyz'?"),
+    "an element misspelt": (collision('<box size="1 1 1"/>', "<orgin/>"), "did you mean 'origin'?"),
+    "a collision misspelt": (BOX.replace("collision", "Collision"), "did you mean 'collision'?"),
+    "a quaternion": (collision('<box size="1 1 1"/>', '<origin quat_xyzw="0 0 0 1"/>'), "rpy in"),
+    "NaN": (collision('<box size="1 1 1"/>', '<origin xyz="nan 0 0"/>'), "finite numbers"),
+    "infinity": (collision('<sphere radius="inf"/>'), "finite numbers"),
+    "a large number": (collision('<sphere radius="1e9"/>'), "finite numbers, at most 1e+07"),
+    "a unit": (collision('<sphere radius="0.1m"/>'), "finite numbers"),
+    "a decimal comma": (collision('<sphere radius="0,1"/>'), "finite numbers"),
+    "an underscore": (collision('<sphere radius="1_0"/>'), "finite numbers"),
+    "a hexadecimal": (collision('<sphere radius="0x1"/>'), "finite numbers"),
+    "a negative radius": (collision('<sphere radius="-1"/>'), "numbers greater than 0"),
+    "a radius of 0": (collision('<sphere radius="0"/>'), "numbers greater than 0"),
+    "a flat box": (collision('<box size="1 1 0"/>'), "numbers greater than 0"),
+    "a short capsule": (collision('<capsule radius="1" length="0"/>'), "numbers greater than 0"),
+    "no radius": (collision("<sphere/>"), "radius in a <sphere>"),
+    "no length": (collision('<cylinder radius="1"/>'), "length in a <cylinder>"),
+    "no size": (collision("<box/>"), "size in a <box>"),
+    "no name of a mesh": (collision("<mesh/>"), "filename in a <mesh>"),
+    "a scale of one": (collision('<mesh filename="a.obj" scale="0.001"/>'), "three numbers"),
+    "a scale of 0": (collision('<mesh filename="a.obj" scale="1 0 1"/>'), "numbers other than 0"),
+    "a scale of NaN": (collision('<mesh filename="a.obj" scale="1 nan 1"/>'), "finite numbers"),
+    "a body in a visual": (f"<visual>{BOX}</visual>", "each <collision> in a <link>"),
+    "a body in a body": (BOX.replace("<geo", "<collision/><geo"), "each <collision> in a <link>"),
+}
+
+
+@pytest.mark.parametrize(("body", "must"), REFUSED.values(), ids=REFUSED.keys())
+def test_a_body_that_cannot_be_is_refused_by_its_link(
+    tmp_path: Path, body: str, must: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SettingError) as refusal:
+        robot(tmp_path, arm(body))
+    text = str(refusal.value)
+    assert must in text and "link 'b'" in text and str(tmp_path / "r.urdf") in text
+    assert "\n" not in text and not capfd.readouterr().err
+
+
+TAKEN = {
+    "spaces and line ends": collision('<box size=" 0.1\n 0.2\t0.3 "/>'),
+    "exponents": collision('<box size="1e-1 +.2 3.E-1"/>'),
+    "an empty origin": collision('<box size="0.1 0.2 0.3"/>', "<origin/>"),
+    "an inertia without mass": f"<inertial><origin/></inertial>{BOX}",
+    "an inertia of NaN": f'<inertial><mass value="nan"/><inertia ixx="nan"/></inertial>{BOX}',
+    "a visual that cannot be": f'<visual><origin xyz="1"/><geometry/></visual>{BOX}',
+    "an unknown material": f'<visual><material name="none"/></visual>{BOX}',
+    "elements of others": f"<sensor/>{BOX.replace('<geo', '<drake:proximity_properties/><geo')}",
+}
+
+
+@pytest.mark.parametrize("body", TAKEN.values(), ids=TAKEN.keys())
+def test_a_body_is_built_whatever_stands_beside_it(
+    tmp_path: Path, body: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    found = bodies(tmp_path, arm(body))
+    assert list(found) == ["a", "b"]
+    assert np.array_equal(2.0 * found["b"].geometry.halfSide, [0.1, 0.2, 0.3])
+    assert not capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ['<capsule radius="0.05" length="0.3"/>', '<drake:capsule length="0.3" radius="0.05"/>'],
+)
+def test_a_capsule_is_one(tmp_path: Path, shape: str) -> None:
+    found = bodies(tmp_path, arm(collision(shape, '<origin xyz="0.5 0 0" rpy="0 1.5 0"/>') + BOX))
+    capsule = found["b_0"]
+    assert isinstance(capsule.geometry, coal.Capsule)
+    assert (capsule.geometry.radius, 2.0 * capsule.geometry.halfLength) == (0.05, 0.3)
+    assert capsule.placement.translation == pytest.approx([0.5, 0.0, 0.0])
+    assert np.array_equal(2.0 * found["b_1"].geometry.halfSide, [0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        arm(head=' xmlns="http://drake.mit.edu"'),
+        arm(more='<gazebo><controller:x name="y"/></gazebo>'),
+        arm(more='<gazebo reference="b"><collision>b</collision></gazebo><transmission/>'),
+        arm(head=' version="2.7" xmlns:xacro="http://www.ros.org/wiki/xacro"'),
+        "\ufeff" + arm(),
+    ],
+    ids=["default namespace", "unbound prefix", "elements of Gazebo", "version", "byte order mark"],
+)
+def test_namespaces_and_elements_of_others_are_no_matter(tmp_path: Path, text: str) -> None:
+    assert list(bodies(tmp_path, text)) == ["a", "b"]
+
+
+LINK = '<link name="c"/>'
+
+
+def join(name: str, parent: str, child: str, kind: str = "fixed") -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        "</joint>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (arm(more='<link name="b"/>'), "links have different names, was \"two links 'b'\""),
+        (arm(more=LINK + join("j", "b", "c")), "was \"two joints 'j'\""),
+        (arm(more=LINK), "one tree of links, was '2 roots: a, c'"),
+        (arm(more=join("k", "b", "a")), "links form a tree, was 'a loop: a → b → a'"),
+        (arm(more=LINK + join("k", "c", "c")), "was 'a loop: c → c'"),
+        (arm(more=LINK + join("k", "a", "c") + join("l", "b", "c")), "'c' on joints 'k' and 'l'"),
+        (arm(more=join("k", "b", "bb")), "the links of joint 'k', was \"without 'bb'\"; did you"),
+        (arm(more='<joint name="k" type="fixed"/>'), "have a <parent>, was \"joint 'k' without"),
+        (arm(more="<link/>"), "name in a <link>"),
+        (arm(more=collision("<sphere/>")), "each <collision> in a <link>, was 'one in a <robot>'"),
+        (arm(body=LINK), "each <link> in a <robot>, was \"link 'b': one in a <link>"),
+        (arm(joint='<origin xyz="0 1"/>'), "three numbers as xyz of <origin>, was \"joint 'j'"),
+        (arm(joint='<mimic multiplier="2"/>'), "joint in a <mimic>"),
+        (arm(more='<xacro:property name="l"/>'), "FILE > robot.urdf), was '<xacro:property>'"),
+        (arm(collision('<sphere radius="${r}"/>')), "(xacro FILE > robot.urdf), was '<sphere rad"),
+        (arm(collision('<mesh filename="$(find x)/a.obj"/>')), "(xacro FILE > robot.urdf)"),
+        ("<!doctype html><html></html>", "was \"an HTML page in the file's place"),
+        ("version https://git-lfs.github.com/spec/v1\n", "was \"a Git-LFS pointer in the file's"),
+        ("", "was 'an empty file'"),
+        (arm(limit='<limit lower="1" upper="-1"/>'), "was \"joint 'j': 1 to -1\""),
+        (arm(limit='<limit upper="-1"/>'), "was \"joint 'j': 0 to -1 (an absent limit is 0)\""),
+        (arm(limit='<limit lower="nan" upper="1"/>'), "finite numbers"),
+        (arm(limit='<limit lower="-1 0" upper="1"/>'), "one number"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_file_is_told_with_its_name(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    with pytest.raises(SettingError) as refusal:
+        robot(tmp_path, text)
+    told = str(refusal.value)
+    assert message in told and str(tmp_path / "r.urdf") in told and "\n" not in told
+
+
+def test_a_joint_without_room_names_the_setting_of_a_limit(tmp_path: Path) -> None:
+    locked = robot(tmp_path, arm(limit='<limit lower="0" upper="0" velocity="1"/>'))
+    with pytest.raises(SettingError, match=r"joint 'j': 0 to 0.*robot\.turn_limit"):
+        locked.build()
+    turn = '<link name="c"/>' + join("k", "b", "c", "continuous")
+    still = robot(tmp_path, arm(limit='<limit upper="0"/>', more=turn), joints=["k"])
+    assert still.build().model.nq == 1
+    sliding = arm(limit="<limit upper='0'/>").replace("revolute", "prismatic")
+    with pytest.raises(SettingError, match=r"robot\.slide_limit"):
+        robot(tmp_path, sliding).build()
+
+
+@pytest.mark.parametrize(
+    ("limit", "low", "high"),
+    [("", -90.0, 90.0), ('<limit lower="-inf" upper="1e9" velocity="inf"/>', -90.0, 90.0)],
+)
+def test_limits_that_are_none_are_the_setting(
+    tmp_path: Path, limit: str, low: float, high: float
+) -> None:
+    model = robot(tmp_path, arm(limit=limit), turn_limit=90.0).build().model
+    assert np.degrees(model.lowerPositionLimit) == pytest.approx([low])
+    assert np.degrees(model.upperPositionLimit) == pytest.approx([high])
+    assert np.isinf(model.velocityLimit).all()
+
+
+def test_notes_name_links_without_a_body_and_limits_that_are_not_given(tmp_path: Path) -> None:
+    tool = '<link name="tool"/>' + join("k", "b", "tool")
+    note = "links that move and have no body: tool"
+    assert robot(tmp_path, arm(more=tool)).notes() == [note]
+    assert robot(tmp_path, arm(more='<link name="s"/>' + join("k", "a", "s"))).notes() == []
+    (low,) = robot(tmp_path, arm(limit='<limit upper="1"/>')).notes()
+    assert low == "joint 'j': the URDF gives no lower limit, which counts as 0"
+    (none,) = robot(tmp_path, arm(limit="<limit effort='1'/>"), turn_limit=90.0).notes()
+    assert "'j': the URDF gives no limits; robot.turn_limit holds, 90 deg" in none
+    free = robot(tmp_path, arm(body="", more=tool), base="planar").notes()
+    assert free == ["links that move and have no body: b, tool"]

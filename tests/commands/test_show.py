@@ -214,10 +214,11 @@ def test_list_json_has_stable_keys(evoexp: Evoexp, stored: Path, tmp_path: Path)
     assert listed["runs"][1]["done"] == 2
 
 
+SMOKE = ("experiment=rana_planar", "budget=smoke")
 UNFIT = {
-    "settings that do not fit": (*PLANAR, "planner.num_new_trajectories=1000"),
-    "a start in collision": (*PLANAR, "scenario.q_start=[[0,0],[180,0]]"),
-    "a robot that is not there": (*PLANAR, "robot=urdf", "robot.path=none.urdf"),
+    "settings that do not fit": (*SMOKE, "planner.num_new_trajectories=1000"),
+    "a start in collision": (*SMOKE, "scenario.q_start=[[90,0],[90,180]]"),
+    "a robot that is not there": (*SMOKE, "robot=urdf", "robot.path=none.urdf"),
 }
 
 

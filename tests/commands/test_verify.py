@@ -57,6 +57,14 @@ def change_a_row(run: RunDirectory) -> None:
     summaries._KNOWN.clear()
 
 
+def change_a_setting(run: RunDirectory) -> None:
+    table = pq.read_table(run.summary_path)
+    at = table.schema.get_field_index("population_size")
+    doubled = pc.multiply(table["population_size"], 2.0)
+    pq.write_table(table.set_column(at, table.schema.field(at), doubled), run.summary_path)
+    summaries._KNOWN.clear()
+
+
 def forge(run: RunDirectory) -> None:
     """Write a log whose checksums are right and whose summary is not that of its generations."""
     stored = read_log(run.log_path(1))
@@ -106,6 +114,10 @@ FAULTS: dict[str, tuple[Callable[[RunDirectory], object], str]] = {
         lambda run: shutil.copy(other(run) / "summary.parquet", run.summary_path),
         "summary.parquet: is of run",
     ),
+    "an altered setting": (
+        change_a_setting,
+        "summary.parquet: altered: population_size is not the setting",
+    ),
     "an altered row": (change_a_row, "summary.parquet: altered: it does not repeat 0000.mcap"),
 }
 
@@ -133,7 +145,7 @@ def test_every_damage_is_found_and_mended_by_the_command_it_names(
     (problem,) = problems
     assert problem.startswith(expected)
     if problem.endswith("; delete it, then run again"):
-        (run.summary_path if fault == "an altered row" else run.log_path(1)).unlink()
+        (run.summary_path if fault.startswith("an altered") else run.log_path(1)).unlink()
     evoexp("run", *PLANAR, "--no-report")
     assert evoexp("verify").code == 0
 

@@ -12,6 +12,8 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+import pyarrow.parquet as pq
+
 from evoexp.attachments import PREFIX
 from evoexp.errors import CorruptLog, EvoexpError, StoreError
 from evoexp.records import ReplicateSummary
@@ -21,9 +23,12 @@ from evoexp.store.files import is_temporary
 from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES
 from evoexp.store.log_reader import LogContents, read_log
 from evoexp.store.mending import damaged_files
+from evoexp.store.messages import TERM
 from evoexp.store.plans import PLANS
+from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory, open_run
 from evoexp.store.summaries import altered_rows, table_damage
+from evoexp.store.summary_columns import BASE
 
 _KNOWN = {CONFIG, MANIFEST, PLANS, REPLICATES, PREFIX.strip("/"), "summary.parquet", ".lock"}
 DELETE = "; delete it, then run again"
@@ -139,6 +144,7 @@ def _check_log(path: Path, condition_id: str, evaluate: Evaluation | None) -> Lo
     try:
         log = read_log(path)
         summary = log.summary
+        log.arrays()  # each is one
         problem = next(_contradictions(log, condition_id, int(path.stem)), "")
         if not problem and evaluate is not None:
             try:
@@ -165,9 +171,31 @@ def check_rows(run: RunDirectory, logs: list[LogCheck]) -> dict[str, str]:
     whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
     names = altered_rows(run, whole)
     if not names:
-        return {}
+        columns = _altered_settings(run)
+        told = f"altered: {columns[0]} is not the setting{DELETE}" if columns else ""
+        return {"summary.parquet": told} if told else {}
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     return {"summary.parquet": f"altered: it does not repeat {names[0]}{more}{DELETE}"}
+
+
+def _altered_settings(run: RunDirectory) -> list[str]:
+    """Return the columns of `summary.parquet` that do not repeat a setting of the run.
+
+    What the manifest says of the origin may have changed since, and is not looked at.
+    """
+    if not run.summary_path.exists() or table_damage(run):
+        return []
+    with pq.ParquetFile(run.summary_path) as file:
+        table = file.read(use_threads=False)
+    known = {field.name for field in BASE}
+    measured = [name for name in table.column_names if name in known or name.startswith(TERM)]
+    return [
+        name
+        for name, value in run_context(run.path, measured).items()
+        if name in table.column_names
+        and name not in ORIGIN
+        and set(table[name].to_pylist()) - {value}
+    ]
 
 
 def _contradictions(log: LogContents, condition_id: str, replicate: int) -> Iterator[str]:

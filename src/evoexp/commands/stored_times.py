@@ -99,7 +99,9 @@ def _bounds(alike: Sequence[_Times], evaluations: int) -> tuple[float, float]:
     More evaluations take more time, but no more than in proportion: a part of the time is the same
     for any number. Runs of about as many evaluations, or the nearest number, tell the most.
     """
-    ratios = np.array([evaluations / max(1.0, float(np.mean(times.evaluations))) for times in alike])
+    ratios = np.array(
+        [evaluations / max(1.0, float(np.mean(times.evaluations))) for times in alike]
+    )
     spent = np.array([np.mean(times.cpu_s) for times in alike])  # [s]
     distance = np.abs(np.log(np.maximum(ratios, 1e-9)))
     near = distance <= distance.min() + 0.1

@@ -132,7 +132,7 @@ def test_a_way_through_subgoals_has_phases_and_is_no_manoeuvre(outputs: Path) ->
     assert not any(stem.startswith("manoeuvre") for stem in stems)
     two = results._replace(conditions=results.main[:2])  # enough to be compared
     swept = page_of(two, page_settings("corsepius_wall", "corsepius_sweep"))
-    assert "effects" in {drawing.stem for drawing in swept.drawings}
+    assert "values" in {drawing.stem for drawing in swept.drawings}
 
 
 def test_other_planners_get_the_generic_page(results: Results) -> None:

@@ -126,6 +126,15 @@ def test_distances_are_those_of_pinocchio(shown: Recording) -> None:
         assert shown.clearance.least[k] == pytest.approx(max(truth, 0.0), abs=1e-5)
 
 
+@pytest.mark.parametrize("name", ["two arms in space", "co-evolution"])
+def test_bodies_are_of_the_arm_whose_joints_carry_them(name: str) -> None:
+    shown = recording(name)
+    moving = [shape for shape in shown.shapes if shape.role == "arm" and shape.frame >= 0]
+    half = len(shown.joints) // 2  # two arms of as many joints
+    assert {shape.arm for shape in moving} == {0, 1}
+    assert all(shape.arm == (shape.frame >= half) for shape in moving)
+
+
 @pytest.mark.parametrize("name", ["mission", "placement"])
 def test_the_tool_ends_at_the_marked_target(name: str) -> None:
     shown = recording(name)

@@ -40,6 +40,27 @@ def robot(path: Path = URDF, **settings: Any) -> Urdf:
     return Urdf.model_validate(found, strict=False)
 
 
+def test_without_a_tool_frame_the_tool_is_the_farthest_fixed_link(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    body = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    names = ("base", "arm", "flange", "tip")
+    links = "".join(f'<link name="{name}">{body * (name == "arm")}</link>' for name in names)
+    fixed = "".join(
+        f'<joint name="{child}_joint" type="fixed"><parent link="{parent}"/>'
+        f'<child link="{child}"/><origin xyz="0 0 {height}"/></joint>'
+        for parent, child, height in (("arm", "flange", 0.3), ("flange", "tip", 0.2))
+    )
+    turning = (
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>'
+        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    )
+    path.write_text(f'<robot name="arm">{links}{turning}{fixed}</robot>')
+    found = Urdf.read_files({"path": str(path)}, "robot")
+    found["urdf"] = {"sha256": found["urdf"]["sha256"]}
+    (tool,) = Urdf.model_validate(found, strict=False).build().tools
+    assert tool.position == pytest.approx([0.0, 0.0, 0.5])
+
+
 def whole_placements(path: Path, values: dict[str, float]) -> tuple[Any, Any, dict[str, Any]]:
     """Return model, data and placements of the bodies by the whole URDF, every joint by name."""
     text, no_limit = path.read_text(), '<limit effort="1" velocity="1"/></joint>'

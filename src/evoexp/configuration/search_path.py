@@ -11,7 +11,6 @@ is the package's own.
 """
 
 import contextlib
-import functools
 import importlib.util
 import os
 from collections.abc import Iterable, Iterator
@@ -98,11 +97,9 @@ def _declared(registration: Registration) -> Path:
     )
 
 
-@functools.cache
-def groups() -> tuple[str, ...]:
+def groups() -> list[str]:
     """Return the groups that a configuration chooses options of, in alphabetical order."""
-    folder = shipped.config_directory()
-    return tuple(sorted(path.name for path in folder.iterdir() if path.is_dir()))
+    return sorted(path.name for path in shipped.config_directory().iterdir() if path.is_dir())
 
 
 def options(group: str) -> list[str]:

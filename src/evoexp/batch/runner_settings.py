@@ -17,7 +17,7 @@ class RunnerSettings(Settings):
         memory_gb: Memory that one replicate may take, by its planner's estimate; what would take
             more is refused before it begins, and what does take more in a worker fails [GB]. None:
             the machine's, divided by the workers.
-        backend: loky: processes of this machine | dask: workers of `distributed`.
+        backend: loky: processes of this machine (once started by it) | dask: of `distributed`.
         address: Of a scheduler of `distributed` that runs already; None: one is started here, with
             `num_workers` workers.
         timeout_s: Wall time that one replicate may take [s]; one that takes longer is run once

@@ -8,7 +8,6 @@ keeps nobody waiting. The end of a worker is told by the system, whatever it hel
 import contextlib
 import os
 import pickle
-import select
 import selectors
 import signal
 import socket
@@ -278,10 +277,11 @@ class Workers:
         if worker.process is not None:
             return
         self._num_lost += 1
-        if self._door in select.select([self._door], [], [], 0.0)[0]:
-            with contextlib.suppress(ConnectionError):
-                if reason := self._door.recv(_CHUNK):  # why the server cannot load libraries
-                    raise pickle.loads(reason)
+        reason = b""
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            reason = self._door.recv(_CHUNK, socket.MSG_DONTWAIT)
+        if reason:  # why the server cannot load libraries
+            raise pickle.loads(reason)
         if self._num_lost > MOST_LOST * self.number:
             raise WorkerError("worker processes die before they have begun")
 

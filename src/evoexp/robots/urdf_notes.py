@@ -1,4 +1,4 @@
-"""What a URDF leaves open: bounds of joints, bodies of links, units of meshes."""
+"""Remarks on the bounds of joints, bodies of links and units of meshes that a URDF leaves open."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -110,6 +110,7 @@ def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
     assert run_replicate(found, 0).summary.digest == log.summary.digest
 
 
+@pytest.mark.matrix
 def test_run_list_show_reproduce_report(
     said: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,6 +131,7 @@ def test_run_list_show_reproduce_report(
     assert "DIVERGES by" in said("reproduce", found.id[:12], code=1)
 
 
+@pytest.mark.matrix
 def test_the_report_reads_references_beside_the_planners(
     said: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -52,7 +52,7 @@ def test_an_error_of_a_task_is_raised_with_its_text() -> None:
         assert "in refuse" in raised.value.__notes__[0]
         with pytest.raises(Exception, match=r"^ga\.population_size: must be positive, was -1$"):
             list(in_order(workers, refuse, [("setting",)]))
-        with pytest.raises(RuntimeError, match="pickle"):
+        with pytest.raises(Exception, match="pickle"):
             list(in_order(workers, threading.Lock, [()]))
 
 

@@ -32,7 +32,6 @@ from evoexp.scenarios.moveit_request import (
     state_of,
 )
 from evoexp.scenarios.moveit_scene import AllowedPairs, World, read_allowed, read_state, read_world
-from evoexp.scenarios.moveit_yaml import MAX_SCENE
 from evoexp.validation import Component, NonNegative, Positive, Settings
 
 if TYPE_CHECKING:
@@ -328,6 +327,8 @@ def _world(
 
 def _content(path: str, field: str) -> bytes:
     try:
+        from evoexp.scenarios.moveit_yaml import MAX_SCENE  # and YAML
+
         return read_bounded(located(path), MAX_SCENE)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()

@@ -95,7 +95,9 @@ def load(
 
 def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str, pd.Series]:
     """Return the columns that tell the conditions apart, and their seeds."""
-    contexts = {run.condition_id: run_context(run.path, summaries.columns) for run in runs}
+    contexts = {
+        run.condition_id: run_context(run.path, run.condition_id, summaries.columns) for run in runs
+    }
     names = dict.fromkeys(name for context in contexts.values() for name in context)
     values = {name: [context.get(name) for context in contexts.values()] for name in names}
     told = [

@@ -78,6 +78,24 @@ def shipped() -> tuple[Shipped, ...]:
     return tuple(Shipped(**row) for row in orjson.loads(content))
 
 
+@functools.cache
+def rows_by_condition() -> dict[str, list[Shipped]]:
+    """Return hash → the rows of the table that have it."""
+    found: dict[str, list[Shipped]] = {}
+    for row in shipped():
+        found.setdefault(row.condition_id, []).append(row)
+    return found
+
+
+@functools.cache
+def labels_by_experiment() -> dict[str, set[str]]:
+    """Return the labels of every shipped experiment, at any budget."""
+    found: dict[str, set[str]] = {}
+    for row in shipped():
+        found.setdefault(row.experiment, set()).add(row.label)
+    return found
+
+
 def find(prefix: str) -> list[Shipped]:
     """Return the shipped conditions whose hash begins with a prefix.
 

@@ -243,27 +243,71 @@ def test_the_command_line_wins_over_an_entry_which_wins_over_the_file(
     base = (*PLAIN, "scenario=rana_planar", "seed=5")
     assert ids("experiment=mine") == {"a": one(*base, "ga.population_size=10"), "b": one(*base)}
     both = one(*base, "ga.population_size=30")
-    assert ids("experiment=mine", "ga.population_size=30") == {"a": both, "b": both}
+    assert ids("experiment=mine", "ga.population_size=30") == {"b · population_size=30": both}
     swept = ids("experiment=mine", "ga.population_size=30,50", multirun=True)
-    assert list(swept) == [
-        f"{label} · population_size={size}" for label in "ab" for size in (30, 50)
-    ]
-    assert swept["a · population_size=30"] == swept["b · population_size=30"] == both
+    assert swept == {"b · population_size=30": both, "b · population_size=50": one(*base)}
 
 
-def test_groups_of_an_entry_can_be_taken_back_on_the_command_line() -> None:
+def test_conditions_that_become_one_have_the_label_that_is_true_of_it() -> None:
     plain = ids("experiment=rana_planar")
-    without = ids("experiment=rana_planar", "control=null")
-    assert without == {
-        "via-point GA": plain["via-point GA"],
-        "multi-start": plain["via-point GA"],
-        "random search": plain["via-point GA"],
+    ga, drawn = "via-point GA", "random search"
+    for word in ("control=null", "~control"):
+        assert ids("experiment=rana_planar", word) == {ga: plain[ga]}
+    assert ids("experiment=rana_planar", "control=random_search") == {drawn: plain[drawn]}
+    swept = ids("experiment=rana_planar", "control=null,random_search", multirun=True)
+    assert swept == {ga: plain[ga], drawn: plain[drawn]}
+    methods = ids("experiment=curkovic_methods")
+    assert ids("experiment=curkovic_methods", "ga=curkovic_1") == {"I": methods["I"]}
+
+
+def test_a_condition_with_no_label_of_the_file_is_named_by_its_planner() -> None:
+    words = ("experiment=rana_planar", "control=cma_es")
+    (label,) = every = ids(*words)
+    assert label == "cma_es"
+    swept = ids(words[0], "control=stomp,cma_es", multirun=True)
+    assert list(swept) == ["stomp", "cma_es"]
+    assert swept["cma_es"] == every["cma_es"]
+    # also where one of the labels that became one is picked
+    for picked in ("random search", "via-point GA", "cma_es"):
+        assert ids(*words, only=(picked,)) == every
+
+
+def test_a_condition_with_no_label_of_the_file_is_named_by_what_overrides_it(
+    write_experiment: Callable[..., None],
+) -> None:
+    write_experiment(
+        "mine",
+        """
+  "0 elites": [ga.num_elites=0]
+  "2 elites": [ga.num_elites=2]
+  "many": [ga.num_elites=2, ga.population_size=90]
+""",
+    )
+    plain = ids("experiment=mine")
+    assert list(ids("experiment=mine", "ga.num_elites=5")) == [
+        "num_elites=5",
+        "many · num_elites=5",
+    ]
+    assert ids("experiment=mine", "ga.num_elites=2") == {
+        "2 elites": plain["2 elites"],
+        "many": plain["many"],
     }
-    every = ids("experiment=rana_planar", "control=random_search")
-    assert every == dict.fromkeys(plain, plain["random search"])
-    swept = ids("experiment=rana_planar", "control=null,random_search", multirun=True, only=())
-    assert set(swept.values()) == {plain["via-point GA"], plain["random search"]}
-    assert len(swept) == 6
+    assert list(ids("experiment=mine", "ga.population_size=40")) == [
+        "0 elites · population_size=40",
+        "2 elites · population_size=40",
+    ]
+    assert list(ids("experiment=mine", "ga.mutation_rate=0.5")) == list(plain)
+
+
+def test_two_labels_of_one_condition_are_one_row(write_experiment: Callable[..., None]) -> None:
+    write_experiment("mine", '  "as printed": []\n  "{} elites": ["ga.num_elites=0,2"]')
+    found = ids("experiment=mine")
+    assert list(found) == ["as printed ≡ 2 elites", "0 elites"]
+    for label in ("as printed", "2 elites", "as printed ≡ 2 elites"):
+        (picked,) = expand(["experiment=mine"], only=[label])
+        assert [each.label for each in picked.conditions] == ["as printed ≡ 2 elites"]
+    capped = ids("experiment=lavoie_stopping", "budget=smoke")
+    assert len(set(capped.values())) == len(capped)
 
 
 def test_two_swept_settings_of_one_name_are_told_apart() -> None:
@@ -310,7 +354,7 @@ def test_a_multirun_drops_no_experiment_and_no_condition() -> None:
     [
         (
             ["ga.population_size=20,20"],
-            "conditions: must be labels that differ, was 'population_size=20'",
+            "ga.population_size: must be values that differ, was '20,20'",
         ),
         (
             ["budget=smoke,paper"],

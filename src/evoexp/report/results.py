@@ -348,12 +348,11 @@ def _read(
     rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
     rows = rows.set_index("replicate")
     asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
-    planned = max([asked, *(plan.num_replicates for plan in plans), *(1 + k for k in rows.index)])
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
     return ConditionResults(
         label,
         condition,
-        planned,
+        run.num_planned(asked),
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,

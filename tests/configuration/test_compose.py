@@ -303,7 +303,7 @@ def test_two_labels_of_one_condition_are_one_row(write_experiment: Callable[...,
     write_experiment("mine", '  "as printed": []\n  "{} elites": ["ga.num_elites=0,2"]')
     found = ids("experiment=mine")
     assert list(found) == ["as printed ≡ 2 elites", "0 elites"]
-    for label in ("as printed", "2 elites", "as printed ≡ 2 elites"):
+    for label in (*["as printed", "2 elites"], "as printed ≡ 2 elites"):
         (picked,) = expand(["experiment=mine"], only=[label])
         assert [each.label for each in picked.conditions] == ["as printed ≡ 2 elites"]
     capped = ids("experiment=lavoie_stopping", "budget=smoke")
@@ -320,6 +320,12 @@ def test_two_swept_settings_of_one_name_are_told_apart() -> None:
     label = "robot.arms.0.link_lengths=[4,4] · robot.arms.1.link_lengths=[3,3]"
     assert len(swept) == 4
     assert swept[label] == one(*PLAIN, "robot.arms.1.link_lengths=[3,3]")
+
+
+def test_only_picks_labels_with_commas_that_the_command_line_splits() -> None:
+    words = ("experiment=corsepius", "budget=smoke")
+    picked = ids(*words, only=("pose", "empty scene", "wall", "pose"))
+    assert list(picked) == ["pose", "pose, empty scene", "wall"]
 
 
 def test_only_picks_labels() -> None:
@@ -426,7 +432,104 @@ def test_entries_that_cannot_be(
     assert "\n" not in str(caught.value)
 
 
+# Settings that some conditions have
+
+
+def test_a_setting_concerns_the_conditions_that_have_it() -> None:
+    plain = ids("experiment=rana_planar")
+    changed = ids("experiment=rana_planar", "control.num_sweeps=7")
+    assert {label: changed[label] == each for label, each in plain.items()} == {
+        "via-point GA": True,
+        "random search": True,
+        "multi-start": False,
+    }
+    assert ids("experiment=rana_planar", "control.num_sweeps=7", only=("multi-start",)) == {
+        "multi-start": changed["multi-start"]
+    }
+    swept = ids("experiment=rana_planar", "control.num_sweeps=7,40", multirun=True)
+    assert swept == {
+        "via-point GA": plain["via-point GA"],
+        "random search": plain["random search"],
+        "multi-start · num_sweeps=7": changed["multi-start"],
+        "multi-start · num_sweeps=40": plain["multi-start"],
+    }
+
+
+def test_a_part_concerns_the_conditions_whose_planner_takes_it(
+    write_experiment: Callable[..., None], tmp_path: Path
+) -> None:
+    (tmp_path / "planner").mkdir()
+    text = Path(find("planner", "rana_planar").path).read_text()
+    own = "ga: {_target_: genetic, population_size: 9, num_generations: 5, num_elites: 1,"
+    own += " crossover_rate: 0.5, mutation_rate: 1.0}"
+    (tmp_path / "planner/with_ga.yaml").write_text(text.replace("ga: ${ga}", own))
+    write_experiment("mine", '  "taken": []\n  "own": [planner=with_ga, ~ga]')
+    plain, other = ids("experiment=mine"), ids("experiment=mine", "ga=rana_puma")
+    assert list(other) == ["taken · ga=rana_puma", "own"]
+    assert other["own"] == plain["own"] and other["taken · ga=rana_puma"] != plain["taken"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "only", "message"),
+    [
+        (["control.num_sweps=7"], (), "control.num_sweps: unknown setting; did you mean 'num_sw"),
+        (["control.num_sweeps=seven"], (), "control.num_sweeps: must be a whole number, was 'seve"),
+        (["reference.num_steps=100"], (), "reference: must be chosen: grid_frontier, "),
+        (["control.num_sweeps=7"], ("random search",), "control.num_sweeps: unknown setting"),
+        (["control.num_sweeps=7"], ("via-point GA",), "control: must be chosen: cma_es, "),
+    ],
+)
+def test_a_setting_that_concerns_no_condition_is_refused(
+    overrides: list[str], only: tuple[str, ...], message: str
+) -> None:
+    with pytest.raises(EvoexpError) as caught:
+        expand(["experiment=rana_planar", *overrides], only=only)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+ARM = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry>
+<box size="0.4 0.05 0.05"/></geometry></collision></link><joint name="turn" type="revolute">
+<parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_a_file_that_an_override_replaces_need_not_be_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    groups = ("planner", "ga", "objective")
+    chosen = "".join(f"  - override /{group}: via_points\n" for group in groups)
+    (tmp_path / "arm.urdf").write_text(ARM)
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "# @package _global_\ndefaults:\n  - override /robot: urdf\n"
+        f"  - override /scenario: rana_planar\n{chosen}  - override /collision: covered_bodies\n"
+        "robot: {path: not/there.urdf}\n"
+        "scenario: {_target_: arm_motion, q_start: [[-50.0]], q_goal: [[50.0]], length_unit: m,"
+        " security_margin: 0.0}\nconditions: {few: [ga.population_size=10], many: []}\n"
+    )
+    words = (f"experiment={path}", f"robot.path={tmp_path / 'arm.urdf'}")
+    for only in ((), ("few",)):
+        (found,) = expand(words, only=only)
+        assert found.changed
+        assert found.conditions[0].label == "few"
+    with pytest.raises(SettingError, match=r"robot.path: must be a file that can be read"):
+        expand(words[:1])
+
+
 # Budgets
+
+
+def test_the_budget_of_a_condition_is_what_capped_it() -> None:
+    budgets = [
+        expand([*PLAIN, *words])[0].budget_of("rana_obstacles")
+        for words in (
+            ["budget=quick"],
+            ["budget=smoke"],
+            ["budget=smoke", "ga.num_generations=10"],
+            ["budget.collision_queries=1e5"],
+        )
+    ]
+    assert budgets == ["paper", "smoke", "paper", "paper, capped"]
 
 
 def generations(experiment: Experiment) -> list[int]:

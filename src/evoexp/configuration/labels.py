@@ -6,6 +6,7 @@ condition. Such a condition has the label of the file's condition that it still 
 by its planner, or by the overriding setting.
 """
 
+from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -110,9 +111,8 @@ def labels_of(groups: Sequence[Group], holds: Holds) -> list[str]:
     labels = [_label(group, varied, holds, group.planner) for group in groups]
     if len(set(labels)) < len(labels):  # planners of one component
         labels = [_label(group, varied, holds, "") for group in groups]
-    for k, label in enumerate(labels):
-        if label in labels[:k]:
-            raise SettingError("conditions", "labels that differ", label)
+    if twice := [label for label, count in Counter(labels).items() if count > 1]:
+        raise SettingError("conditions", "labels that differ", twice[0])
     return labels
 
 

@@ -121,7 +121,7 @@ def _run(outputs: Path, what: str, experiments: Sequence[str]) -> RunDirectory:
 
 
 def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:
-    """Add the label in front; labels that share a condition have its rows each."""
+    """Add the label in front, with the rows in the order of the labels."""
     parts = [
         frame[frame["condition"] == condition_id].assign(label=label)
         for label, condition_id in labels

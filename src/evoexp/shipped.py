@@ -78,22 +78,26 @@ def shipped() -> tuple[Shipped, ...]:
     return tuple(Shipped(**row) for row in orjson.loads(content))
 
 
-@functools.cache
 def rows_by_condition() -> dict[str, list[Shipped]]:
     """Return hash → the rows of the table that have it."""
-    found: dict[str, list[Shipped]] = {}
-    for row in shipped():
-        found.setdefault(row.condition_id, []).append(row)
-    return found
+    return _indexed(shipped())[0]
 
 
-@functools.cache
 def labels_by_experiment() -> dict[str, set[str]]:
     """Return the labels of every shipped experiment, at any budget."""
-    found: dict[str, set[str]] = {}
-    for row in shipped():
-        found.setdefault(row.experiment, set()).add(row.label)
-    return found
+    return _indexed(shipped())[1]
+
+
+@functools.lru_cache(maxsize=1)
+def _indexed(
+    table: tuple[Shipped, ...],
+) -> tuple[dict[str, list[Shipped]], dict[str, set[str]]]:
+    rows: dict[str, list[Shipped]] = {}
+    labels: dict[str, set[str]] = {}
+    for row in table:
+        rows.setdefault(row.condition_id, []).append(row)
+        labels.setdefault(row.experiment, set()).add(row.label)
+    return rows, labels
 
 
 def find(prefix: str) -> list[Shipped]:

@@ -306,8 +306,17 @@ def test_two_labels_of_one_condition_are_one_row(write_experiment: Callable[...,
     for label in (*["as printed", "2 elites"], "as printed ≡ 2 elites"):
         (picked,) = expand(["experiment=mine"], only=[label])
         assert [each.label for each in picked.conditions] == ["as printed ≡ 2 elites"]
-    capped = ids("experiment=lavoie_stopping", "budget=smoke")
-    assert len(set(capped.values())) == len(capped)
+
+
+def test_of_labels_that_a_budget_makes_one_the_first_stands() -> None:
+    words = ("experiment=lavoie_stopping", "budget=smoke")
+    first = [label for label in ids(words[0]) if "at most 300" not in label]
+    capped = ids(*words)
+    assert list(capped) == first and len(set(capped.values())) == len(capped)
+    picked = ids(*words, only=("stop below 1.5", "at most 300"))
+    assert list(picked) == ["stop below 1.5, at most 100"]
+    swept = ids(*PLAIN, words[1], "ga.num_generations=100,200", multirun=True)
+    assert list(swept) == ["num_generations=100 ≡ num_generations=200"]
 
 
 def test_two_swept_settings_of_one_name_are_told_apart() -> None:

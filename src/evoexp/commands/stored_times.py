@@ -28,7 +28,7 @@ class Estimate(NamedTuple):
     source: str
 
 
-class _Times(NamedTuple):
+class Times(NamedTuple):
     """Times of a run's finished replicates.
 
     Attributes:
@@ -49,7 +49,7 @@ class StoredTimes:
         """Read the configurations of all runs; those that cannot be read are left out."""
         self._named: dict[str, list[tuple[str, str]]] = {}  # settings → (id, name) of runs
         self._alike: dict[str, list[RunDirectory]] = {}  # planner and scene → runs
-        self._known: dict[str, list[_Times]] = {}
+        self._known: dict[str, list[Times]] = {}
         for name in run_names(outputs):
             try:
                 content = read(outputs / "runs" / name / CONFIG)
@@ -88,12 +88,12 @@ class StoredTimes:
         if not (alike := self._known[scene]):
             return Estimate(None, None, None, "nothing stored like it")
         most_evaluations = _num_evaluations(condition)
-        least, most = _bounds(alike, most_evaluations)
+        least, most = bounds(alike, most_evaluations)
         source = f"{len(alike)} other runs of the scene"
         return Estimate(float(np.sqrt(least * most)), least, most, source)
 
 
-def _bounds(alike: Sequence[_Times], evaluations: int) -> tuple[float, float]:
+def bounds(alike: Sequence[Times], evaluations: int) -> tuple[float, float]:
     """Return the least and the most that a replicate of so many evaluations may take [s].
 
     More evaluations take more time, but no more than in proportion: a part of the time is the same
@@ -117,13 +117,13 @@ def _num_evaluations(condition: Condition) -> int:
     return sum(planner.num_evaluations(k) for k in range(min(planner.num_generations, 10_000) + 1))
 
 
-def _times(run: RunDirectory) -> _Times:
+def _times(run: RunDirectory) -> Times:
     if not run.completed():
-        return _Times([], [], False)
+        return Times([], [], False)
     columns = ["status", "cpu_s", "evaluations", "stop_reason"]
     rows = [row for row in summary_table(run).select(columns).to_pylist() if row["cpu_s"]]
     done = [row for row in rows if row["status"] == "done"]
-    return _Times(
+    return Times(
         [float(row["cpu_s"]) for row in done],
         [int(row["evaluations"] or 0) for row in done],
         any(row["stop_reason"] != ALL_GENERATIONS for row in done),

@@ -100,7 +100,7 @@ class Builder:
                     raise
         built = [self._built(same[0].choice) for same in members.values()]
         groups = [
-            Group(same, each.condition.planner.component)
+            Group(same, each.condition.planner.component, each.is_capped)
             for same, each in zip(members.values(), built, strict=True)
         ]
         labels = labels_of(groups, self._is_same)

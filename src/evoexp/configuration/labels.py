@@ -57,10 +57,17 @@ class Crossed(NamedTuple):
 
 
 class Group(NamedTuple):
-    """All combinations that are one condition, and the name of its planner's component."""
+    """All combinations that are one condition.
+
+    Attributes:
+        members: In the order of the experiment.
+        planner: Name of the component of its planner.
+        is_capped: Whether the budget capped it.
+    """
 
     members: Sequence[Crossed]
     planner: str
+    is_capped: bool
 
 
 Holds = Callable[[Crossed, Choice], bool]  # whether a condition is the same with another choice
@@ -128,9 +135,11 @@ def _label(group: Group, varied: set[str], holds: Holds, planner: str) -> str:
     """Return the label of a condition; without a planner's name the overrides themselves."""
     members = group.members
     overridden = varied.intersection(*(member.typed for member in members))
+    swept = {key for member in members for key in member.swept}
+    if not overridden and group.is_capped and not swept:
+        return members[0].label  # others differ from it in what the budget caps
     if not overridden:
         return SAME.join(dict.fromkeys(member.label for member in members))
-    swept = {key for member in members for key in member.swept}
     # a sweep over settings shows each of its values
     if not overridden & swept - {*PLANNER}:
         holders = [m for m in members if holds(m, _without(m, varied))]

@@ -22,7 +22,7 @@ from evoexp.store.damage import warn
 from evoexp.store.identity import DamagedFile
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
-from evoexp.store.plans import Plan
+from evoexp.store.plans import Plan, num_planned
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
 from evoexp.store.tables import read_generations, read_summaries
@@ -352,7 +352,7 @@ def _read(
     return ConditionResults(
         label,
         condition,
-        run.num_planned(asked),
+        num_planned(run, asked),
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,

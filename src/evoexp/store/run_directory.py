@@ -228,18 +228,6 @@ class RunDirectory:
             self.path.mkdir(parents=True, exist_ok=True)
             write_file(self.path / PLANS, as_json(plans))
 
-    def num_planned(self, asked: int = 0) -> int:
-        """Return how many replicates were ever asked for; at least those that are there.
-
-        Args:
-            asked: How many are asked for now.
-        """
-        try:
-            plans = [plan.num_replicates for plan in self.plans()]
-        except DamagedFile:
-            plans = []
-        return max([asked, *plans, *(1 + k for k in self.completed() | self.failed())])
-
     @staticmethod
     def is_own(name: str) -> bool:
         """Return whether a file's name is one of a log or a failure."""

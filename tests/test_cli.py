@@ -64,7 +64,8 @@ def test_evaluate_says_what_a_motion_file_is(capsys: pytest.CaptureFixture[str])
     with pytest.raises(SystemExit):
         main(["evaluate", "--help"])
     out = " ".join(capsys.readouterr().out.split())
-    assert "a motion file (.json: nested lists, .npy: an array)" in out
+    assert "(.json: nested lists, .npy: an array)" in out
+    assert "a joint trajectory as export writes it (.csv, .json, .yaml)" in out
 
 
 def test_no_words_and_version(capsys: pytest.CaptureFixture[str]) -> None:

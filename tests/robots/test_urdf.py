@@ -170,7 +170,7 @@ def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
         (lambda text: "<sdf></sdf>", "robot.path: must be XML with the root <robot>, was '<sdf>'"),
         (
             lambda text: text.replace("hand.obj", "hnad.obj"),
-            'robot.path: must be a URDF whose meshes are there, was "a missing mesh '
+            'robot.path: must be a file whose meshes are there, was "a missing mesh '
             "'package://ur5_like/hnad.obj'\"",
         ),
         (
@@ -195,7 +195,8 @@ def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
         ),
         (
             lambda text: text.replace('<child link="tool0"/>', '<child link="nothing"/>'),
-            "robot.path: must be a URDF that Pinocchio reads",
+            "robot.path: must be a URDF that has the links of joint 'tool_joint', "
+            "was \"without 'nothing'\"",
         ),
     ],
 )

@@ -183,6 +183,10 @@ def _altered_settings(run: RunDirectory) -> list[str]:
 
     What the manifest says of the origin may have changed since, and is not looked at.
     """
+    try:
+        run.check()
+    except StoreError:  # whose settings nothing tells
+        return []
     if not run.summary_path.exists() or table_damage(run):
         return []
     with pq.ParquetFile(run.summary_path) as file:

@@ -62,6 +62,8 @@ def known_instead(config: dict[str, Any], override: Override) -> list[str] | Non
     root, *parts = override.key.split(".")
     if root in NOT_IDENTITY or root not in groups() or not parts:
         return None
+    if override.prefix in (ADD, FORCE):  # it adds what there is not
+        return None
     node = config.get(root)
     if node is None:
         return []

@@ -95,7 +95,9 @@ def load(
 
 def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str, pd.Series]:
     """Return the columns that tell the conditions apart, and their seeds."""
-    contexts = {run.condition_id: run_context(run.path, summaries.columns) for run in runs}
+    contexts = {
+        run.condition_id: run_context(run.path, run.condition_id, summaries.columns) for run in runs
+    }
     names = dict.fromkeys(name for context in contexts.values() for name in context)
     values = {name: [context.get(name) for context in contexts.values()] for name in names}
     told = [
@@ -119,7 +121,7 @@ def _run(outputs: Path, what: str, experiments: Sequence[str]) -> RunDirectory:
 
 
 def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:
-    """Add the label in front; labels that share a condition have its rows each."""
+    """Add the label in front, with the rows in the order of the labels."""
     parts = [
         frame[frame["condition"] == condition_id].assign(label=label)
         for label, condition_id in labels

@@ -30,6 +30,13 @@ def test_runs_are_compared_by_their_hashes(evoexp: Evoexp, stored: Path) -> None
     assert str(page) in said.out and page.exists()
 
 
+def test_a_condition_of_two_experiments_is_one_row(evoexp: Evoexp, stored: Path) -> None:
+    words = (*SERIAL, "scenario=rana_planar", "control=null", "--json")
+    said = evoexp("compare", "rana_planar", "rana_obstacles", *words)
+    (row,) = json.loads(said.out)
+    assert row["condition"] == "rana_planar: via-point GA ≡ rana_obstacles: rana_obstacles"
+
+
 def test_what_is_neither_is_refused(evoexp: Evoexp, stored: Path) -> None:
     said = evoexp("compare", "rana_planet")
     assert said.code == 2 and "did you mean 'rana_planar'?" in said.err

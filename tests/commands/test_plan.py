@@ -3,10 +3,14 @@
 import json
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
+import pytest
 from command_samples import SERIAL, Evoexp, content
 
-from evoexp.store.run_directory import find_runs
+from evoexp.commands import stored_times
+from evoexp.commands.stored_times import OTHER_SETTINGS, Times, bounds
+from evoexp.store.run_directory import RunDirectory, find_runs
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 
@@ -35,9 +39,47 @@ def test_times_come_from_other_runs_of_the_scene(evoexp: Evoexp, stored: Path) -
     said = evoexp("plan", *longer, "--json")
     rows = json.loads(said.out)
     assert all("1 other runs of the scene" in row["cpu_s_from"] for row in rows)
+    assert all(row["cpu_s_least"] < row["cpu_s_each"] < row["cpu_s_most"] for row in rows)
+    assert " to " in evoexp("plan", *longer).out
     known = json.loads(evoexp("plan", *PLANAR, "--json").out)
     for row, own in zip(rows, known, strict=True):
         assert row["cached"] == 0 and row["cpu_s_each"] > own["cpu_s_each"] > 0.0
+
+
+def test_every_stored_run_is_read_once_for_any_number_of_conditions(
+    evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+    table = stored_times.summary_table
+
+    def counted(run: RunDirectory) -> Any:
+        read.append(run.hash12)
+        return table(run)
+
+    monkeypatch.setattr(stored_times, "summary_table", counted)
+    said = evoexp("plan", "-m", *PLANAR, "seed=range(1,9)", "--json")
+    assert len(json.loads(said.out)) == 24
+    assert sorted(read) == sorted(run.hash12 for run in find_runs(stored))
+
+
+@pytest.mark.parametrize(
+    ("stored", "wanted", "least", "most"),
+    [
+        ([(1.0, 100)], 100, 1.0, 1.0),
+        ([(1.0, 100)], 1000, 1.0, 10.0),  # a part of the time is the same for any number
+        ([(1.0, 100)], 10, 0.1, 1.0),
+        ([(1.0, 100), (5.0, 1000)], 1000, 5.0, 5.0),  # the nearest number of evaluations
+        ([(1.0, 100), (5.0, 1000)], 2000, 5.0, 10.0),
+    ],
+)
+def test_a_guess_is_a_range(
+    stored: list[tuple[float, int]], wanted: int, least: float, most: float
+) -> None:
+    times = [Times([seconds], [count], False) for seconds, count in stored]
+    found = bounds(times, wanted)
+    assert found == pytest.approx((least / OTHER_SETTINGS, most * OTHER_SETTINGS))
+    early = [each._replace(stopped_early=True) for each in times]
+    assert bounds(early, wanted)[0] <= found[0] and bounds(early, wanted)[1] == found[1]
 
 
 def test_nothing_is_known_where_nothing_is_stored(evoexp: Evoexp, outputs: Path) -> None:

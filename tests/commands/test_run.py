@@ -8,9 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from command_samples import SERIAL, SMALL, Evoexp
 
+from evoexp import load
 from evoexp.configuration import compose
 from evoexp.store.run_directory import find_runs
 
@@ -35,6 +37,59 @@ def test_a_run_says_what_is_there_and_runs_nothing_twice(
     assert again.out.startswith("nothing to run: every replicate is there\n")
     assert again.out.split("\n", 1)[1] == first.out[first.out.index("rana_planar@smoke") :]
     assert not (outputs / "reports").exists()
+
+
+def test_conditions_that_become_one_are_one_row_everywhere(
+    evoexp: Evoexp, outputs: Path, wide_terminal: None
+) -> None:
+    words = ("experiment=rana_planar", "control=cma_es", "ga.num_generations=20", *SERIAL)
+    words = tuple(word for word in words if word != "ga.num_generations=2")  # the cap counts
+    said = evoexp("run", *words, "report.formats=[png]", "report.dpi=20")
+    (condition,) = (c for _, c in compose.expand(words)[0].conditions)
+    table = [line for line in said.out.splitlines() if condition.id[:12] in line]
+    assert len(table) == 1 and table[0].split("│")[1].strip() == "cma_es"
+    assert "via-point GA" not in said.out
+    # the store, the Python door, and all pages and tables say the same
+    (run,) = find_runs(outputs)
+    row = pd.read_parquet(run.summary_path).iloc[0]
+    named = {"experiment": "rana_planar", "label": "cma_es", "budget": "smoke"}
+    assert {name: row[name] for name in named} == named and row["planner"] == "cma_es"
+    assert set(load("rana_planar", *words[1:], budget="smoke").summaries["label"]) == {"cma_es"}
+    (listed,) = json.loads(evoexp("list", "--json").out)["runs"]
+    assert {name: listed[name] for name in named} == named and listed["changed"]
+    shown = json.loads(evoexp("show", run.hash12, "--json").out)["origin"]
+    assert {name: shown[name] for name in named} == named
+    (planned,) = json.loads(evoexp("plan", *words, "--json").out)
+    (compared,) = json.loads(evoexp("compare", "rana_planar", *words[1:], "--json").out)
+    assert planned["label"] == compared["condition"] == "cma_es"
+    (page,) = (outputs / "reports").glob("rana_planar@smoke+*/index.md")
+    assert f"{run.hash12}" in page.read_text() and "random search" not in page.read_text()
+    assert evoexp("site").code == 0
+    home = (outputs / "reports" / "index.html").read_text()
+    assert "cma_es" in home and "via-point GA" not in home
+
+
+def test_a_budget_of_fewer_replicates_is_no_budget_of_a_condition(
+    evoexp: Evoexp, outputs: Path
+) -> None:
+    words = ("experiment=rana_planar", "budget=quick", "runner=serial", "num_replicates=1")
+    small = ("ga.num_generations=2", "ga.population_size=8", "--only", "via-point GA")
+    assert evoexp("run", *words, *small, "--no-report").code == 0
+    (run,) = find_runs(outputs)
+    (listed,) = json.loads(evoexp("list", "--json").out)["runs"]
+    assert listed["budget"] == "paper" == pd.read_parquet(run.summary_path)["budget"][0]
+
+
+def test_terminal_and_report_have_all_stored_replicates(evoexp: Evoexp, stored: Path) -> None:
+    said = evoexp(
+        "run", *PLANAR, "num_replicates=1", "report=paper", "report.formats=[png]", "report.dpi=20"
+    )
+    assert said.out.count("2 of 2") == 3
+    assert "of 1 asked for: all that are stored, here and in the report" in said.out
+    (page,) = (stored / "reports").glob("*/index.md")
+    assert "| `num_replicates` | 2 |" in page.read_text()
+    said = evoexp("run", *PLANAR, "--no-report")
+    assert "asked for: all" not in said.out
 
 
 def test_a_run_without_report_loads_neither_pandas_nor_matplotlib(outputs: Path) -> None:

@@ -56,7 +56,7 @@ def test_a_configuration_before_anything_ran(evoexp: Evoexp, outputs: Path, widt
     )
     assert found["condition"] == condition.id
     assert "via_point_ga 1" in found["components"] and "genetic 1" in found["components"]
-    assert "rana_planar, via-point GA, budget smoke" in found["origin"]
+    assert "rana_planar, via-point GA, budget paper" in found["origin"]  # no cap changed it
     assert "ga=rana_planar" in found["origin"].replace("\n", " ")
     assert "not run here; run it: evoexp run experiment=rana_planar budget=smoke" in (
         found["result"].replace("\n", " ")

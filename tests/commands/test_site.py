@@ -81,7 +81,7 @@ def test_all_reports_are_those_of_experiments_that_were_run(
 
         def manifest(self) -> dict[str, object]:
             experiment, budget, _ = done[self.condition_id]
-            return {"experiment": experiment, "budget": budget}
+            return {"experiment": experiment, "command": f"evoexp run budget={budget}"}
 
     monkeypatch.setattr(all_reports, "RunDirectory", Run)
 

@@ -243,27 +243,80 @@ def test_the_command_line_wins_over_an_entry_which_wins_over_the_file(
     base = (*PLAIN, "scenario=rana_planar", "seed=5")
     assert ids("experiment=mine") == {"a": one(*base, "ga.population_size=10"), "b": one(*base)}
     both = one(*base, "ga.population_size=30")
-    assert ids("experiment=mine", "ga.population_size=30") == {"a": both, "b": both}
+    assert ids("experiment=mine", "ga.population_size=30") == {"b · population_size=30": both}
     swept = ids("experiment=mine", "ga.population_size=30,50", multirun=True)
-    assert list(swept) == [
-        f"{label} · population_size={size}" for label in "ab" for size in (30, 50)
-    ]
-    assert swept["a · population_size=30"] == swept["b · population_size=30"] == both
+    assert swept == {"b · population_size=30": both, "b · population_size=50": one(*base)}
 
 
-def test_groups_of_an_entry_can_be_taken_back_on_the_command_line() -> None:
+def test_conditions_that_become_one_have_the_label_that_is_true_of_it() -> None:
     plain = ids("experiment=rana_planar")
-    without = ids("experiment=rana_planar", "control=null")
-    assert without == {
-        "via-point GA": plain["via-point GA"],
-        "multi-start": plain["via-point GA"],
-        "random search": plain["via-point GA"],
+    ga, drawn = "via-point GA", "random search"
+    for word in ("control=null", "~control"):
+        assert ids("experiment=rana_planar", word) == {ga: plain[ga]}
+    assert ids("experiment=rana_planar", "control=random_search") == {drawn: plain[drawn]}
+    swept = ids("experiment=rana_planar", "control=null,random_search", multirun=True)
+    assert swept == {ga: plain[ga], drawn: plain[drawn]}
+    methods = ids("experiment=curkovic_methods")
+    assert ids("experiment=curkovic_methods", "ga=curkovic_1") == {"I": methods["I"]}
+
+
+def test_a_condition_with_no_label_of_the_file_is_named_by_its_planner() -> None:
+    words = ("experiment=rana_planar", "control=cma_es")
+    (label,) = every = ids(*words)
+    assert label == "cma_es"
+    swept = ids(words[0], "control=stomp,cma_es", multirun=True)
+    assert list(swept) == ["stomp", "cma_es"]
+    assert swept["cma_es"] == every["cma_es"]
+    # also where one of the labels that became one is picked
+    for picked in ("random search", "via-point GA", "cma_es"):
+        assert ids(*words, only=(picked,)) == every
+
+
+def test_a_condition_with_no_label_of_the_file_is_named_by_what_overrides_it(
+    write_experiment: Callable[..., None],
+) -> None:
+    write_experiment(
+        "mine",
+        """
+  "0 elites": [ga.num_elites=0]
+  "2 elites": [ga.num_elites=2]
+  "many": [ga.num_elites=2, ga.population_size=90]
+""",
+    )
+    plain = ids("experiment=mine")
+    assert list(ids("experiment=mine", "ga.num_elites=5")) == [
+        "num_elites=5",
+        "many · num_elites=5",
+    ]
+    assert ids("experiment=mine", "ga.num_elites=2") == {
+        "2 elites": plain["2 elites"],
+        "many": plain["many"],
     }
-    every = ids("experiment=rana_planar", "control=random_search")
-    assert every == dict.fromkeys(plain, plain["random search"])
-    swept = ids("experiment=rana_planar", "control=null,random_search", multirun=True, only=())
-    assert set(swept.values()) == {plain["via-point GA"], plain["random search"]}
-    assert len(swept) == 6
+    assert list(ids("experiment=mine", "ga.population_size=40")) == [
+        "0 elites · population_size=40",
+        "2 elites · population_size=40",
+    ]
+    assert list(ids("experiment=mine", "ga.mutation_rate=0.5")) == list(plain)
+
+
+def test_two_labels_of_one_condition_are_one_row(write_experiment: Callable[..., None]) -> None:
+    write_experiment("mine", '  "as printed": []\n  "{} elites": ["ga.num_elites=0,2"]')
+    found = ids("experiment=mine")
+    assert list(found) == ["as printed ≡ 2 elites", "0 elites"]
+    for label in (*["as printed", "2 elites"], "as printed ≡ 2 elites"):
+        (picked,) = expand(["experiment=mine"], only=[label])
+        assert [each.label for each in picked.conditions] == ["as printed ≡ 2 elites"]
+
+
+def test_of_labels_that_a_budget_makes_one_the_first_stands() -> None:
+    words = ("experiment=lavoie_stopping", "budget=smoke")
+    first = [label for label in ids(words[0]) if "at most 300" not in label]
+    capped = ids(*words)
+    assert list(capped) == first and len(set(capped.values())) == len(capped)
+    picked = ids(*words, only=("stop below 1.5", "at most 300"))
+    assert list(picked) == ["stop below 1.5, at most 100"]
+    swept = ids(*PLAIN, words[1], "ga.num_generations=100,200", multirun=True)
+    assert list(swept) == ["num_generations=100 ≡ num_generations=200"]
 
 
 def test_two_swept_settings_of_one_name_are_told_apart() -> None:
@@ -276,6 +329,12 @@ def test_two_swept_settings_of_one_name_are_told_apart() -> None:
     label = "robot.arms.0.link_lengths=[4,4] · robot.arms.1.link_lengths=[3,3]"
     assert len(swept) == 4
     assert swept[label] == one(*PLAIN, "robot.arms.1.link_lengths=[3,3]")
+
+
+def test_only_picks_labels_with_commas_that_the_command_line_splits() -> None:
+    words = ("experiment=corsepius", "budget=smoke")
+    picked = ids(*words, only=("pose", "empty scene", "wall", "pose"))
+    assert list(picked) == ["pose", "pose, empty scene", "wall"]
 
 
 def test_only_picks_labels() -> None:
@@ -310,7 +369,7 @@ def test_a_multirun_drops_no_experiment_and_no_condition() -> None:
     [
         (
             ["ga.population_size=20,20"],
-            "conditions: must be labels that differ, was 'population_size=20'",
+            "ga.population_size: must be values that differ, was '20,20'",
         ),
         (
             ["budget=smoke,paper"],
@@ -382,7 +441,104 @@ def test_entries_that_cannot_be(
     assert "\n" not in str(caught.value)
 
 
+# Settings that some conditions have
+
+
+def test_a_setting_concerns_the_conditions_that_have_it() -> None:
+    plain = ids("experiment=rana_planar")
+    changed = ids("experiment=rana_planar", "control.num_sweeps=7")
+    assert {label: changed[label] == each for label, each in plain.items()} == {
+        "via-point GA": True,
+        "random search": True,
+        "multi-start": False,
+    }
+    assert ids("experiment=rana_planar", "control.num_sweeps=7", only=("multi-start",)) == {
+        "multi-start": changed["multi-start"]
+    }
+    swept = ids("experiment=rana_planar", "control.num_sweeps=7,40", multirun=True)
+    assert swept == {
+        "via-point GA": plain["via-point GA"],
+        "random search": plain["random search"],
+        "multi-start · num_sweeps=7": changed["multi-start"],
+        "multi-start · num_sweeps=40": plain["multi-start"],
+    }
+
+
+def test_a_part_concerns_the_conditions_whose_planner_takes_it(
+    write_experiment: Callable[..., None], tmp_path: Path
+) -> None:
+    (tmp_path / "planner").mkdir()
+    text = Path(find("planner", "rana_planar").path).read_text()
+    own = "ga: {_target_: genetic, population_size: 9, num_generations: 5, num_elites: 1,"
+    own += " crossover_rate: 0.5, mutation_rate: 1.0}"
+    (tmp_path / "planner/with_ga.yaml").write_text(text.replace("ga: ${ga}", own))
+    write_experiment("mine", '  "taken": []\n  "own": [planner=with_ga, ~ga]')
+    plain, other = ids("experiment=mine"), ids("experiment=mine", "ga=rana_puma")
+    assert list(other) == ["taken · ga=rana_puma", "own"]
+    assert other["own"] == plain["own"] and other["taken · ga=rana_puma"] != plain["taken"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "only", "message"),
+    [
+        (["control.num_sweps=7"], (), "control.num_sweps: unknown setting; did you mean 'num_sw"),
+        (["control.num_sweeps=seven"], (), "control.num_sweeps: must be a whole number, was 'seve"),
+        (["reference.num_steps=100"], (), "reference: must be chosen: grid_frontier, "),
+        (["control.num_sweeps=7"], ("random search",), "control.num_sweeps: unknown setting"),
+        (["control.num_sweeps=7"], ("via-point GA",), "control: must be chosen: cma_es, "),
+    ],
+)
+def test_a_setting_that_concerns_no_condition_is_refused(
+    overrides: list[str], only: tuple[str, ...], message: str
+) -> None:
+    with pytest.raises(EvoexpError) as caught:
+        expand(["experiment=rana_planar", *overrides], only=only)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+ARM = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry>
+<box size="0.4 0.05 0.05"/></geometry></collision></link><joint name="turn" type="revolute">
+<parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_a_file_that_an_override_replaces_need_not_be_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    groups = ("planner", "ga", "objective")
+    chosen = "".join(f"  - override /{group}: via_points\n" for group in groups)
+    (tmp_path / "arm.urdf").write_text(ARM)
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "# @package _global_\ndefaults:\n  - override /robot: urdf\n"
+        f"  - override /scenario: rana_planar\n{chosen}  - override /collision: covered_bodies\n"
+        "robot: {path: not/there.urdf}\n"
+        "scenario: {_target_: arm_motion, q_start: [[-50.0]], q_goal: [[50.0]], length_unit: m,"
+        " security_margin: 0.0}\nconditions: {few: [ga.population_size=10], many: []}\n"
+    )
+    words = (f"experiment={path}", f"robot.path={tmp_path / 'arm.urdf'}")
+    for only in ((), ("few",)):
+        (found,) = expand(words, only=only)
+        assert found.changed
+        assert found.conditions[0].label == "few"
+    with pytest.raises(SettingError, match=r"robot.path: must be a file that can be read"):
+        expand(words[:1])
+
+
 # Budgets
+
+
+def test_the_budget_of_a_condition_is_what_capped_it() -> None:
+    budgets = [
+        expand([*PLAIN, *words])[0].budget_of("rana_obstacles")
+        for words in (
+            ["budget=quick"],
+            ["budget=smoke"],
+            ["budget=smoke", "ga.num_generations=10"],
+            ["budget.collision_queries=1e5"],
+        )
+    ]
+    assert budgets == ["paper", "smoke", "paper", "paper, capped"]
 
 
 def generations(experiment: Experiment) -> list[int]:

@@ -53,21 +53,27 @@ def package(tmp_path: Path) -> Iterator[Path]:
         yield conf
 
 
-def test_the_first_folder_that_has_an_option_wins(
+def test_each_place_is_searched_before_the_next_one(
     package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ("experiment=rana_obstacles", "ga=mine")
-    given = [write_ga(tmp_path / f"given {k}, [a]='b'", "mine", 10 + k) for k in (1, 2)]
-    variable = [write_ga(tmp_path / f"variable{k}", "mine", 20 + k) for k in (1, 2)]
-    assert (population_size(*words), origin("ga", "mine")) == (13, "my-options 0.3")
+    """One option in all places: each wins once those before it have it no more."""
+    words = ("experiment=rana_obstacles",)  # with ga=rana_planar, which is shipped with 50
+    given = [tmp_path / f"given {k}, [a]='b'" for k in (1, 2)]
+    variable = [tmp_path / f"variable{k}" for k in (1, 2)]
+    places = [*given, *variable, package]
+    for size, folder in enumerate(places, 11):
+        write_ga(folder, "rana_planar", size)
     monkeypatch.setenv("EVOEXP_CONFIG_DIR", os.pathsep.join(map(str, variable)))
-    assert (population_size(*words), origin("ga", "mine")) == (21, str(variable[0]))
+    found = []
     with searched_first(map(str, given)):
-        assert (population_size(*words), origin("ga", "mine")) == (11, str(given[0]))
-        assert [folder.path for folder in folders()][:5] == [*given, *variable, package]
-        assert folders()[-1].origin == origin("ga", "lavoie") == "evoexp"
-    assert population_size(*words) == 21
-    assert {"mine", "lavoie"} <= set(options("ga"))
+        assert [folder.path for folder in folders()][:5] == places
+        for folder in [*places, None]:
+            found.append((population_size(*words), origin("ga", "rana_planar")))
+            if folder is not None:
+                (folder / "ga" / "rana_planar.yaml").unlink()
+        assert {"mine", "lavoie"} <= set(options("ga"))
+    names = [*map(str, given), *map(str, variable), "my-options 0.3", "evoexp"]
+    assert found == list(zip([11, 12, 13, 14, 15, 50], names, strict=True))
 
 
 def test_an_option_may_replace_a_shipped_one_and_says_so(tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def test_the_page_of_assumptions_judges_three_claims_under_every_variation(outpu
     directory = smoke_report(outputs, "chen_assumptions")
     assert figure_stems(directory) == {"assumptions", "scene"}
     text = (directory / "index.md").read_text()
-    for name in ("obstacles mirrored", "slow decay of unsafeness", "50 generations"):
+    for name in ("obstacles mirrored", "slow decay of unsafeness"):
         assert f"| {name} | `" in text
     claims = text.split("## Claims")[1].split("## ")[0]
     rows = [row for row in claims.splitlines() if "— whatever number is assumed" in row]

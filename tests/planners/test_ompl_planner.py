@@ -21,8 +21,9 @@ ANYTIME = ("RRTstar", "InformedRRTstar", "BITstar", "PRMstar")
 
 
 def condition(*words: str, label: str = "rana_planar") -> Condition:
-    (experiment,) = expand(["experiment=rrt_connect", *words])
-    return next(each.condition for each in experiment.conditions if each.label == label)
+    (experiment,) = expand(["experiment=rrt_connect", *words], only=[label])
+    ((_, chosen),) = experiment.conditions
+    return chosen
 
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:

@@ -32,8 +32,9 @@ POST = body("cylinder", [1.0, 0.03], [0.35, 0.35, 0.5], name="post")  # in the s
 
 
 def condition(label: str, *changes: str) -> Condition:
-    (experiment,) = expand(["experiment=rrt_connect", *changes])
-    return next(each.condition for each in experiment.conditions if each.label == label)
+    (experiment,) = expand(["experiment=rrt_connect", *changes], only=[label])
+    ((_, chosen),) = experiment.conditions
+    return chosen
 
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:

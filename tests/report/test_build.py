@@ -258,12 +258,7 @@ def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None
 
 
 def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
-    words = (
-        "ga.population_size=8",
-        "ga.hall_depth=0.25",
-        "ga.num_generations=3",
-        "num_replicates=3",
-    )
+    words = ("ga.hall_depth=0.25", "ga.num_generations=3", "num_replicates=3")
     methods = [f"experiment=curkovic_methods budget=smoke {' '.join(words)}"]
     experiment = compose.expand(methods[0].split(), only=["V", "VI"])[0]
     plain = compose.expand([w for w in methods[0].split() if "hall" not in w], only=["I", "II"])[0]

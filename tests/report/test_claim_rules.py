@@ -3,10 +3,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evoexp.papers.rana import page as rana_page
 from evoexp.report.claim_rules import KINDS, Rules, read_rules
-from evoexp.report.judging import Judge
+from evoexp.report.judging import Judge, left_out, not_judged
 from evoexp.report.proportions import Proportion
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import Results
 from evoexp.report.verdicts import compare
+from report_samples import REPORT
 
 BETTER = compare("cost", np.arange(12.0), np.arange(12.0) + 20.0, True, 0.95, 50)
 ENTRY = (
@@ -85,3 +89,34 @@ def test_an_unjudged_claim_names_the_reason_and_keeps_its_numbers(tmp_path: Path
     claim = hearing.every("1 of 2", 1, 2, 2)
     assert (claim.verdict, claim.evidence) == ("not judged (budget smoke)", "1 of 2")
     assert hearing.elsewhere("its sweep").verdict == "not judged"
+
+
+@pytest.mark.parametrize("kind", ["better", "better than all", "best"])
+def test_a_comparison_with_nothing_is_not_judged(tmp_path: Path, kind: str) -> None:
+    hearing = Judge("", 0.05, rules_of(tmp_path, kind)).on("told", who="", metric="cycles")
+    claim = {
+        "better": lambda: hearing.better(None, "lower"),
+        "better than all": lambda: hearing.better_than_all("–", []),
+        "best": lambda: hearing.best("–", [], True),
+    }[kind]()
+    assert claim.verdict == "not judged (nothing to compare)"
+
+
+def test_claims_on_conditions_that_were_left_out_are_not_judged(results: Results) -> None:
+    assert list(left_out(results, ())) == []
+    alone = results._replace(conditions=results.conditions[:1])
+    found = {claim.name: claim for claim in left_out(alone, ())}
+    assert {"free_at_via_points", "evolution_adds"} <= found.keys()
+    assert {claim.verdict for claim in found.values()} == {"not judged (conditions left out)"}
+    assert all("multi-start, random search" in claim.evidence for claim in found.values())
+    judged = [found.pop("free_at_via_points")]
+    assert [claim.name for claim in left_out(alone, judged)] == list(found)
+
+
+def test_nothing_is_judged_on_a_control_alone(results: Results) -> None:
+    controls = tuple(c for c in results.conditions if c.is_control)
+    alone = results._replace(conditions=controls, budget="paper")
+    assert not_judged(alone) == "only a control was run"
+    claims = rana_page.page(alone, ReportSettings(**REPORT, figures="rana")).claims
+    own = [claim.verdict for claim in claims if claim.name == "free_at_via_points"]
+    assert own == ["not judged (only a control was run)"] * len(controls)

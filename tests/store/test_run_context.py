@@ -10,8 +10,9 @@ import pyarrow.parquet as pq
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import expansions
 from evoexp.load import load
+from evoexp.shipped import shipped
 from evoexp.store.manifest import manifest
-from evoexp.store.run_context import run_context, with_context
+from evoexp.store.run_context import origin, run_context, with_context
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 
@@ -66,7 +67,7 @@ def test_names_are_short_where_nothing_else_has_them(tmp_path: Path) -> None:
     }
     (tmp_path / "config.json").write_text(json.dumps(config))
     (tmp_path / "manifest.json").write_text(json.dumps({"experiment": "e", "label": "l"}))
-    assert run_context(tmp_path, ["best_cost"]) == {
+    assert run_context(tmp_path, "0" * 64, ["best_cost"]) == {
         "experiment": "e",
         "label": "l",
         "planner": "a",
@@ -78,7 +79,7 @@ def test_names_are_short_where_nothing_else_has_them(tmp_path: Path) -> None:
         "seed": 7,
     }
     (tmp_path / "config.json").write_text("[" * 100_000)
-    assert run_context(tmp_path, []) == {"experiment": "e", "label": "l"}
+    assert run_context(tmp_path, "0" * 64, []) == {"experiment": "e", "label": "l"}
 
 
 def test_constant_columns_are_what_arrow_makes_of_them() -> None:
@@ -90,3 +91,22 @@ def test_constant_columns_are_what_arrow_makes_of_them() -> None:
         assert found[name].to_pylist() == truth.to_pylist()
         assert found[name].type == truth.type
     assert with_context(table.slice(0, 0), given).num_rows == 0
+
+
+def test_the_origin_of_a_run_follows_from_its_condition() -> None:
+    def known(manifest: dict[str, str], condition_id: str) -> tuple[object, ...]:
+        return tuple(origin(manifest, condition_id).values())
+
+    (row,) = (
+        row for row in shipped() if row[:3] == ("rana_planar_ablations", "as printed", "paper")
+    )
+    others = {each.experiment for each in shipped() if each.condition_id == row.condition_id}
+    assert "rana_planar" in others
+    mine = {"experiment": "rana_planar_ablations", "label": "via-point GA", "budget": "quick"}
+    assert known(mine, row.condition_id) == (*row[:3], False)
+    assert known({"experiment": "e", "budget": "smoke"}, row.condition_id)[2:] == ("paper", False)
+    # a label that was made for it, in an experiment that has no such condition
+    named = {"experiment": "lavoie", "label": "cma_es", "budget": "smoke"}
+    assert known(named, row.condition_id) == ("lavoie", "cma_es", "paper", True)
+    assert known(named, "0" * 64) == ("lavoie", "cma_es", "smoke", True)
+    assert known({}, "0" * 64) == (None, None, None, False)

@@ -127,7 +127,8 @@ def _ids(name: str, budget: str) -> set[str]:
 
 def _is_quick(name: str, begun: Sequence[RunDirectory]) -> bool:
     """Return whether runs, whose hashes are those of the paper's budget, are of `quick`."""
-    if any(_notes(run).get("budget") != "quick" for run in begun):
+    commands = [_words(str(_notes(run).get("command", ""))) for run in begun]
+    if not all("budget=quick" in words for words in commands):
         return False
     (quick,) = expansions.expand([f"experiment={name}", "budget=quick"])
     return all(len(run.completed()) <= quick.num_replicates for run in begun)

@@ -15,6 +15,7 @@ from evoexp.commands.console import add_columns, new_table, plain_console, print
 from evoexp.commands.pack import unpacked
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
+from evoexp.configuration.labels import SAME
 from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build, markdown
@@ -198,15 +199,16 @@ def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings
         [*chosen, *overrides], multirun=multirun or len(names) > 1, only=only
     )
     several = len(experiments) > 1
-    labelled = tuple(
-        (f"{experiment.name}: {label}" if several else label, condition)
-        for experiment in experiments
-        for label, condition in experiment.conditions
-    )
+    rows: dict[str, tuple[str, Condition]] = {}  # experiments share conditions
+    for experiment in experiments:
+        for label, condition in experiment.conditions:
+            name = f"{experiment.name}: {label}" if several else label
+            before = [rows[condition.id][0]] if condition.id in rows else []
+            rows[condition.id] = SAME.join([*before, name]), condition
     first = experiments[0]
     name = _name("+".join(experiment.report_name for experiment in experiments), len(experiments))
     title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
-    request = build.Request(name, title, first.budget, labelled, words, None, "compare")
+    request = build.Request(name, title, first.budget, tuple(rows.values()), words, None, "compare")
     return request, _with_page(first.report), first.num_replicates
 
 

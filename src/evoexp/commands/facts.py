@@ -24,6 +24,9 @@ from evoexp.store.identity import TAKEN
 from evoexp.store.kept_facts import kept_fact
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
+from evoexp.store.plans import num_planned
+from evoexp.store.run_context import ORIGIN
+from evoexp.store.run_context import origin as origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
@@ -58,13 +61,13 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
     origin = {
         "experiment": experiment.name,
         "label": label,
-        "budget": experiment.budget,
+        "budget": experiment.budget_of(label),
         "command": command,
         "options": experiment.option_names(label),
     }
     run = RunDirectory(outputs_root(), condition.id)
     rows = summary_table(run).to_pylist() if run.completed() or run.failed() else []
-    planned = condition.num_replicates(experiment.num_replicates)
+    planned = num_planned(run, condition.num_replicates(experiment.num_replicates))
     around = run.manifest() if rows else None
     config_json = condition.to_json()
     if not lacking(config_json):  # else a note says how to install it
@@ -75,8 +78,10 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
 def stored_facts(run: RunDirectory) -> dict[str, Any]:
     """Return the facts about a stored run."""
     manifest = run.manifest()
-    names = ("experiment", "label", "budget", "command", "options", TAKEN)
-    origin = {name: manifest[name] for name in names if name in manifest}
+    known = origin_of(manifest, run.condition_id)
+    named = {name: known[name] for name in ORIGIN if known[name]}
+    others = ("command", "options", TAKEN)
+    origin = named | {name: manifest[name] for name in others if name in manifest}
     origin |= {"code": manifest.get("git"), "directory": str(run.path)}
     config_json = run.config_json()
     found = _facts(config_json, origin, manifest, summary_table(run).to_pylist(), None)
@@ -130,8 +135,7 @@ def _facts(
         "condition": condition_id,
         "shipped_as": [
             {"experiment": row.experiment, "label": row.label, "budget": row.budget}
-            for row in shipped.shipped()
-            if row.condition_id == condition_id
+            for row in shipped.rows_by_condition().get(condition_id, ())
         ],
         "components": list(_components(config)),
         "origin": origin,

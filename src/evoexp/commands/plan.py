@@ -4,13 +4,11 @@ Nothing is run or written.
 """
 
 import argparse
-import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
 from rich.table import Table
 
 from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
@@ -23,13 +21,14 @@ from evoexp.commands.console import (
     plain_console,
     print_json,
 )
+from evoexp.commands.stored_times import StoredTimes
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
-from evoexp.errors import StoreError
-from evoexp.store.identity import CONFIG, read
-from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
-from evoexp.store.summaries import damaged_logs, summary_table
+from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.summaries import damaged_logs
 
+START_S = 5.0  # [s] assumed: at most, to start workers and compile nothing
+CONDITION_S = 0.05  # [s] assumed: at most, to prepare a condition and write its files
 KEYS = (
     "experiment",
     "label",
@@ -41,6 +40,8 @@ KEYS = (
     "damaged",
     "other_revision",
     "cpu_s_each",
+    "cpu_s_least",
+    "cpu_s_most",
     "cpu_s_from",
     "memory_gb_each",
 )
@@ -60,7 +61,9 @@ class PlannedCondition(NamedTuple):
         damaged: Those of the missing ones whose log is damaged.
         other_revision: Hashes of stored runs of the same settings by components of another
             revision.
-        cpu_s_each: Median CPU time of a replicate [s]; None: unknown.
+        cpu_s_each: CPU time of a replicate [s], as far as it is known; None: unknown.
+        cpu_s_least: The least that it may take in the mean [s].
+        cpu_s_most: The most that it may take in the mean [s].
         cpu_s_from: Origin of that time.
         memory_gb_each: Estimate of the memory of a replicate [GB].
     """
@@ -75,16 +78,10 @@ class PlannedCondition(NamedTuple):
     damaged: int
     other_revision: tuple[str, ...]
     cpu_s_each: float | None
+    cpu_s_least: float | None
+    cpu_s_most: float | None
     cpu_s_from: str
     memory_gb_each: float
-
-
-class _StoredRun(NamedTuple):
-    """A stored run as far as estimates need it."""
-
-    name: str
-    settings: Any
-    run: RunDirectory
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,7 +97,7 @@ def main(arguments: argparse.Namespace) -> int:
     experiments = expansions.expand(
         arguments.overrides, multirun=arguments.multirun, only=arguments.only
     )
-    stored = list(_stored_runs(outputs_root()))
+    stored = StoredTimes(outputs_root())
     rows, seen = [], set[str]()
     for experiment in experiments:
         for label, condition in experiment.conditions:
@@ -118,35 +115,16 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _stored_runs(outputs: Path) -> Iterator[_StoredRun]:
-    """Yield the stored runs whose configuration can be read."""
-    for name in run_names(outputs):
-        try:
-            content = read(outputs / "runs" / name / CONFIG)
-            config = json.loads(content)
-        except (StoreError, ValueError):
-            continue
-        condition_id = hashlib.sha256(content).hexdigest()
-        if condition_id.startswith(name) and isinstance(config, dict):
-            yield _StoredRun(name, config, RunDirectory(outputs, condition_id))
-
-
 def _planned(
-    experiment: str, label: str, condition: Condition, count: int, stored: list[_StoredRun]
+    experiment: str, label: str, condition: Condition, count: int, stored: StoredTimes
 ) -> PlannedCondition:
     run = RunDirectory(outputs_root(), condition.id)
     asked = set(range(count))
     damaged = {int(Path(name).stem) for name in damaged_logs(run)} if run.completed() else set()
     cached = (run.completed() - damaged) & asked
     failed = run.failed() & asked
-    own = json.loads(condition.to_json())
-    plain = without_revisions(own)
-    others = tuple(
-        each.name
-        for each in stored
-        if each.settings != own and without_revisions(each.settings) == plain
-    )
-    seconds, origin = _seconds(condition, run, own, stored)
+    settings = json.loads(condition.to_json())
+    estimate = stored.estimate(condition, run, settings)
     return PlannedCondition(
         experiment,
         label,
@@ -156,56 +134,10 @@ def _planned(
         count - len(cached) - len(failed),
         len(failed),
         len(damaged & asked),
-        others,
-        seconds,
-        origin,
+        stored.other_revisions(settings, condition.id),
+        *estimate,
         round(replicate_memory(condition) / GIGABYTE, 4),
     )
-
-
-def without_revisions(config: Any) -> Any:
-    """Return plain data of a condition without the revisions of its components."""
-    if isinstance(config, Mapping):
-        return {key: without_revisions(v) for key, v in config.items() if key != "revision"}
-    if isinstance(config, list):
-        return [without_revisions(value) for value in config]
-    return config
-
-
-def _seconds(
-    condition: Condition, run: RunDirectory, own: Any, stored: list[_StoredRun]
-) -> tuple[float | None, str]:
-    """Estimate the CPU time of a replicate: from its own ones, else from runs like it."""
-    if times := _column(run, "cpu_s"):
-        return float(np.median(times)), f"{len(times)} of its own"
-    alike = [
-        each
-        for each in stored
-        if _component(each.settings, "planner") == _component(own, "planner")
-        and each.settings.get("robot") == own["robot"]
-        and each.settings.get("scenario") == own["scenario"]
-    ]
-    rates = []
-    for each in alike:
-        spent, done = _column(each.run, "cpu_s"), _column(each.run, "evaluations")
-        rates += [a / b for a, b in zip(spent, done, strict=True) if b]
-    if not rates:
-        return None, "nothing stored like it"
-    planner = condition.planner
-    most = sum(planner.num_evaluations(k) for k in range(min(planner.num_generations, 10_000) + 1))
-    return float(np.median(rates)) * most, f"{len(alike)} other runs of the scene, at most"
-
-
-def _component(config: Any, group: str) -> Any:
-    return config.get(group, {}).get("_target_") if isinstance(config, Mapping) else None
-
-
-def _column(run: RunDirectory, name: str) -> list[float]:
-    """Return a column of the finished replicates of a run; empty if there are none."""
-    if not run.completed():
-        return []
-    rows = summary_table(run).select(["status", name]).to_pylist()
-    return [float(row[name]) for row in rows if row["status"] == "done" and row[name] is not None]
 
 
 def _table(rows: list[PlannedCondition]) -> Table:
@@ -225,10 +157,17 @@ def _table(rows: list[PlannedCondition]) -> Table:
             str(row.failed),
             str(row.damaged),
             ", ".join(row.other_revision) or "–",
-            "unknown" if row.cpu_s_each is None else f"{row.cpu_s_each:.3g}",
+            _seconds(row.cpu_s_each, row.cpu_s_least, row.cpu_s_most),
             f"{row.memory_gb_each:.3g}",
         )
     return table
+
+
+def _seconds(mean: float | None, least: float | None, most: float | None) -> str:
+    """Return a time, or a range if its ends differ by more than a factor of two."""
+    if mean is None or least is None or most is None:
+        return "unknown"
+    return f"{mean:.3g}" if most <= 2 * least else f"{least:.2g} to {most:.2g}"
 
 
 def _total(rows: list[PlannedCondition], workers: int) -> str:
@@ -240,10 +179,13 @@ def _total(rows: list[PlannedCondition], workers: int) -> str:
     if not missing:
         return f"nothing to run{f': {again}' if failed else ': every replicate is there'}"
     todo = [row for row in rows if row.missing]
-    known = [(row.cpu_s_each, row.missing) for row in todo if row.cpu_s_each is not None]
-    seconds = sum(each * count for each, count in known)
+    known = [row for row in todo if row.cpu_s_each is not None]
+    bounds = attrgetter("cpu_s_each", "cpu_s_least", "cpu_s_most")
+    cpu = [sum(row.missing * bounds(row)[k] for row in known) for k in range(3)]
+    starting = START_S + CONDITION_S * len(todo)
+    wall = cpu[0] / workers, cpu[1] / workers, cpu[2] / workers + starting
     unknown = sum(row.missing for row in todo if row.cpu_s_each is None)
-    time = f"{seconds:.3g} s of CPU time, {seconds / workers:.3g} s on {workers} workers"
+    time = f"{_seconds(*cpu)} s of CPU time, {_seconds(*wall)} s on {workers} workers"
     open_ones = f"{unknown} of them of unknown length" if known else "of unknown length"
     largest = max(row.memory_gb_each for row in todo)
     parts = (

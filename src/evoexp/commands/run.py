@@ -29,6 +29,7 @@ from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
 from evoexp.report.pages import page_registration
 from evoexp.report.standing_reports import StandingReport, inputs_of_reports
+from evoexp.store.plans import num_planned
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
@@ -208,7 +209,7 @@ def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
     """Return the notes that a new run's manifest keeps of its origin; no part of its identity."""
     return {
         "experiment": experiment.name,
-        "budget": experiment.budget,
+        "budget": experiment.budget_of(label),
         "label": label,
         "options": experiment.option_names(label),
         "command": command,
@@ -216,16 +217,20 @@ def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
 
 
 def summary_table(experiment: Experiment) -> Table:
-    """Return a table of the conditions: replicates done, solved, cost and time."""
+    """Return a table of the conditions: replicates done, solved, cost and time.
+
+    As the report, it has all stored replicates, also those beyond the number that is asked for.
+    """
     table = new_table(experiment.report_name)
     add_columns(table, "condition")
     add_hash_column(table)
     add_columns(table, "replicates", "solved", "median\nbest cost", "CPU s\neach", right=True)
     for label, condition in experiment.conditions:
-        rows = stored_summaries(RunDirectory(outputs_root(), condition.id))
-        planned = condition.num_replicates(experiment.num_replicates)
-        columns = rows.select(["replicate", "status", "solved", "best_cost", "cpu_s"]).to_pylist()
-        done = [row for row in columns if row["status"] == "done" and row["replicate"] < planned]
+        run = RunDirectory(outputs_root(), condition.id)
+        rows = stored_summaries(run)
+        planned = num_planned(run, condition.num_replicates(experiment.num_replicates))
+        columns = rows.select(["status", "solved", "best_cost", "cpu_s"]).to_pylist()
+        done = [row for row in columns if row["status"] == "done"]
         table.add_row(
             label,
             condition.id[:12],
@@ -234,6 +239,9 @@ def summary_table(experiment: Experiment) -> Table:
             _median([row["best_cost"] for row in done], ".4g"),
             _median([row["cpu_s"] for row in done], ".3f"),
         )
+        if planned > condition.num_replicates(experiment.num_replicates):
+            asked = experiment.num_replicates
+            table.caption = f"of {asked} asked for: all that are stored, here and in the report"
     return table
 
 

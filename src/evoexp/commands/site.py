@@ -20,7 +20,7 @@ from evoexp.report.home_page import Paper, StoredRun, home_page, summaries
 from evoexp.report.page_summary import HTML
 from evoexp.store.busy_runs import is_being_written
 from evoexp.store.files import write_file
-from evoexp.store.identity import DamagedFile
+from evoexp.store.plans import num_planned
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written
@@ -75,7 +75,9 @@ def say_busy(console: Console) -> None:
     busy = [
         name
         for name, run in stored_runs(outputs_root())
-        if isinstance(run, RunDirectory) and _planned(run) > _done(run) and is_being_written(run)
+        if isinstance(run, RunDirectory)
+        and num_planned(run) > len(run.completed())
+        and is_being_written(run)
     ]
     if busy:
         more = ", …" if len(busy) > MAX_NAMED else ""
@@ -118,17 +120,4 @@ def _runs(outputs: Path) -> Iterator[StoredRun]:
             str(origin[key] or "") for key in ("experiment", "label", "budget")
         )
         done, failed = len(run.completed()), len(run.failed())
-        yield StoredRun(name, experiment, label, budget, done, _planned(run), failed)
-
-
-def _done(run: RunDirectory) -> int:
-    return len(run.completed())
-
-
-def _planned(run: RunDirectory) -> int:
-    """Return how many replicates were asked for; at least those that are there."""
-    try:
-        plans = [plan.num_replicates for plan in run.plans()]
-    except DamagedFile:
-        plans = []
-    return max([*plans, _done(run) + len(run.failed())])
+        yield StoredRun(name, experiment, label, budget, done, num_planned(run), failed)

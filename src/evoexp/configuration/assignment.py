@@ -5,12 +5,22 @@ A dotted path leads through mappings by their keys and through lists by indices 
 component decides whether it has such a setting.
 """
 
+import contextlib
 import difflib
 from typing import Any
 
-from evoexp.configuration.overrides import ADD, DELETE, FORCE, SCALARS, Choice, Override
+from evoexp.configuration.overrides import (
+    ADD,
+    DELETE,
+    FORCE,
+    NOT_IDENTITY,
+    SCALARS,
+    Choice,
+    Override,
+)
 from evoexp.configuration.search_path import groups, options
-from evoexp.errors import SettingError, UnknownSetting, nearest
+from evoexp.errors import EvoexpError, SettingError, UnknownSetting, nearest
+from evoexp.registry import component_class
 from evoexp.validation import TARGET
 
 
@@ -33,6 +43,40 @@ def assign_all(config: dict[str, Any], overrides: Choice) -> None:
     for override in reversed(by_path):
         if override.prefix == DELETE:
             _delete(config, override)
+
+
+def known_instead(config: dict[str, Any], override: Override) -> list[str] | None:
+    """Return the settings of a component that lacks an overridden one; None if it has that one.
+
+    A component that reads files, and all that is no component, is not looked into: whether there is
+    such a setting is checked with its value.
+
+    Args:
+        config: Composed options.
+        override: Of a setting or a group.
+
+    Returns:
+        None if the override concerns this configuration; no names if no option of the override's
+        group is chosen.
+    """
+    root, *parts = override.key.split(".")
+    if root in NOT_IDENTITY or root not in groups() or not parts:
+        return None
+    if override.prefix in (ADD, FORCE):  # it adds what there is not
+        return None
+    node = config.get(root)
+    if node is None:
+        return []
+    for part in parts:
+        if not isinstance(node, dict):
+            return None
+        if part not in node and isinstance(name := node.get(TARGET), str):
+            with contextlib.suppress(EvoexpError):  # of a component that there is not
+                kind = component_class(name, root)
+                if part not in kind.model_fields and not hasattr(kind, "read_files"):
+                    return list(kind.model_fields)
+        node = node.get(part)
+    return None
 
 
 def _parts(key: str) -> list[tuple[int, str]]:

@@ -9,9 +9,9 @@ import copy
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import hydra
 import yaml
@@ -26,6 +26,7 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.configuration.assignment import assign_all
 from evoexp.configuration.building import build_condition, build_settings, planned_replicates
+from evoexp.configuration.conditions import Builder, Built, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
 from evoexp.configuration.interpolations import MARK, NotWhole, fill_in, refuse_functions
 from evoexp.configuration.option_files import check_file, check_files
@@ -33,7 +34,6 @@ from evoexp.configuration.overrides import (
     ADD,
     DELETE,
     FORCE,
-    JOIN,
     NOT_IDENTITY,
     SCALARS,
     Choice,
@@ -46,7 +46,7 @@ from evoexp.configuration.overrides import (
     single_values,
     sweep,
 )
-from evoexp.configuration.problem_folders import FOLDER, problem_choices
+from evoexp.configuration.problem_folders import FOLDER
 from evoexp.configuration.refusals import (
     uncomposed,
     unparsed,
@@ -60,25 +60,13 @@ from evoexp.configuration.search_path import (
     groups,
     is_file,
 )
-from evoexp.errors import SettingError, UnknownOption, UnknownSetting
+from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
 _PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 _COMPOSER = (HydraException, OmegaConfBaseException, yaml.YAMLError, ValueError, TypeError, OSError)
-
-
-class Composed(NamedTuple):
-    """Chosen options, composed.
-
-    Attributes:
-        config: Their settings as plain data, interpolations as they are written.
-        options: The option taken of each group.
-    """
-
-    config: dict[str, Any]
-    options: tuple[Option, ...]
 
 
 def expand(
@@ -175,13 +163,14 @@ class _Composer:
         Raises:
             EvoexpError: If they cannot be composed.
         """
-        choices = {key: overrides[key] for key in sorted(overrides) if key in groups()}
-        base = self._chosen(choices, file)
+        base = self.chosen(overrides, file)
         config = copy.deepcopy(base.config)
-        assign_all(config, {key: each for key, each in overrides.items() if key not in choices})
+        assign_all(config, {key: each for key, each in overrides.items() if key not in groups()})
         return Composed(config, base.options)
 
-    def _chosen(self, choices: Choice, file: Option | None) -> Composed:
+    def chosen(self, overrides: Choice, file: Option | None) -> Composed:
+        """Return the options that overrides choose, with the settings that these have."""
+        choices = {key: overrides[key] for key in sorted(overrides) if key in groups()}
         words = [_choosing(override) for override in choices.values()]
         names = {group: override.option() for group, override in choices.items()}
         if file is not None:
@@ -234,94 +223,78 @@ def _quoted(text: str) -> str:
 def _expand_one(
     file: Option | None, overrides: Choice, only: Sequence[str], compose: _Composer
 ) -> Experiment:
-    name = file.name if file else "custom"
-    base, labelled = _labelled(name, overrides, only, compose, file)
-    budget = build_settings(Budget, base["budget"], "budget")
-    found = {label: compose(choice, file) for label, choice in labelled.items()}
-    conditions = tuple(
-        Labelled(label, _condition(composed.config, budget)) for label, composed in found.items()
-    )
+    base, budget, builder = _builder(file, overrides, compose)
+    built = builder.build_all(overrides, only)
     return Experiment(
-        name,
+        builder.name,
         budget.name,
-        conditions,
+        tuple(Labelled(label, each.condition) for label, each in built.items()),
         planned_replicates(base["num_replicates"], budget),
         build_settings(RunnerSettings, base["runner"], "runner"),
         build_settings(ReportSettings, base["report"], "report"),
-        _changed(file, overrides, only, conditions, compose),
-        {label: composed.options for label, composed in found.items()},
+        _is_changed(file, overrides, only, built, compose),
+        {label: each.options for label, each in built.items()},
+        tuple(label for label, each in built.items() if each.is_capped),
     )
 
 
-def _changed(
+def _builder(
+    file: Option | None, overrides: Choice, compose: _Composer
+) -> tuple[dict[str, Any], Budget, Builder]:
+    """Return the settings that all conditions share, their budget, and who builds them."""
+    first = {key: each for key, each in next(sweep(overrides)).items() if key != FOLDER}
+    base = _shared(compose(concerning(first, compose.chosen(first, file).config), file).config)
+    budget = build_settings(Budget, base["budget"], "budget")
+    builder = Builder(
+        file.name if file else "custom",
+        list(_entries(base["conditions"])),
+        lambda choice: compose.chosen(choice, file),
+        lambda choice: compose(choice, file),
+        lambda config: _condition(config, budget),
+    )
+    return base, budget, builder
+
+
+def _is_changed(
     file: Option | None,
     overrides: Choice,
     only: Sequence[str],
-    conditions: tuple[Labelled, ...],
+    built: Mapping[str, Built],
     compose: _Composer,
 ) -> bool:
     """Whether the conditions differ from those that the experiment has by itself."""
     plain = {key: each for key, each in overrides.items() if key in NOT_IDENTITY}
     if file is None or (len(plain) == len(overrides) and not only):
         return file is None
-    base, labelled = _labelled(file.name, plain, (), compose, file)
-    if list(labelled) != [label for label, _ in conditions]:
+    try:
+        own = _builder(file, plain, compose)[2].build_all(plain, ())
+    except EvoexpError:  # a file that the experiment names need not be there
         return True
-    budget = build_settings(Budget, base["budget"], "budget")
-    return any(
-        _condition(compose(labelled[label], file).config, budget).id != condition.id
-        for label, condition in conditions
-    )
+    return [(label, each.condition.id) for label, each in built.items()] != [
+        (label, each.condition.id) for label, each in own.items()
+    ]
 
 
-def _labelled(
-    name: str, overrides: Choice, only: Sequence[str], compose: _Composer, file: Option | None
-) -> tuple[dict[str, Any], dict[str, Choice]]:
-    """Return the settings that all conditions share, and the overrides of each label."""
-    swept = list(sweep(overrides))
-    first = {key: each for key, each in swept[0][1].items() if key != FOLDER}
-    base = _shared(compose(first, file).config)
-    labels: dict[str, Choice] = {}
-    owner: dict[str, str] = {}  # the file's own label of a condition that is swept over
-    for template, entry in _entries(base["conditions"]):
-        for label, own in expand_entry(template, map(parse, entry)):
-            for suffix, chosen_here in swept:
-                # the command line wins
-                for problem, choice in problem_choices(own | chosen_here):
-                    parts = (label, suffix, problem)
-                    joined = JOIN.join(part for part in parts if part) or name
-                    if not joined.isprintable():
-                        raise SettingError("conditions", "labels of printable characters", joined)
-                    if joined in labels:
-                        raise SettingError("conditions", "labels that differ", joined)
-                    labels[joined], owner[joined] = choice, label
-    if unknown := [label for label in only if label not in {*labels, *owner.values()}]:
-        raise UnknownOption("--only", unknown[0], labels)
-    return base, {
-        label: choice
-        for label, choice in labels.items()
-        if not only or {label, owner[label]} & set(only)
-    }
-
-
-def _entries(conditions: Any) -> Iterator[tuple[str, list[str]]]:
-    """Yield label and overrides of the entries of `conditions`; without any, one that is empty."""
+def _entries(conditions: Any) -> Iterator[Entry]:
+    """Expand the entries of `conditions`; without any, an empty one."""
     if not isinstance(conditions, dict | None):
         raise SettingError("conditions", "a mapping of labels to lists of overrides", conditions)
     for template, entry in (conditions or {"": []}).items():
         if not isinstance(entry, list) or not all(isinstance(text, str) for text in entry):
             raise SettingError(f"conditions.{template}", "a list of overrides", entry)
-        yield str(template), entry
+        yield from expand_entry(str(template), map(parse, entry))
 
 
-def _condition(config: dict[str, Any], budget: Budget) -> Condition:
-    """Build one composed configuration, its generations and queries capped by the budget."""
+def _condition(config: dict[str, Any], budget: Budget) -> tuple[Condition, bool]:
+    """Build a composed configuration; return it with whether the budget capped it."""
     plain, cap = _resolved(config), budget.max_generations
     asked = (plain.get("ga") or {}).get("num_generations")
-    if cap is not None and isinstance(asked, int) and asked > cap:  # before a planner takes it in
+    is_capped = cap is not None and isinstance(asked, int) and asked > cap
+    if is_capped:  # before a planner takes it in
         plain = _resolved(config | {"ga": config["ga"] | {"num_generations": cap}})
     built = build_condition(plain, str(config["planner"]))
-    return built._replace(max_collision_queries=budget.collision_queries)
+    most = budget.collision_queries
+    return built._replace(max_collision_queries=most), is_capped or most is not None
 
 
 def _shared(config: dict[str, Any]) -> dict[str, Any]:

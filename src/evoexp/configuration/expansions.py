@@ -141,6 +141,7 @@ def _experiment(plain: dict[str, Any]) -> Experiment:
     report = ReportSettings.model_validate_json(plain["report"])
     options = {label: tuple(Option(*each) for each in own) for label, own in plain["options"]}
     changed = {"conditions": tuple(conditions), "runner": runner, "report": report}
+    changed |= {"capped": tuple(plain["capped"])}
     return Experiment(**(plain | changed | {"options": options}))
 
 

@@ -18,6 +18,7 @@ def _whole(value: Any) -> Any:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
+PAPER = "paper"  # the budget without caps
 Queries = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=LARGEST_CAP)]
 
 
@@ -51,7 +52,7 @@ class Experiment(NamedTuple):
     Attributes:
         name: Of the experiment file; "custom" without one.
         budget: Name of the budget.
-        conditions: In the order of the file; two labels may share a condition.
+        conditions: In the order of the file, each condition once.
         num_replicates: Of every condition, but for references (`Condition.num_replicates`).
         runner: How to run them.
         report: How to report them.
@@ -59,6 +60,7 @@ class Experiment(NamedTuple):
             own.
         options: Label → the option that was taken of each group, the experiment file included. No
             part of any identity: the same settings may come from other options.
+        capped: Labels of the conditions that the budget changed.
     """
 
     name: str
@@ -69,15 +71,25 @@ class Experiment(NamedTuple):
     report: ReportSettings
     changed: bool
     options: Mapping[str, tuple[Option, ...]]
+    capped: tuple[str, ...]
 
     @property
     def report_name(self) -> str:
         """Directory of its report: `<experiment>[@budget][+hash of what was changed]`."""
-        name = self.name if self.budget == "paper" else f"{self.name}@{self.budget}"
+        name = self.name if self.budget == PAPER else f"{self.name}@{self.budget}"
         if not self.changed:
             return name
         text = "\n".join(f"{label}\t{condition.id}" for label, condition in self.conditions)
         return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+    def budget_of(self, label: str) -> str:
+        """Return the budget of a condition: `paper` if no cap changed it, whatever was asked for.
+
+        Fewer replicates are no other budget of a condition.
+        """
+        if label not in self.capped:
+            return PAPER
+        return f"{PAPER}, capped" if self.budget == PAPER else self.budget
 
     def option_names(self, label: str) -> dict[str, dict[str, str]]:
         """Return group → name and origin of the option taken, as a run's manifest records them."""

@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from evoexp.configuration.search_path import EXPERIMENT, find, groups
@@ -55,6 +55,11 @@ class Override(NamedTuple):
     def typed(self) -> str:
         """Everything behind the first `=`."""
         return self.text.partition("=")[2]
+
+    @property
+    def word(self) -> str:
+        """The override with the first of its values, as one would type it."""
+        return f"{self.prefix}{self.key}" + (f"={self.values[0].text}" if self.values else "")
 
     def option(self) -> str | None:
         """Return the option that an override of a group chooses; None: the group is left out."""
@@ -134,6 +139,10 @@ def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
         if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
             must = "one value: a sweep is over what changes a condition"
             raise SettingError(key, must, override.typed)
+        if key != EXPERIMENT and len({value.text for value in override.values}) < len(
+            override.values
+        ):
+            raise SettingError(key, "values that differ", override.typed)
 
 
 def single_values(override: Override) -> Iterator[Override]:
@@ -144,16 +153,29 @@ def single_values(override: Override) -> Iterator[Override]:
         yield override._replace(values=(value,), is_swept=False)
 
 
-def sweep(overrides: Choice) -> Iterator[tuple[str, dict[str, Override]]]:
-    """Cross all swept overrides; yield (label, overrides with one value) of each combination."""
-    swept = [key for key, override in overrides.items() if override.is_swept]
-    short = {key: key.rsplit(".", 1)[-1] for key in swept}
-    if len(set(short.values())) < len(short):
-        short = {key: key for key in swept}
+def sweep(overrides: Choice) -> Iterator[dict[str, Override]]:
+    """Cross all swept overrides; yield the overrides of each combination, with one value each."""
     for combination in itertools.product(*map(single_values, overrides.values())):
-        chosen = dict(zip(overrides, combination, strict=True))
-        label = JOIN.join(f"{short[key]}={chosen[key].values[0].text}" for key in swept)
-        yield label, chosen
+        yield dict(zip(overrides, combination, strict=True))
+
+
+def sweep_texts(overrides: Choice, choice: Choice) -> dict[str, str]:
+    """Return key → `name=value` of the swept overrides that a combination has.
+
+    Args:
+        overrides: By key, as they are swept over.
+        choice: The combination.
+    """
+    short = short_names([key for key, override in overrides.items() if override.is_swept])
+    return {
+        key: f"{name}={choice[key].values[0].text}" for key, name in short.items() if key in choice
+    }
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Return key → its last part; the whole keys where several end in the same part."""
+    short = {key: key.rsplit(".", 1)[-1] for key in keys}
+    return short if len(set(short.values())) == len(short) else {key: key for key in keys}
 
 
 def expand_entry(
@@ -180,13 +202,14 @@ def expand_entry(
     pieces = template.split("{}")
     if len(pieces) - 1 not in (0, len(swept)):
         raise SettingError(field, "a label with one {} per swept override, or none", template)
-    for suffix, chosen in sweep(parsed):
+    for chosen in sweep(parsed):
         if len(pieces) > 1:
             values = (chosen[key].values[0].text for key in swept)
             filled = (value + piece for value, piece in zip(values, pieces[1:], strict=True))
             yield pieces[0] + "".join(filled), chosen
         else:
-            yield JOIN.join(part for part in (template, suffix) if part), chosen
+            parts = (template, *sweep_texts(parsed, chosen).values())
+            yield JOIN.join(part for part in parts if part), chosen
 
 
 def dotted(text: str) -> str:

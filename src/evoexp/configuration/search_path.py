@@ -11,6 +11,7 @@ is the package's own.
 """
 
 import contextlib
+import functools
 import importlib.util
 import os
 from collections.abc import Iterable, Iterator
@@ -97,9 +98,11 @@ def _declared(registration: Registration) -> Path:
     )
 
 
-def groups() -> list[str]:
+@functools.cache
+def groups() -> tuple[str, ...]:
     """Return the groups that a configuration chooses options of, in alphabetical order."""
-    return sorted(path.name for path in shipped.config_directory().iterdir() if path.is_dir())
+    folder = shipped.config_directory()
+    return tuple(sorted(path.name for path in folder.iterdir() if path.is_dir()))
 
 
 def options(group: str) -> list[str]:

@@ -1,8 +1,9 @@
 """Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from evoexp.registry import CLAIMS, names, registered
 from evoexp.report import markdown, verdicts
 from evoexp.report.claim_rules import NO_RULES, OWN, Rule, Rules
 from evoexp.report.parameters import option, planned_replicates
@@ -11,6 +12,8 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
 from evoexp.report.verdicts import Claim, Comparison
 from evoexp.shipped import config_directory, shipped
+
+ONLY_CONTROLS = "only a control was run"
 
 
 class Hearing(NamedTuple):
@@ -98,8 +101,9 @@ class Hearing(NamedTuple):
     def _claim(self, kind: str, evidence: str, n: object, verdict: str) -> Claim:
         if kind != self.rule.kind:
             raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
-        reason = f"{verdicts.NOT_JUDGED} ({self.reason})"
-        return self.made(evidence, n, reason if self.reason else verdict)
+        # a comparison without a pair of runs
+        reason = self.reason or ("nothing to compare" if n in (None, "0") else "")
+        return self.made(evidence, n, f"{verdicts.NOT_JUDGED} ({reason})" if reason else verdict)
 
     def made(self, evidence: str, n: object, verdict: str) -> Claim:
         """Return the claim with this evidence and verdict."""
@@ -150,6 +154,8 @@ def not_judged(results: Results) -> str:
     """Return why claims are not to be judged; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
+    if results.main and all(c.is_control for c in results.main):
+        return ONLY_CONTROLS
     planned = planned_replicates(results)
     if any(c.planned < c.condition.num_replicates(planned) for c in results.conditions):
         return "fewer replicates than planned"
@@ -162,6 +168,31 @@ def not_judged(results: Results) -> str:
     if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
         return "settings overridden"
     return ""
+
+
+def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
+    """Yield the claims that an experiment judges on conditions which are not among its results.
+
+    Args:
+        results: Of the experiment.
+        judged: The claims that its page judges.
+    """
+    budget = results.budget if results.budget == "smoke" else "paper"
+    rows = [r for r in shipped() if (r.experiment, r.budget) == (results.experiment, budget)]
+    missing = {row.label for row in rows} - {c.label for c in results.conditions}
+    if not missing:
+        return
+    known, verdict = (
+        {claim.name for claim in judged},
+        f"{verdicts.NOT_JUDGED} (conditions left out)",
+    )
+    for paper in names(CLAIMS):
+        registration = registered(CLAIMS, paper)
+        assert registration is not None
+        for rule in registration.load().values():
+            if results.experiment in rule.experiments and rule.name not in known:
+                told = "not among its conditions: " + ", ".join(sorted(missing))
+                yield Hearing(rule.unjudged(), "", 0.0).made(told, "0", verdict)
 
 
 def evidence(comparison: Comparison, better: str) -> str:

@@ -22,7 +22,7 @@ from evoexp.store.damage import warn
 from evoexp.store.identity import DamagedFile
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
-from evoexp.store.plans import Plan
+from evoexp.store.plans import Plan, num_planned
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
 from evoexp.store.tables import read_generations, read_summaries
@@ -348,12 +348,11 @@ def _read(
     rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
     rows = rows.set_index("replicate")
     asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
-    planned = max([asked, *(plan.num_replicates for plan in plans), *(1 + k for k in rows.index)])
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
     return ConditionResults(
         label,
         condition,
-        planned,
+        num_planned(run, asked),
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,

@@ -1,12 +1,16 @@
 """`plans.json`: how many replicates of a run were asked for, and how many were stored by then."""
 
+import contextlib
 import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from evoexp.store.identity import DamagedFile, read_object
+
+if TYPE_CHECKING:
+    from evoexp.store.run_directory import RunDirectory
 
 PLANS = "plans.json"
 
@@ -38,6 +42,18 @@ def read_plans(path: Path) -> list[Plan]:
     if not all(type(number) is int and number >= 0 for plan in found for number in plan):
         raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
     return [Plan(*each) for each in found]
+
+
+def num_planned(run: "RunDirectory", asked: int = 0) -> int:
+    """Return how many replicates of a run were ever asked for; at least those that are there.
+
+    Args:
+        run: Whose.
+        asked: How many are asked for now.
+    """
+    with contextlib.suppress(DamagedFile):
+        asked = max([asked, *(plan.num_replicates for plan in run.plans())])
+    return max([asked, *(1 + k for k in run.completed() | run.failed())])
 
 
 def as_json(plans: Iterable[Plan]) -> bytes:

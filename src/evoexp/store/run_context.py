@@ -15,15 +15,43 @@ import numpy as np
 import pyarrow as pa
 
 from evoexp.errors import StoreError
+from evoexp.shipped import labels_by_experiment, rows_by_condition
 from evoexp.store.identity import CONFIG, MANIFEST, read_object
 
-ORIGIN = ("experiment", "label", "budget")  # of the manifest
+ORIGIN = ("experiment", "label", "budget")
 LONGEST = 200  # characters of a list
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NO_SETTING = ("_target_", "revision", "sha256")
 
 
-def run_context(path: Path, taken: Collection[str]) -> dict[str, Any]:
+def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
+    """Return experiment, label and budget of a run, and whether its experiment was changed.
+
+    A shipped condition has the label and the budget of the shipped table, in the experiment that
+    its manifest names if that has it: experiments share conditions.
+
+    Args:
+        manifest: Of the run; may be empty.
+        condition_id: 64 hex digits.
+
+    Returns:
+        The keys of `ORIGIN`, None where nothing is known, and `changed`.
+    """
+    notes = {name: manifest.get(name) or None for name in ORIGIN}
+    experiment, label = notes["experiment"], notes["label"]
+    rows = sorted(
+        rows_by_condition().get(condition_id, ()),
+        key=lambda row: (row.experiment != experiment, row.label != label),
+    )
+    labels = labels_by_experiment().get(experiment or "", set())
+    is_named = label is not None and label not in labels
+    if rows and (rows[0].experiment == experiment or not is_named):
+        return {**{name: getattr(rows[0], name) for name in ORIGIN}, "changed": False}
+    budget = rows[0].budget if rows else notes["budget"]
+    return {**notes, "budget": budget, "changed": bool(labels)}
+
+
+def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[str, Any]:
     """Collect the origin and the settings of a run.
 
     A setting has the last part of its name where no other setting and no column has it, else its
@@ -32,13 +60,15 @@ def run_context(path: Path, taken: Collection[str]) -> dict[str, Any]:
 
     Args:
         path: The run's directory.
+        condition_id: 64 hex digits.
         taken: Columns that the table has already.
 
     Returns:
         Name → value; empty where neither configuration nor manifest can be read.
     """
     manifest, config = (_read(path / name) for name in (MANIFEST, CONFIG))
-    found = {name: str(manifest[name]) for name in ORIGIN if manifest.get(name)}
+    known = origin(manifest, condition_id)
+    found = {name: str(known[name]) for name in ORIGIN if known[name]}
     settings = dict(_settings(config))
     counts = Counter(name.rpartition(".")[2] for name in settings)
     for name, value in settings.items():

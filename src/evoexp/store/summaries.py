@@ -50,7 +50,7 @@ class _Summary(NamedTuple):
 
 
 ROWS_AT_ONCE = 5000  # that a table is built from
-_VERSION = 5  # of the table's columns and notes; another one is rebuilt
+_VERSION = 6  # of the table's columns and notes; another one is rebuilt
 _KEY = b"evoexp"
 # tables that this process wrote or read
 _KNOWN: dict[Path, tuple[tuple[int, int, int], _Summary]] = {}
@@ -84,7 +84,8 @@ def write_summary(
     known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
     summary = _build(run, stored, stamps, known, thorough)
     sink = pa.BufferOutputStream()
-    table = with_context(summary.table, run_context(run.path, summary.table.column_names))
+    context = run_context(run.path, run.condition_id, summary.table.column_names)
+    table = with_context(summary.table, context)
     pq.write_table(table, sink, compression="snappy", write_page_checksum=True)
     if run.summary_path.is_dir():
         set_aside(run.summary_path)

@@ -195,7 +195,7 @@ def _altered_settings(run: RunDirectory) -> list[str]:
     measured = [name for name in table.column_names if name in known or name.startswith(TERM)]
     return [
         name
-        for name, value in run_context(run.path, measured).items()
+        for name, value in run_context(run.path, run.condition_id, measured).items()
         if name in table.column_names
         and name not in ORIGIN
         and set(table[name].to_pylist()) - {value}

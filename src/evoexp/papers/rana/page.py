@@ -112,6 +112,8 @@ def not_judged(results: Results, condition: ConditionResults) -> str:
     """Return why claims are not judged on a condition; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
+    if condition.is_control:
+        return judging.ONLY_CONTROLS
     planned = planned_replicates(results)
     if condition.planned < planned:
         return f"{condition.planned} of {planned} replicates planned"

@@ -34,12 +34,14 @@ def page_registration(settings: ReportSettings) -> Registration:
 def page_of(results: "Results", settings: ReportSettings) -> "Page":
     """Return the page that the settings name, filled from results; a sweep has a page of its own.
 
-    A page that shows no motion is given the figure of the scene, with the best motions.
+    A page that shows no motion is given the figure of the scene, with the best motions; claims on
+    conditions that were left out are named as not judged.
 
     Raises:
         UnknownOption: If there is none of this name.
         RegistrationError: If its package registered it wrongly.
     """
+    from evoexp.report.judging import left_out
     from evoexp.report.motion_pictures import best_motions, scene_drawing
     from evoexp.report.pages import swept
     from evoexp.report.swept_settings import sweep_of
@@ -48,6 +50,7 @@ def page_of(results: "Results", settings: ReportSettings) -> "Page":
     if sweep := sweep_of(results):
         return swept.page(results, sweep, settings)
     page = cast("Page", chosen.load()(results, settings))
+    page = page._replace(claims=(*page.claims, *left_out(results, page.claims)))
     if any(drawing.plays for drawing in page.drawings):
         return page
     return page._replace(drawings=(*page.drawings, *scene_drawing(best_motions(results))))

@@ -1,0 +1,173 @@
+"""The conditions of one experiment: entries of its file crossed with the command line, built once.
+
+An override of the command line wins over an entry. It concerns the conditions that have such a
+setting; one that concerns none is refused.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from evoexp.condition import Condition
+from evoexp.configuration.assignment import known_instead
+from evoexp.configuration.interpolations import MARK
+from evoexp.configuration.labels import Crossed, Group, labels_of, refuse_equal_labels, rejoined
+from evoexp.configuration.overrides import (
+    NOT_IDENTITY,
+    PLANNER_PARTS,
+    Choice,
+    single_values,
+    sweep,
+    sweep_texts,
+)
+from evoexp.configuration.problem_folders import problem_choices
+from evoexp.configuration.refusals import chosen
+from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
+from evoexp.shipped import Option
+
+Entry = tuple[str, Choice]  # label and overrides, each with one value, of an experiment's file
+
+
+class Composed(NamedTuple):
+    """Chosen options, composed.
+
+    Attributes:
+        config: Their settings as plain data, interpolations as they are written.
+        options: The option taken of each group.
+    """
+
+    config: dict[str, Any]
+    options: tuple[Option, ...]
+
+
+class Built(NamedTuple):
+    """A condition, the options that it was taken from, and whether the budget capped it."""
+
+    condition: Condition
+    options: tuple[Option, ...]
+    is_capped: bool
+
+
+class Builder:
+    """Builds the conditions of an experiment at one budget, each choice of overrides once."""
+
+    def __init__(
+        self,
+        name: str,
+        entries: Sequence[Entry],
+        choose: Callable[[Choice], Composed],
+        compose: Callable[[Choice], Composed],
+        build: Callable[[dict[str, Any]], tuple[Condition, bool]],
+    ) -> None:
+        """Keep the experiment and the steps from a choice to a condition.
+
+        Args:
+            name: Of the experiment, which is the label of a condition that has no other.
+            entries: Of the experiment's file.
+            choose: Composes the options of a choice, without its settings.
+            compose: Composes a choice.
+            build: Builds a composed condition; tells whether the budget capped it.
+        """
+        self.name = name
+        self._entries, self._choose, self._compose, self._build = entries, choose, compose, build
+        self._known: dict[frozenset[str], Built] = {}
+
+    def build_all(self, overrides: Choice, only: Sequence[str]) -> dict[str, Built]:
+        """Build all conditions, each once; return them by their labels.
+
+        All are built even if some are kept: the labels of one condition make one label.
+
+        Args:
+            overrides: Of the command line.
+            only: Labels to keep; empty keeps all.
+
+        Raises:
+            EvoexpError: For a condition that cannot be built, an override that concerns none, or an
+                unknown label of `only`.
+        """
+        rows = list(self._crossed(overrides))
+        refuse_equal_labels(rows)
+        names = {name for row in rows for name in (row.label, row.entry) if name}
+        picked = rejoined(only, names)
+        named = [row for row in rows if row.is_named(picked)] or rows
+        self._refuse_unused(overrides, named)
+        members: dict[str, list[Crossed]] = {}
+        for row in rows:
+            try:
+                members.setdefault(self._built(row.choice).condition.id, []).append(row)
+            except EvoexpError:
+                if row in named:
+                    raise
+        built = [self._built(same[0].choice) for same in members.values()]
+        groups = [
+            Group(same, each.condition.planner.component, each.is_capped)
+            for same, each in zip(members.values(), built, strict=True)
+        ]
+        labels = labels_of(groups, self._is_same)
+        picked = rejoined(only, known := {*labels, *names})
+        if unknown := [label for label in picked if label not in known]:
+            raise UnknownOption("--only", unknown[0], known)
+        return {
+            label: each
+            for label, group, each in zip(labels, groups, built, strict=True)
+            if not picked or label in picked or any(row.is_named(picked) for row in group.members)
+        }
+
+    def _built(self, choice: Choice) -> Built:
+        key = frozenset(each.word for each in choice.values() if each.root not in NOT_IDENTITY)
+        if key not in self._known:
+            composed = self._compose(choice)
+            condition, is_capped = self._build(composed.config)
+            self._known[key] = Built(condition, composed.options, is_capped)
+        return self._known[key]
+
+    def _is_same(self, row: Crossed, choice: Choice) -> bool:
+        """Whether another choice gives the same condition."""
+        with contextlib.suppress(EvoexpError):
+            return self._built(choice).condition.id == self._built(row.choice).condition.id
+        return False
+
+    def _crossed(self, overrides: Choice) -> Iterator[Crossed]:
+        """Yield the entries with each combination of the values that overrides have."""
+        for label, own in self._entries:
+            seen = set[frozenset[str]]()
+            for combination in sweep(overrides):
+                typed = self._concerning(combination, own)
+                words = frozenset(each.word for each in typed.values())
+                if words in seen:  # the swept setting concerns other conditions
+                    continue
+                seen.add(words)
+                swept = sweep_texts(overrides, typed)
+                for problem, choice in problem_choices({**own, **typed}):
+                    yield Crossed(self.name, label, swept, problem, own, typed, choice)
+
+    def _concerning(self, choice: Choice, own: Choice) -> Choice:
+        """Return the overrides of the command line that concern a condition.
+
+        Args:
+            choice: Of the command line, each with one value.
+            own: Of the condition's entry.
+        """
+        planner = str(self._choose({**own, **choice}).config.get("planner"))
+        parts = [key for key in choice if key in PLANNER_PARTS and choice[key].option()]
+        not_taken = {key for key in parts if f"{MARK}{key}" not in planner}
+        choice = {key: each for key, each in choice.items() if key not in not_taken}
+        return concerning(choice, self._choose({**own, **choice}).config)
+
+    def _refuse_unused(self, overrides: Choice, rows: Sequence[Crossed]) -> None:
+        """Refuse an override of the command line that concerns none of the conditions."""
+        for key, override in overrides.items():
+            if any(key in row.typed for row in rows):
+                continue
+            configs = [self._choose(row.choice).config for row in rows]
+            known = {name for each in configs for name in known_instead(each, override) or ()}
+            if known:
+                raise UnknownSetting(key, sorted(known))
+            if override.root != key:
+                raise SettingError(override.root, chosen(override.root), None)
+            self._built({**rows[0].choice, key: next(single_values(override))})  # says why not
+
+
+def concerning(choice: Choice, config: dict[str, Any]) -> Choice:
+    """Return the overrides that chosen options have a setting for, and those of groups."""
+    return {key: each for key, each in choice.items() if known_instead(config, each) is None}

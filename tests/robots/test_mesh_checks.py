@@ -183,7 +183,7 @@ def test_a_mesh_that_is_none_is_refused_with_the_reason(
     with pytest.raises(SettingError) as refusal:
         robot(tmp_path, name)
     assert f"'{name}': {reason}" in str(refusal.value)
-    assert str(tmp_path / "r.urdf") in str(refusal.value)
+    assert f"in link 'b' of {tmp_path / 'r.urdf'}" in str(refusal.value)
     assert "\n" not in str(refusal.value) and not capfd.readouterr().err
 
 

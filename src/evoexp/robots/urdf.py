@@ -42,7 +42,7 @@ from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
 from evoexp.robots.urdf_text import JointText, file_content, parsed_xml, read_joints
 from evoexp.validation import Positive, Settings
 
-MESH = "link/collision/geometry/mesh"
+MESH = "collision/geometry/mesh"  # of a link
 SPHERES = "robot.spheres"
 
 
@@ -167,10 +167,13 @@ class Urdf(Chain):
             root = read_urdf(content, f"{field}.path")
             check_tree(root, f"{field}.path")
             read_joints(root, f"{field}.path")
-            found = {}
-            for name in dict.fromkeys(mesh.get("filename") for mesh in root.iterfind(MESH)):
-                data = mesh_content(name, file, packages, f"{field}.path")
-                found[name] = whole_mesh(data, name, f"{field}.path")
+        found: dict[str, bytes] = {}
+        for link in root.iterfind("link"):
+            for name in (mesh.get("filename") for mesh in link.iterfind(MESH)):
+                if name not in found:
+                    with _named(f"link '{link.get('name')}' of {file}"):
+                        data = mesh_content(name, file, packages, f"{field}.path")
+                        found[name] = whole_mesh(data, name, f"{field}.path")
         settings["urdf"] = {SHA256: keep(content)}
         if found:
             settings["meshes"] = [
@@ -188,7 +191,8 @@ class Urdf(Chain):
             settings["spheres"] = {SHA256: keep(content)}
         if srdf is not None:
             content = file_content(srdf, f"{field}.srdf")
-            parsed_xml(content, f"{field}.srdf", "robot")
+            with _named(srdf):
+                parsed_xml(content, f"{field}.srdf", "robot")
             settings["srdf"] = {SHA256: keep(content)}
         return settings
 

@@ -194,12 +194,21 @@ def readers_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+ONE_OF_MANY = {  # conditions: tests/test_shipped.py runs every one of them
+    "experiment=arena_papers": "rana_planar · GA",
+    "experiment=arena_tuning": "curkovic_b · GA, walk step 3.0",
+}
+
+
 def shortened(words: list[str]) -> list[str]:
     """Return a command with which a long run is over in seconds."""
     is_long = words[0] == "run" and not {"experiment=rana_planar", "-m"} & set(words)
     is_short = any(word.startswith("budget=") for word in words)
     if is_long and not is_short:
-        return [*words, "budget=smoke", "num_replicates=1"]
+        only = [
+            part for word in words if word in ONE_OF_MANY for part in ("--only", ONE_OF_MANY[word])
+        ]
+        return [*words, "budget=smoke", "num_replicates=1", *only]
     # a comparison of what was run above, at that budget
     is_of_page = words[0] == "compare" and "rana_planar" not in words
     return [*words, "budget=smoke"] if is_of_page else words

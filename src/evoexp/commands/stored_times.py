@@ -43,7 +43,7 @@ class Times(NamedTuple):
 
 
 class StoredTimes:
-    """What is known of all stored runs; a run's table is read when the first condition needs it."""
+    """The times of all stored runs; a run's table is read when the first condition needs it."""
 
     def __init__(self, outputs: Path) -> None:
         """Read the configurations of all runs; those that cannot be read are left out."""

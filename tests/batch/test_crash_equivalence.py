@@ -22,9 +22,10 @@ from killed_batches import (
 )
 
 from masked_logs import differing, masked_store
+from matrix import counts
 
 SEED = 20
-NUM_BLOWS = 50  # with ./scripts/test --all
+NUM_BLOWS = counts(15, 50)  # with ./scripts/test --all
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="victims are found in /proc"

@@ -23,7 +23,7 @@ from evoexp.batch.workers import Workers
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.errors import Busy, SettingError
+from evoexp.errors import Busy, DamagedStore, SettingError
 from evoexp.store import damage
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
@@ -74,6 +74,19 @@ def test_more_replicates_leave_the_earlier_ones_alone(faulty: Condition, tmp_pat
     assert read_summaries(directory)["replicate"].tolist() == [0, 1, 2, 3]
     assert run(tmp_path, (faulty, 1)) == []
     assert sorted(directory.completed()) == [0, 1, 2, 3], "fewer replicates take nothing away"
+
+
+def test_a_damaged_replicate_runs_again_though_fewer_are_asked_for(
+    faulty: Condition, tmp_path: Path
+) -> None:
+    run(tmp_path, (faulty, 3))
+    directory, before = RunDirectory(tmp_path, faulty.id), digests(tmp_path, faulty)
+    log = directory.log_path(2)
+    log.write_bytes(log.read_bytes()[:-10])
+    with pytest.warns(DamagedStore, match=r"run again: 0002\.mcap"):
+        assert [outcome.replicate for outcome in run(tmp_path, (faulty, 1))] == [2]
+    assert digests(tmp_path, faulty) == before
+    assert run(tmp_path, (faulty, 1)) == []
 
 
 def test_of_many_the_missing_ones_are_found_without_decoding_a_log(

@@ -89,6 +89,20 @@ def test_a_damaged_replicate_runs_again_though_fewer_are_asked_for(
     assert run(tmp_path, (faulty, 1)) == []
 
 
+def test_a_lost_manifest_is_taken_from_a_log_and_one_that_is_there_stays(
+    faulty: Condition, tmp_path: Path
+) -> None:
+    run(tmp_path, (faulty, 1))
+    path = RunDirectory(tmp_path, faulty.id).path / "manifest.json"
+    before = path.read_bytes()
+    run(tmp_path, (faulty, 2))
+    assert path.read_bytes() == before
+    path.unlink()
+    with pytest.warns(DamagedStore, match=r"manifest\.json"):
+        run(tmp_path, (faulty, 3))
+    assert json.loads(path.read_bytes())["restored_from"] == "0000.mcap"
+
+
 def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

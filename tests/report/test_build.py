@@ -170,6 +170,14 @@ def test_the_command_in_the_index_makes_this_report(
     assert cli.main(["report", *hashes[1].split()]) == 0
 
 
+def test_files_of_an_earlier_report_are_named_in_order(tmp_path: Path) -> None:
+    for name in ("b.svg", "a.svg", "c.svg", build.INDEX, ".kept"):
+        (tmp_path / name).touch()
+    stale = build.stale_files(build.ReportFiles(tmp_path, {build.INDEX: b""}))
+    assert [path.name for path in stale] == ["a.svg", "b.svg", "c.svg"]
+    assert build.stale_files(build.ReportFiles(tmp_path / "none", {})) == []
+
+
 def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     experiment = expand("rana_planar", "ga.num_generations=1")
     store(tmp_path, experiment)

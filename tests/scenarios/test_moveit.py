@@ -255,6 +255,15 @@ def test_a_pose_of_a_link_has_the_tolerances_of_its_constraints() -> None:
     ("changes", "named"),
     [
         ({"path_constraints": {"joint_constraints": [{"joint_name": "x"}]}}, "path constraints"),
+        (
+            {
+                "path_constraints": {
+                    "joint_constraints": [],
+                    "orientation_constraints": [{"link_name": "x"}],
+                }
+            },
+            "path constraints",
+        ),
         ({"trajectory_constraints": {"constraints": [{"name": "x"}]}}, "trajectory constraints"),
         ({"goal_constraints": []}, "one goal"),
         ({"goal_constraints": [{}]}, "a goal of joints, or of one position"),

@@ -47,6 +47,12 @@ def test_what_is_neither_is_refused(evoexp: Evoexp, stored: Path) -> None:
     assert said.code == 2 and "nothing stored" in said.err
 
 
+def test_a_hash_beside_an_experiment_is_refused(evoexp: Evoexp, stored: Path) -> None:
+    said = evoexp("compare", "rana_planar", "4da921")
+    assert said.code == 2
+    assert said.err.startswith("evoexp: experiment: no option '4da921'")
+
+
 def test_given_runs_stand_beside_ours(evoexp: Evoexp, stored: Path, tmp_path: Path) -> None:
     data = tmp_path / "given.csv"
     data.write_text("planner,problem,seed,queries,cost\nRRT*,rana_planar,0,70,5.5\n")

@@ -186,7 +186,7 @@ def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
 
 def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_ball").conditions[0]
-    table = posture_motions.scope_table(condition, measures.shown_replicate(condition))
+    table = posture_motions.scope_table(condition)
     path = table[table["element"] == posture_motions.POSTURE].sort_values("order")
     for axis in ("x", "y"):
         assert (path[axis].diff().abs().dropna() <= path[f"half_{axis}"].iloc[0] + 1e-9).all()

@@ -18,6 +18,7 @@ from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.grid_path_ga.path_sampling import PathSampling
 from evoexp.planners.grid_path_ga.planner import STRETCH
 from evoexp.planners.proofs import judge_motion
+from evoexp.testing.small_conditions import conditions
 from matrix import num_cases
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
@@ -193,6 +194,15 @@ def test_large_grids_work_out_fronts_as_they_go() -> None:
     assert len(problem.world.fronts) == 0
     last = list(own.evolve(problem, rng(0)))[-1]
     assert all(faults(problem, path, revisits=False) == [] for path in last.population)
+
+
+def test_a_map_asks_for_every_node_beforehand_and_no_other_planner_does() -> None:
+    own = planner()
+    problem = solvable((6, 5), 0.2, 3, own)
+    assert own.prior_queries(problem) == 30
+    assert RandomSearch(planner=own).prior_queries(problem) == 30
+    other, task = conditions("experiment=rana_planar")["via-point GA"].prepare()
+    assert other.prior_queries(task) == 0
 
 
 def test_permitted_moves_past_corners_are_certified() -> None:

@@ -273,7 +273,7 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             "plane of its two joints that move most; every child lies in its parent's box. "
             "Right: where the tool can be one step away from the start, for the scope, a half "
             "and twice of it: hulls of random steps, as seen from above.",
-            partial(posture_motions.scope_table, main[0], measures.shown_replicate(main[0])),
+            partial(posture_motions.scope_table, main[0]),
             posture_motions.draw_scope,
             main[:1],
         ),

@@ -210,8 +210,8 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     )
 
 
-def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
-    """Return a path in the plane of its two liveliest joints, and the tool's reach at the start.
+def scope_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return the shown path in its two liveliest joints, and the tool's reach at the start.
 
     The reach is told by hulls of the tool's places after one random step.
 
@@ -220,6 +220,7 @@ def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
         of the others), half_x, half_y (scope [deg] of the two joints), factor (of the scope),
         joint_x, joint_y (from 1), length_unit.
     """
+    replicate = measures.shown_replicate(condition)
     problem, q = measures.problem(condition), measures.paths(condition)[replicate]
     moved = np.abs(np.diff(q, axis=0)).sum(axis=0)
     a, b = sorted(int(k) for k in np.argsort(-moved, kind="stable")[:2])

@@ -2,12 +2,7 @@
 
 import argparse
 
-from evoexp.commands.motion_words import (
-    add_motion_arguments,
-    check_speeds,
-    output_path,
-    write,
-)
+from evoexp.commands.motion_words import add_motion_arguments, output_path, write
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +12,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    check_speeds(arguments)
     from evoexp.commands.motion_files import file_name, recordings  # Pinocchio, coal and numba
     from evoexp.playback.player_page import page
 

@@ -12,10 +12,11 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-MODULES = {  # of libraries whose module is named otherwise, where they are not installed
+MODULES = {  # of libraries that metadata name otherwise, or that are not installed
     "coacd": "coacd",
     "example_robot_data": "example-robot-data",
     "ompl": "ompl",
+    "pinocchio": "pin",  # its module lies where packages_distributions does not look
     "toppra": "toppra",
 }
 DEEP = ("coal", "hydra-core", "mcap", "numba", "numpy", "omegaconf", "pin", "pydantic")

@@ -14,7 +14,7 @@ lock=${lock:-requirements.lock}
 marks="$venv/.installed"
 mark_of() {
   case $1 in
-    evoexp) { echo "$root" && sed '/^\[tool/,$d' "$root/pyproject.toml"; } | cksum ;;  # settings of tools have no part
+    evoexp) { echo "$root" && sed '/^\[tool/,$d' "$root/pyproject.toml" && cat "$root/src/evoexp/version.py"; } | cksum ;;  # settings of tools have no part
     *) { echo "$root" && cat "$root/$1"; } | cksum ;;
   esac
 }

@@ -77,11 +77,6 @@ def array_bytes(array: NDArray[Any]) -> bytes:
     return array.tobytes()
 
 
-def any_nan(arrays: Iterable[bytes]) -> bool:
-    """Return whether float64 arrays, given as bytes, hold any NaN."""
-    return bool(np.isnan(np.frombuffer(b"".join(arrays))).any())
-
-
 class ContentDigest:
     """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
 

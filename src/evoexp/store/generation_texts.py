@@ -1,94 +1,42 @@
-"""The messages of generations, many at a time.
+"""The messages of a block of generations: what the best so far tells is written once for each."""
 
-All of them together take little more than half the time that they take one by one; a stretch of
-generations, whose best changes rarely, takes half of that.
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import repeat
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import orjson
 
-from evoexp.records import Standing, Stretch
-from evoexp.store.messages import NONFINITE, TERM, flagged
+from evoexp.records import Best, Block
+from evoexp.store.messages import NONFINITE, TERM
 
 
-def generation_row(
-    values: Sequence[Any],
-    terms: Mapping[str, Any],
-    columns: Iterable[tuple[str, str]],
-    chain: str,
-) -> dict[str, Any]:
-    """Return the recorded part of a generation as plain values, for `encode_generations`.
+def encode_block(block: Block, links: Sequence[str]) -> list[bytes]:
+    """Return the messages of the generations of a block.
 
     Args:
-        values: Of the fields of `Generation`, from `index` to `solved`.
-        terms: Its terms.
-        columns: (name, column) of every term, in the order of the columns.
-        chain: Its link.
-    """
-    index, _, best, lowest, mean, std, num_feasible, evaluations, queries, solved = values
-    row: dict[str, Any] = {
-        "index": int(index),
-        "best_cost": float(best),
-        "best_cost_in_generation": float(lowest),
-        "mean_cost": float(mean),
-        "std_cost": float(std),
-        "num_feasible": int(num_feasible),
-        "evaluations": int(evaluations),
-        "collision_queries": int(queries),
-        "solved": bool(solved),
-    }
-    for name, column in columns:
-        row[column] = float(terms[name])
-    row["chain"] = chain
-    return row
-
-
-def encode_generations(rows: Sequence[dict[str, Any]]) -> list[bytes]:
-    """Return the messages of generations.
-
-    All rows together take little more than half the time that they take one by one.
-
-    Args:
-        rows: Of `generation_row`.
-    """
-    parts = orjson.dumps(rows)[2:-2].split(b"},{")
-    if len(parts) != len(rows):  # a name of a term looks like the end of a row
-        return [orjson.dumps(flagged(row)) for row in rows]
-    return [
-        orjson.dumps(flagged(row)) if b"null" in part else b"{%b}" % part  # is a number not finite?
-        for part, row in zip(parts, rows, strict=True)
-    ]
-
-
-def encode_stretch(stretch: Stretch, links: Sequence[str]) -> list[bytes]:
-    """Return the messages of a stretch: those that its generations have one by one.
-
-    Args:
-        stretch: The generations.
+        block: The generations.
         links: Of the chain, one of each generation.
     """
-    count, standings = len(links), stretch.standings
-    ends = [standing.place for standing in standings[1:]]
-    numbers = orjson.dumps([*stretch.lowest, *stretch.means, *stretch.deviations]).decode()
+    count, bests = len(links), block.bests
+    ends = [best.place for best in bests[1:]]
+    floats = [*map(float, (*block.lowest, *block.means, *block.deviations))]
+    numbers = orjson.dumps(floats).decode()
     written = numbers[1:-1].split(",")
     fields = (
         written[:count],
         written[count : 2 * count],
         written[2 * count :],
-        stretch.num_feasible,
-        stretch.evaluations,
-        stretch.collision_queries,
+        map(int, block.num_feasible),
+        map(int, block.evaluations),
+        map(int, block.collision_queries),
         links,
-        _flags_of_each(stretch) if "null" in numbers else repeat("", count),
+        _flags_of_each(block) if "null" in numbers else repeat("", count),
     )
     own = zip(*fields, strict=True)
     found: list[bytes] = []
-    for standing, begin, end in zip(standings, [0, *ends], [*ends, count], strict=True):
-        cost, rest, flags, more_flags = _standing_texts(standing)
+    for best, begin, end in zip(bests, [0, *ends], [*ends, count], strict=True):
+        cost, rest, flags, more_flags = _best_texts(best)
         found += [
             f'{{"index":{index},{cost},"best_cost_in_generation":{lowest},"mean_cost":{mean},'
             f'"std_cost":{deviation},"num_feasible":{num_feasible},"evaluations":{evaluations},'
@@ -103,12 +51,12 @@ def encode_stretch(stretch: Stretch, links: Sequence[str]) -> list[bytes]:
                 queries,
                 link,
                 own_flags,
-            ) in zip(range(stretch.first + begin, stretch.first + end), own, strict=False)
+            ) in zip(range(block.first + begin, block.first + end), own, strict=False)
         ]
     return found
 
 
-class _StandingTexts(NamedTuple):
+class _BestTexts(NamedTuple):
     """The pieces of a message that are the same while a solution is the best."""
 
     cost: str
@@ -117,19 +65,19 @@ class _StandingTexts(NamedTuple):
     more_flags: str  # of the terms
 
 
-def _standing_texts(standing: Standing) -> _StandingTexts:
-    cost = {"best_cost": standing.cost}
-    terms = {TERM + name: float(standing.terms[name]) for name in sorted(standing.terms)}
+def _best_texts(best: Best) -> _BestTexts:
+    cost = {"best_cost": float(best.cost)}
+    terms = {TERM + name: float(best.terms[name]) for name in sorted(best.terms)}
     cost_text = orjson.dumps(cost)[1:-1].decode()
-    rest = orjson.dumps({"solved": standing.solved, **terms})[1:-1].decode()
+    rest = orjson.dumps({"solved": bool(best.solved), **terms})[1:-1].decode()
     more_flags = _flags(terms) if "null" in rest else ""
-    return _StandingTexts(cost_text, rest, _flags(cost) if "null" in cost_text else "", more_flags)
+    return _BestTexts(cost_text, rest, _flags(cost) if "null" in cost_text else "", more_flags)
 
 
-def _flags_of_each(stretch: Stretch) -> list[str]:
+def _flags_of_each(block: Block) -> list[str]:
     """Return the flags of the numbers that every generation has for itself."""
     names = "best_cost_in_generation", "mean_cost", "std_cost"
-    own = zip(stretch.lowest, stretch.means, stretch.deviations, strict=True)
+    own = zip(block.lowest, block.means, block.deviations, strict=True)
     return [_flags(dict(zip(names, values, strict=True))) for values in own]
 
 

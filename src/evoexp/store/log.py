@@ -2,8 +2,7 @@
 
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain, compress, repeat
-from operator import sub
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,17 +11,16 @@ from numpy.typing import NDArray
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.records import (
+    Block,
     FrontRow,
-    Generation,
     GenerationRow,
     ReplicateSummary,
     SolutionRow,
-    Stretch,
 )
 from evoexp.store.container import MAX_LOG
 from evoexp.store.container_writer import ContainerWriter, Messages
-from evoexp.store.digests import Chain, ContentDigest, any_nan, array_bytes, channel_identity
-from evoexp.store.generation_texts import encode_generations, encode_stretch, generation_row
+from evoexp.store.digests import Chain, ContentDigest, array_bytes, channel_identity
+from evoexp.store.generation_texts import encode_block
 from evoexp.store.messages import (
     TERM,
     encode_front,
@@ -46,8 +44,6 @@ PUBLISHED, CPU_TIME = "publish_time", "cpu"  # the entry of `RUN` that tells pub
 GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
 
 _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
-_BATCH = 64  # generations encoded together
-_NUM_VALUES = Generation._fields.index("terms")  # fields of a generation before its terms
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 
@@ -86,7 +82,7 @@ class _Channel:
 
 
 class Log:
-    """The log of one replicate: written generation by generation, finished into bytes.
+    """The log of one replicate: written block by block, finished into bytes.
 
     The same content gives the same messages, chain and digests; wall and CPU times and the
     environment are metadata and enter none of them.
@@ -123,12 +119,8 @@ class Log:
         self._content = ContentDigest()
         self._channels: dict[str, _Channel] = {}
         self._terms: dict[str, str] = {}  # name → column, in the order of the columns
-        self._last: Generation | None = None
-        # Generations that wait to be encoded: values up to `solved`; a copy of the terms; (name,
-        # column) of all terms; the bytes of the costs; whether these are floats, whose NaNs have
-        # the bits that they had; `array_bytes` of the best; the generator's state; CPU time [ns].
-        self._pending: list[tuple[Any, ...]] = []
-        self._best_bytes = b""  # array_bytes of the best so far
+        self._last: int | None = None  # index of the generation written last
+        self._population: NDArray[Any] = np.empty(0)  # of it, a view of the planner's memory
         self._best = self._written = (
             b""  # of the generation encoded last, and of the last solution written
         )
@@ -149,83 +141,34 @@ class Log:
                 raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
             self._writer.add_attachment(name, data)
 
-    def write(self, generation: Generation, cpu_s: float = 0.0) -> None:
-        """Append a generation, and its best solution where that is better than the last written.
-
-        What the planner may change is copied here; encoding waits for a batch of generations,
-        because between kernels its code would run from a cold cache each time (a fifth of a
-        replicate's time).
+    def write(self, block: Block, cpu_s: float = 0.0) -> None:
+        """Append generations, and every best solution that is better than the last written.
 
         Args:
-            generation: The generation.
+            block: The generations; what the planner may change of them is copied or encoded here.
             cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
                 part of any digest.
         """
-        terms, costs = generation.terms, generation.costs
-        are_floats = costs.dtype.char == "d"
-        if terms.keys() != self._terms.keys():
-            self._terms = {name: TERM + name for name in sorted(terms)}
-        if self._last is None or generation.best is not self._last.best:
-            self._best_bytes = array_bytes(np.asarray(generation.best, dtype=np.float64))
-        self._pending.append(
-            (
-                generation[:_NUM_VALUES],  # without views of the planner's memory
-                terms.copy(),
-                self._terms.items(),
-                costs.tobytes() if are_floats else array_bytes(costs),
-                are_floats,
-                self._best_bytes,
-                self._chain.state(),
-                int(cpu_s * 1e9),
-            )
-        )
-        self._last = generation
-        if len(self._pending) >= _BATCH:
-            self._flush()
-        if generation.arrays:
-            self._send()  # an attachment comes behind the chunks that end before it
-            for name, array in sorted(generation.arrays.items()):
-                self._writer.add_attachment(name + ARRAY, array_file(array))
-        self._write_fronts(generation)
-
-    def write_stretch(self, stretch: Stretch) -> None:
-        """Append generations as `write` does one by one, in half the time.
-
-        Args:
-            stretch: The generations; its times are CPU times of the replicate.
-        """
-        self._flush()
-        count, standings = len(stretch.lowest), stretch.standings
-        if standings[0].terms.keys() != self._terms.keys():
-            self._terms = {name: TERM + name for name in sorted(standings[0].terms)}
-        places, bests, best_costs, _, _ = zip(*standings, strict=True)
-        solutions = [array_bytes(np.asarray(best, dtype=np.float64)) for best in bests]
-        of_each = chain.from_iterable(
-            map(repeat, solutions, map(sub, (*places[1:], count), places))
-        )
-        costs = chain.from_iterable(map(_rows_as_bytes, stretch.costs))
-        links = self._chain.extend(costs, of_each, stretch.states)
-        data, indices = encode_stretch(stretch, links), range(stretch.first, stretch.first + count)
-        cpu = [int(time * 1e9) for time in stretch.times]
-        self._append(data, indices, cpu, places, solutions, best_costs)
-        self._last, self._best_bytes = stretch.last(), solutions[-1]
+        count, bests = block.num_generations, block.bests
+        if bests[0].terms.keys() != self._terms.keys():
+            self._terms = {name: TERM + name for name in sorted(bests[0].terms)}
+        solutions = {
+            id(best): array_bytes(np.asarray(best.solution, dtype=np.float64)) for best in bests
+        }
+        of_each = [solutions[id(best)] for best in block.best_of_each]
+        states = block.states or repeat(self._chain.state(), count)
+        links = self._chain.extend(_rows_as_bytes(block.costs), of_each, states)
+        indices, cpu = range(block.first, block.first + count), [int(cpu_s * 1e9)] * count
+        places, best_costs = [best.place for best in bests], [best.cost for best in bests]
+        data = encode_block(block, links)
+        self._append(data, indices, cpu, places, [*solutions.values()], best_costs)
+        self._last, self._population = indices[-1], block.population(count - 1)
         self._send()
-        self._write_fronts(self._last)
-
-    def _flush(self) -> None:
-        """Encode the generations that wait; a better solution stands behind its generation."""
-        if not self._pending:
-            return
-        values, terms, columns, costs, are_floats, solutions, states, cpu = zip(
-            *self._pending, strict=True
-        )
-        self._pending.clear()
-        links = self._chain.extend(_without_payloads(costs, are_floats), solutions, states)
-        rows = list(map(generation_row, values, terms, columns, links))
-        data, best_costs = encode_generations(rows), [row["best_cost"] for row in rows]
-        indices = [row["index"] for row in rows]
-        self._append(data, indices, cpu, range(len(rows)), solutions, best_costs)
-        self._send()
+        for name, array in sorted((block.arrays or {}).items()):
+            self._writer.add_attachment(name + ARRAY, array_file(array))
+        if block.criteria is not None:
+            for population, criteria in enumerate(block.criteria):
+                self.write_front(FrontRow(self._last, population, criteria.T))
 
     def _append(
         self,
@@ -278,15 +221,8 @@ class Log:
         self._content.update_all(channels, self._messages)
         self._messages = Messages([], [], [], [], [])
 
-    def _write_fronts(self, generation: Generation) -> None:
-        """Append the fronts of a generation that has some."""
-        if generation.criteria is not None:
-            for population, criteria in enumerate(generation.criteria):
-                self.write_front(FrontRow(generation.index, population, criteria.T))
-
     def write_front(self, front: FrontRow) -> None:
         """Append the front of a population of the generation last written."""
-        self._flush()
         data = encode_front(front)
         self._add(FRONT_TOPIC, FrontRow, [front.generation], [data], [self._cpu])
 
@@ -302,7 +238,6 @@ class Log:
         Raises:
             ValueError: No generation was written, or the summary is of another replicate.
         """
-        self._flush()
         if self._last is None:
             raise ValueError("finish: no generation was written")
         if (summary.condition, summary.replicate) != (self._condition_id, self._replicate):
@@ -311,9 +246,9 @@ class Log:
                 "of this"
             )
         if self._best != self._written or self._best_cost != self._written_cost:
-            self._write_solution(self._last.index)
+            self._write_solution(self._last)
         self._send()
-        summary = summary._replace(digest=self._chain.finish(self._last.population))
+        summary = summary._replace(digest=self._chain.finish(self._population))
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
         self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
@@ -381,13 +316,3 @@ def _rows_as_bytes(block: NDArray[Any]) -> Iterable[bytes]:
     content = block.tobytes()
     size = len(content) // len(block)
     return [content[begin : begin + size] for begin in range(0, len(content), size)]
-
-
-def _without_payloads(costs: Sequence[bytes], are_floats: Sequence[bool]) -> Sequence[bytes]:
-    """Return costs as `array_bytes` does, of which those that are floats hold NaNs of any bits."""
-    if not any_nan(compress(costs, are_floats)):
-        return costs
-    return [
-        array_bytes(np.frombuffer(each)) if is_float else each
-        for each, is_float in zip(costs, are_floats, strict=True)
-    ]

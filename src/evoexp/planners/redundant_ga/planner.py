@@ -33,7 +33,7 @@ from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.planners.redundant_ga.sub_path import BestEnd, RunMemory, Search
 from evoexp.planners.redundant_ga.sub_path_costs import RESULTS, Judging, judge_paths
-from evoexp.records import BoolArray, FloatArray, Generation
+from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
@@ -112,13 +112,13 @@ class RedundantGa(PlannerDefaults, Component):
             raise SettingError("ga", "a real_genetic or a binary_genetic", self.ga.component)
         return reaching_problem(robot, scenario, self.collision)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the generations of all searches; their indices go on counting."""
         return self.search_in_turn(problem, rng, Search)
 
     def search_in_turn(
         self, problem: Problem, rng: np.random.Generator, kind: type[Search]
-    ) -> Iterator[Generation]:
+    ) -> Iterator[Block]:
         """Yield the generations of SP1 and SP2 in turn, until both are successful.
 
         Args:
@@ -155,7 +155,7 @@ class RedundantGa(PlannerDefaults, Component):
 
     def _search(
         self, search: Search, plans: "_Plans", path: int
-    ) -> Generator[Generation, None, BestEnd]:
+    ) -> Generator[Block, None, BestEnd]:
         """Search the end of one sub-path (0: SP1, 1: SP2); yield generations, return the best."""
         search.begin()
         plans.begin(path)
@@ -303,7 +303,7 @@ class _Plans:
     def _counts(self) -> dict[str, float]:
         return {"attempts": float(self._attempts), "sub_path": self._path + 1.0}
 
-    def record(self, search: Search, count: int) -> Generation:
+    def record(self, search: Search, count: int) -> Block:
         """Improve the best plan by a population of which `count` are new; return its record."""
         keeper, path, costs = self._keeper, self._path, search.costs
         if path == 0:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.numeric.generator_memory import state_bytes, states_behind
+from evoexp.numeric.generator_state import state_bytes, states_behind
 from evoexp.numeric.random_stream import (
     Block,
     DrawnAhead,

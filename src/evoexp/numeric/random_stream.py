@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel, uncounted
-from evoexp.numeric.generator_memory import state_reader, states_behind
-from evoexp.numeric.pcg64 import draw_uniforms, put_uniforms
+from evoexp.numeric.generator_state import state_reader, states_behind
 
 
 class Block(NamedTuple):
@@ -52,7 +51,7 @@ class Draws:
         if count > len(self._memory):
             self._memory = np.empty(2 * count)
         self._memory[: len(left)] = left
-        put_uniforms(rng, self._memory[len(left) : count])
+        rng.random(out=self._memory[len(left) : count])
         self.block = Block(self._memory[:count], self.block.taken)
         self.block.taken[0] = 0
 
@@ -95,7 +94,7 @@ class DrawnAhead:
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return the numbers of the next steps, (steps, count)."""
-        return draw_uniforms(self._twin, steps * self._count).reshape(steps, self._count)
+        return self._twin.random((steps, self._count))
 
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
@@ -128,7 +127,7 @@ class DrawnByNeed:
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return at least as many numbers as the next steps may take."""
         missing = max(0, steps * self._most - len(self._left))
-        self._left = np.concatenate([self._left, draw_uniforms(self._twin, missing)])
+        self._left = np.concatenate([self._left, self._twin.random(missing)])
         return self._left
 
     def took(self, counts: list[int]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.numeric.generator_memory import state_reader
+from evoexp.numeric.generator_state import state_reader
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation, Standing, Stretch
 

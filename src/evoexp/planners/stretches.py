@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
-from evoexp.numeric.generator_memory import state_reader
+from evoexp.numeric.generator_state import state_reader
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
 from evoexp.planners.gathering import Clock, Gathered, Run
 from evoexp.planners.planner import Candidate, Keeper

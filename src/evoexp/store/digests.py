@@ -10,7 +10,7 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from evoexp.numeric.generator_memory import demand_pcg64, state_reader
+from evoexp.numeric.generator_state import demand_pcg64, state_reader
 from evoexp.store.container_writer import Messages
 
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data

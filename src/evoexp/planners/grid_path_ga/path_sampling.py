@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.generator_memory import STATE_SIZE, state_reader
+from evoexp.numeric.generator_state import STATE_SIZE, state_reader
 from evoexp.numeric.pcg64 import Twin, Words
 from evoexp.paths.erased_walks import Exits, Sums, follow_all, room_for_exits, walk_all
 from evoexp.paths.grid_choices import Choices
@@ -129,7 +129,7 @@ class PathSampling:
         task = problem.choices, problem.ends, blocks, problem.world.tolls
         drawing = Drawing(*task, self._exits, self._sums, paths)
         longest = kernel(self._twin.words, drawing, *arguments)
-        self._twin.follow(self._twin.words)
+        self._twin.follow(self._twin.words[:2])
         return paths[:, : longest + 1]
 
 

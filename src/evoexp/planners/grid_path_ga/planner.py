@@ -20,7 +20,6 @@ from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.pcg64 import draw_words
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choices_of
@@ -179,7 +178,7 @@ class GridPathGa(PlannerDefaults, Component):
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
         num_words = first_words(len(paths), int(problem.moves.steps[problem.ends[0]]))
         while walkers.complete < len(paths):
-            walkers.go(draw_words(rng, num_words))
+            walkers.go(rng.bit_generator.random_raw(num_words))
             num_words = FEW_WORDS
 
     def _fill_one_by_one(

@@ -13,6 +13,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from store_samples import CONDITION, CONFIG, generations, summary, write
 
 from evoexp.errors import CorruptLog
+from evoexp.records import Block
 from evoexp.store import log as log_module
 from evoexp.store.digests import ContentDigest
 from evoexp.store.generation_columns import generation_columns
@@ -124,7 +125,7 @@ def test_other_schema_version(
 def test_killed_before_finish() -> None:
     log = Log(CONDITION, CONFIG, 7, np.random.default_rng(0))
     for generation in generations(400):
-        log.write(generation)
+        log.write(Block.of(generation))
     unfinished = b"".join(log._writer._parts)
     assert len(unfinished) > 10_000
     assert "cut" in refusal(read_log, unfinished)

@@ -12,6 +12,7 @@ from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, 
 
 from evoexp import attachments
 from evoexp.errors import DamagedStore, StoreError, UnknownHash
+from evoexp.records import Block
 from evoexp.store import damage, summaries
 from evoexp.store import log as log_module
 from evoexp.store.damage import is_set_aside, set_aside
@@ -64,7 +65,7 @@ def be_of_another_replicate(path: Path) -> None:
 def be_of_another_run(path: Path) -> None:
     other = hashlib.sha256(b"other").hexdigest()
     log = log_module.Log(other, b"other", 1, np.random.default_rng(0))
-    log.write(generations(1)[0])
+    log.write(Block.of(generations(1)[0]))
     path.write_bytes(log.finish(summary(1, condition=other)).content)
 
 
@@ -210,7 +211,7 @@ def test_a_lost_file_of_the_configuration_is_taken_from_a_log(
     run.create(config, {}, files)
     path = run.path / "files" / sha256
     log = log_module.Log(run.condition_id, config, 0, np.random.default_rng(0), files)
-    log.write(generations(1)[0])
+    log.write(Block.of(generations(1)[0]))
     row = summary(0, condition=run.condition_id)
     run.write_logs({0: log.finish(row).content})
     assert run.config_json() == config

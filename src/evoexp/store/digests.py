@@ -1,8 +1,7 @@
 """The chain of digests, which tells from which generation on two runs differ; that of a log."""
 
 import struct
-from collections.abc import Callable, Iterable
-from functools import cached_property
+from collections.abc import Iterable
 from itertools import chain
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from evoexp.numeric.generator_memory import demand_pcg64, state_reader
+from evoexp.numeric.generator_state import demand_pcg64, state_bytes
 from evoexp.store.container_writer import Messages
 
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
@@ -34,10 +33,9 @@ class Chain:
         demand_pcg64(rng.bit_generator)
         self._rng, self.link = rng, b""
 
-    @cached_property
-    def state(self) -> Callable[[], bytes]:
-        """Returns the state of the generator now, for `extend`."""
-        return state_reader(self._rng.bit_generator)
+    def state(self) -> bytes:
+        """Return the state of the generator now, for `extend`."""
+        return state_bytes(self._rng.bit_generator)
 
     def extend(
         self, costs: Iterable[bytes], best: Iterable[bytes], states: Iterable[bytes]
@@ -47,7 +45,7 @@ class Chain:
         Args:
             costs: `array_bytes` of the costs of each generation.
             best: `array_bytes` of the best solution until each of them.
-            states: What `state` returned at each of them.
+            states: Of the generator at each of them.
         """
         link, links, digest, join = self.link, [], xxhash.xxh3_128_digest, b"".join
         for parts in zip(costs, best, states, strict=True):

@@ -11,8 +11,7 @@ import numpy as np
 from evoexp.evolution.best_team import BestTeam, CollisionCounts
 from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.named_tuples import named, plain
-from evoexp.numeric.random_stream import DrawnByNeed
+from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.coevolution.breeder import Breeder, num_uniforms
 from evoexp.planners.coevolution.kernels import NOT_FINITE, Breeding, breed, evaluate_lines, renew
 from evoexp.planners.coevolution.link_problem import Problem
@@ -104,9 +103,9 @@ def evolve(
     uniforms: FloatArray,
     rates: FloatArray,
     first: int,
-    plain_task: tuple[Any, ...],
-    plain_heredity: tuple[Any, ...],
-    plain_table: tuple[Any, ...],
+    task: Task,
+    heredity: Heredity,
+    table: Table,
     num_teams: IntArray,
     summaries: FloatArray,
     taken: IntArray,
@@ -117,9 +116,9 @@ def evolve(
         uniforms: Numbers for all of them, in the order in which they are used.
         rates: (generations,) of mutation, on the way to each of them.
         first: The present generation; −1 if the initial one is to be judged.
-        plain_task: `Task`, made plain.
-        plain_heredity: `Heredity`, made plain.
-        plain_table: `Table`, made plain, written.
+        task: See `Task`.
+        heredity: See `Heredity`.
+        table: See `Table`, written.
         num_teams: (1,) teams that the hall holds, changed.
         summaries: (places, 4) written: see `TableSearch`.
         taken: (generations,) written: how many numbers each of them took.
@@ -127,8 +126,7 @@ def evolve(
     Returns:
         False if a coordinate is not finite.
     """
-    task, heredity = named(Task, plain_task), named(Heredity, plain_heredity)
-    table, (summaries, taken) = borrowed(named(Table, plain_table)), borrowed((summaries, taken))
+    table, summaries, taken = borrowed((table, summaries, taken))
     places, robots, _, count = table.populations.shape
     nobody, blocked = np.full(robots, -1), np.zeros((robots, count), dtype=np.int64)
     begin = 0
@@ -194,9 +192,9 @@ def follow(
             table.collisions[own],
             table.own[own],
             table.teams[own] if heredity.by_genome else nobody,
-            (hall.teams, hall.ages, hall.collisions, hall.costs),
+            hall,
             num_teams[0],
-            (rules.memory, rules.frozen, rules.exclusive),
+            rules,
             heredity.by_genome,
         )
     breeding, moving = heredity.breeding, 0
@@ -209,7 +207,7 @@ def follow(
         table.costs[own],
         heredity.moving,
         hall.teams[: num_teams[0]],
-        (
+        Breeding(
             breeding.num_elites,
             breeding.inverse,
             breeding.crossover_rate,
@@ -263,19 +261,19 @@ class TeamSearch(TableSearch):
             breeder.by_genome,
             numbers,
         )
-        memory = plain(self._table), np.zeros(1, dtype=np.int64), self.summaries
-        self._arguments = (plain(task), plain(heredity), *memory)
+        num_teams = np.zeros(1, dtype=np.int64)
+        self._arguments = (task, heredity, self._table, num_teams, self.summaries)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial populations."""
         self._table.populations[0] = self._planner.sample(self._problem, rng, self._size)
         self._evolve(np.empty(0), -1, 0)
-        self._ahead = DrawnByNeed(rng, self._most)
+        self._ahead = DrawnAhead(rng, self._most)
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations with numbers that are drawn ahead."""
-        self._ahead.took(self._evolve(self._ahead.draw(last - first), first, last))
-        self.states = self._ahead.follow_all(last - first)
+        taken = self._evolve(self._ahead.draw(last - first), first, last)
+        self.states = self._ahead.take(taken)
         return last
 
     def lowest(self, places: IntArray) -> FloatArray:

@@ -74,7 +74,7 @@ class _Climbing(TableSearch):
 
     def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int) -> None:
         super().__init__(planner.ga, PER_CALL)
-        self._draws = Draws(BLOCK)
+        self._draws, self._is_used_up = Draws(BLOCK), True
         self._planner, self._problem, self._num_paths = planner, problem, num_paths
         width, self._trial = problem.fields.grid.num_nodes + 1, 0
         self._found = Population(
@@ -96,9 +96,13 @@ class _Climbing(TableSearch):
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Make the trials of generations, of one at least; draw more numbers only for that one."""
-        while (reached := self._climb(first, last)) == first:
-            self._draws.extend(rng)
-        return reached
+        while True:
+            if self._is_used_up:
+                self._draws.extend(rng)
+            reached = self._climb(first, last)
+            self._is_used_up = reached < last
+            if reached > first:
+                return reached
 
     def _climb(self, first: int, last: int) -> int:
         """Make trials as far as the numbers suffice; return the last generation that is done."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.generator_memory import STATE_SIZE, state_reader
+from evoexp.numeric.generator_state import STATE_SIZE, state_bytes
 from evoexp.numeric.pcg64 import Twin, Words
 from evoexp.paths.erased_walks import Exits, Sums, follow_all, room_for_exits, walk_all
 from evoexp.paths.grid_choices import Choices
@@ -130,7 +130,7 @@ class PathSampling:
         task = problem.choices, problem.ends, blocks, problem.world.tolls
         drawing = Drawing(*task, self._exits, self._sums, paths)
         longest = kernel(self._twin.words, drawing, *arguments)
-        self._twin.follow(self._twin.words)
+        self._twin.follow(self._twin.words[:2])
         return paths[:, : longest + 1]
 
 
@@ -159,7 +159,7 @@ class RandomPaths(TableSearch):
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Draw generations; only the paths of the last one of them are kept."""
         self._draw(self._ga.num_offspring, first + 1, last)
-        rest = state_reader(rng.bit_generator)()[STATE_SIZE:]
+        rest = state_bytes(rng.bit_generator)[STATE_SIZE:]
         places = np.arange(first + 1, last + 1) % self.num_places
         self.states = [state.tobytes() + rest for state in self._states[places, ::-1]]
         return last

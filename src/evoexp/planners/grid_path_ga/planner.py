@@ -20,7 +20,6 @@ from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.pcg64 import draw_words
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choices_of
@@ -178,7 +177,7 @@ class GridPathGa(PlannerDefaults, Component):
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
         num_words = first_words(len(paths), int(problem.moves.steps[problem.ends[0]]))
         while walkers.complete < len(paths):
-            walkers.go(draw_words(rng, num_words))
+            walkers.go(rng.bit_generator.random_raw(num_words))
             num_words = FEW_WORDS
 
     def _fill_one_by_one(
@@ -308,9 +307,10 @@ class _Search(ScaledSearch):
         return candidate_of(self._found.paths[place], self._problem.world, results)
 
     def population(self, index: int) -> NodeArray:
-        """Return the paths of the generation computed last without the rest of each row."""
-        paths: NodeArray = self._table.paths[index % KEPT]
-        return trimmed(paths) if index == self.reached else paths[:0]
+        """Return the paths of one of the generations computed last, without rests of rows."""
+        kept = len(self._table.paths)
+        paths: NodeArray = self._table.paths[index % kept]
+        return trimmed(paths) if index > self.reached - kept else paths[:0]
 
 
 def trimmed(paths: NodeArray) -> NodeArray:

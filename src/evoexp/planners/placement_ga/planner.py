@@ -281,9 +281,10 @@ class _RandomStrings(_Strings):
         """Draw and judge generations."""
         if first == 0:  # more strings are drawn at first than later
             self._take(self._ga.num_offspring)
-        uniforms = self._ahead.draw(last - first)
+        count, each = last - first, GENES * self._ga.num_offspring
+        uniforms = self._ahead.draw(count).reshape(count, each)
         kernels.draw_generations(uniforms, first, *self._judging, self._table, self.summaries)
-        self.states = self._ahead.follow_all(last - first)
+        self.states = self._ahead.take([each] * count)
         return last
 
 

@@ -22,7 +22,6 @@ import numpy as np
 
 from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
-from evoexp.numeric.named_tuples import plain
 from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
@@ -126,7 +125,7 @@ class RedundantGa(PlannerDefaults, Component):
             rng: Source of all random numbers.
             kind: What searches a sub-path: the genetic algorithm, or a control in its place.
         """
-        judgings = tuple(plain(self._judging(problem, path)) for path in range(2))
+        judgings = tuple(self._judging(problem, path) for path in range(2))
         plans, proofs = _Plans(self, problem, judgings), None
         memory = RunMemory(self.ga, problem.joint_limits, rng)
         if self.answers_are_proven:
@@ -203,7 +202,7 @@ class RedundantGa(PlannerDefaults, Component):
         self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray
     ) -> FloatArray:
         """Return cost, position error and joint displacement of sub-paths, (3, individuals)."""
-        return _judge(plain(self._judging(problem, path)), starts, ends)
+        return _judge(self._judging(problem, path), starts, ends)
 
     def _judging(self, problem: Problem, path: int) -> Judging:
         """Return collision model and objective of a sub-path."""
@@ -341,11 +340,11 @@ class _Plans:
         self._keeper.keep(cost, Candidate(plan, terms | self._counts, solved))
 
 
-def _judge(judging: tuple[Any, ...], starts: FloatArray, ends: FloatArray) -> FloatArray:
+def _judge(judging: Judging, starts: FloatArray, ends: FloatArray) -> FloatArray:
     """Return cost, position error and joint displacement of sub-paths, (3, individuals).
 
     Args:
-        judging: `Judging`, made plain.
+        judging: Collision model and objective.
         starts: (joints, individuals) [rad].
         ends: (joints, individuals) [rad].
     """

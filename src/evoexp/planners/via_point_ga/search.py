@@ -45,8 +45,9 @@ class Search(TableSearch):
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations with numbers that are drawn ahead."""
-        self._evolve(self._ahead.draw(last - first), first)
-        self.states = self._ahead.follow_all(last - first)
+        count, each = last - first, self._strings.num_drawn
+        self._evolve(self._ahead.draw(count).reshape(count, each), first)
+        self.states = self._ahead.take([each] * count)
         return last
 
     def candidate(self, place: int, individual: int) -> Candidate:

@@ -11,7 +11,6 @@ from evoexp.collision.models.touching_spheres import SphereCollision
 from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.named_tuples import plain
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution
@@ -246,10 +245,10 @@ class Strings:
         Returns:
             It takes the numbers (generations, `num_drawn`) and the present generation.
         """
-        settings = plain(kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging))
-        memory, slices = (plain(table), plain(self.scratch())), self.problem.arm_slices
+        settings = kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging)
+        scratch, slices = self.scratch(), self.problem.arm_slices
         return lambda uniforms, first: kernels.evolve(
-            uniforms, first, slices, settings, *memory, summaries
+            uniforms, first, slices, settings, table, scratch, summaries
         )
 
     def unjudged(self, strings: FloatArray, count: int) -> Judgement:

@@ -11,7 +11,7 @@ from store_samples import CONDITION, CONFIG, generations, write
 
 from confinement import confined
 from evoexp.store.archive import ArchiveError, take_in
-from evoexp.store.container import MAX_LOG
+from evoexp.store.log_bounds import MAX_LOG
 from evoexp.store.plans import as_json
 from evoexp.store.run_directory import RunDirectory
 

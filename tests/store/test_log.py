@@ -22,10 +22,8 @@ from store_samples import (
 
 from evoexp.records import FrontRow, GenerationRow
 from evoexp.store.digests import Chain, array_bytes
-from evoexp.store.generation_columns import generation_columns
-from evoexp.store.generation_texts import encode_generations
 from evoexp.store.log import Log
-from evoexp.store.log_reader import read_log, read_solution, read_summary
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
 FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
@@ -259,13 +257,6 @@ def test_names_of_terms_may_look_like_json(name: str) -> None:
     ]
     rows = read_log(write(given).content).generations
     assert [row.terms[name] for row in rows] == [float(k) for k in range(70)]
-
-
-def test_rows_together_are_the_rows_one_by_one() -> None:
-    rows = [{"index": k, "cost": k / 3.0, "solved": k > 2, "chain": f"{k:032x}"} for k in range(9)]
-    assert encode_generations(rows) == [orjson.dumps(row) for row in rows]
-    assert encode_generations(rows[:1]) == [orjson.dumps(rows[0])]
-    assert encode_generations([]) == []
 
 
 @pytest.mark.parametrize("most", [1, 2, 7, 64, 400])

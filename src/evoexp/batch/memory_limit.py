@@ -10,8 +10,8 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
 from evoexp.registry import component_modules
-from evoexp.store.container import MAX_LOG
 from evoexp.store.kept_facts import kept_fact
+from evoexp.store.log_bounds import MAX_LOG
 
 GIGABYTE = 1000 * MEGABYTE
 LEAST_RECORD = 250  # [B] of a generation in a log, without the paper's own terms

@@ -3,7 +3,6 @@
 import struct
 from collections.abc import Callable, Iterable
 from functools import cached_property
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import xxhash
 from numpy.typing import NDArray
 
 from evoexp.numeric.generator_memory import demand_pcg64, state_reader
-from evoexp.store.container_writer import Messages
 
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 
@@ -77,11 +75,6 @@ def array_bytes(array: NDArray[Any]) -> bytes:
     return array.tobytes()
 
 
-def any_nan(arrays: Iterable[bytes]) -> bool:
-    """Return whether float64 arrays, given as bytes, hold any NaN."""
-    return bool(np.isnan(np.frombuffer(b"".join(arrays))).any())
-
-
 class ContentDigest:
     """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
 
@@ -92,12 +85,6 @@ class ContentDigest:
     def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
         """Append one message; `channel` comes from `channel_identity`."""
         self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
-
-    def update_all(self, channels: Iterable[bytes], messages: Messages) -> None:
-        """Append messages; `channels` has one entry for each of them."""
-        heads = map(_MESSAGE.pack, messages.times, messages.sequences, map(len, messages.data))
-        parts = zip(channels, heads, messages.data, strict=True)
-        self._hash.update(b"".join(chain.from_iterable(parts)))
 
     def hexdigest(self) -> str:
         """Return the digest so far as 32 hex digits."""

@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from evoexp.records import GenerationRow
-from evoexp.store.generation_columns import DTYPES, generation_columns
+from evoexp.store.log_reader import DTYPES, generation_columns
 from evoexp.store.messages import field_types
 from evoexp.store.summaries import Runs, distinct, summary_table, whole_logs
 

@@ -12,7 +12,7 @@ from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, 
 
 from evoexp import attachments
 from evoexp.errors import DamagedStore, StoreError, UnknownHash
-from evoexp.store import damage, summaries
+from evoexp.store import damage
 from evoexp.store import log as log_module
 from evoexp.store.damage import is_set_aside, set_aside
 from evoexp.store.log import Finished
@@ -136,7 +136,6 @@ def test_logs_that_are_noted_are_not_read_again(
     empty(run.log_path(3))
     with pytest.warns(DamagedStore):
         summary_table(run)
-    summaries._KNOWN.clear()
     names: list[str] = []
     read = damage.read_summary
     monkeypatch.setattr(damage, "read_summary", lambda path: names.append(path.name) or read(path))  # type: ignore[func-returns-value]

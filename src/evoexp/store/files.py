@@ -1,21 +1,14 @@
 """Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
-import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 NUM_THREADS = 8  # that write files at the same time
 _SUFFIX = ".tmp"
-_NEW = (
-    os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
-)
 
 
 class _File(NamedTuple):
@@ -41,7 +34,9 @@ def write_files(contents: Mapping[Path, bytes] | Mapping[str, bytes]) -> None:
         files.append(_File(os.path.join(folder, f".{name}{ending}"), os.fspath(path), content))
     renamed = 0
     try:
-        _write_all(files)
+        with ThreadPoolExecutor(min(NUM_THREADS, len(files) or 1)) as threads:
+            for _ in threads.map(_write, files):  # raises what a thread raised
+                pass
         for temporary, final, _ in files:
             os.replace(temporary, final)
             renamed += 1
@@ -58,62 +53,12 @@ def write_file(path: Path, content: bytes) -> None:
     write_files({path: content})
 
 
-def _write_all(files: Sequence[_File]) -> None:
-    if len(files) == 1:
-        _write(files[0])
-        return
-    from concurrent.futures import wait  # who writes one file needs no threads
-
-    # one task per thread, not per file: handing a task over takes as long as writing a file
-    shares = [files[k::NUM_THREADS] for k in range(min(NUM_THREADS, len(files)))]
-    stop, locks = threading.Event(), [threading.Lock() for _ in shares]
-    try:
-        given = zip(shares, locks, strict=True)
-        threads = _threads(os.getpid())
-        writing = [threads.submit(_write_share, share, stop, lock) for share, lock in given]
-        wait(writing)  # for all of them, whatever happens to one
-    except BaseException:  # Ctrl-C: no thread writes a file that is then removed
-        stop.set()
-        for lock in locks:  # also of one that was interrupted while it was given its share
-            with lock:
-                pass
-        raise
-    for one in writing:
-        one.result()
-
-
-def _write_share(files: Sequence[_File], stop: threading.Event, lock: threading.Lock) -> None:
-    """Write files one after the other until one fails or nobody wants them any more."""
-    with lock:
-        for file in files:
-            if stop.is_set():
-                return
-            _write(file)
-
-
-@cache
-def _threads(process: int) -> "ThreadPoolExecutor":
-    """Return the threads that write; they stay, as starting them takes as long as two files.
-
-    Args:
-        process: Whose they are: a copy of a process that has them needs its own.
-    """
-    from concurrent.futures import ThreadPoolExecutor
-
-    return ThreadPoolExecutor(NUM_THREADS, "write")
-
-
 def _write(file: _File) -> None:
     """Write a file under its temporary name; return when it is on the disk."""
-    with _named(file.final):
-        descriptor = os.open(file.temporary, _NEW, 0o666)
-        try:
-            rest = memoryview(file.content)
-            while rest:
-                rest = rest[os.write(descriptor, rest) :]
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+    with _named(file.final), open(file.temporary, "wb") as temporary:
+        temporary.write(file.content)
+        temporary.flush()
+        os.fsync(temporary.fileno())
 
 
 @contextmanager

@@ -27,8 +27,7 @@ from evoexp.store.messages import TERM
 from evoexp.store.plans import PLANS
 from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory, open_run
-from evoexp.store.summaries import altered_rows, table_damage
-from evoexp.store.summary_columns import BASE
+from evoexp.store.summaries import BASE, altered_rows, table_damage
 
 _KNOWN = {CONFIG, MANIFEST, PLANS, REPLICATES, PREFIX.strip("/"), "summary.parquet", ".lock"}
 DELETE = "; delete it, then run again"

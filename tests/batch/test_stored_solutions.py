@@ -16,9 +16,9 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log, stored_condition
 from evoexp.batch.stored_solutions import contradictions
 from evoexp.errors import CorruptLog
+from evoexp.store.integrity import LogCheck, check_logs
 from evoexp.store.log import SUMMARY, array_file
 from evoexp.store.log_reader import read_log
-from evoexp.store.verification import LogCheck, check_logs
 from forged_logs import Row, with_attachment, with_message, with_metadata
 from store.log_anatomy import put_together, take_apart
 

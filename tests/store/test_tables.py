@@ -16,7 +16,7 @@ from store_samples import CONDITION, generations, write
 
 from evoexp.errors import DamagedStore
 from evoexp.records import ReplicateSummary
-from evoexp.store import damage, summaries, tables
+from evoexp.store import log_reader, summaries, tables
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import write_summary
@@ -29,13 +29,13 @@ Add = Callable[..., Finished]
 def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Return the names of the logs whose summary was read since."""
     names: list[str] = []
-    read = damage.read_summary
+    read = log_reader.read_summary
 
     def count(path: Path) -> ReplicateSummary:
         names.append(path.name)
         return read(path)
 
-    monkeypatch.setattr(damage, "read_summary", count)
+    monkeypatch.setattr(log_reader, "read_summary", count)
     return names
 
 

@@ -24,7 +24,6 @@ from evoexp.store.identity import TAKEN
 from evoexp.store.kept_facts import kept_fact
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
-from evoexp.store.plans import num_planned
 from evoexp.store.run_context import ORIGIN
 from evoexp.store.run_context import origin as origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -67,7 +66,7 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
     }
     run = RunDirectory(outputs_root(), condition.id)
     rows = summary_table(run).to_pylist() if run.completed() or run.failed() else []
-    planned = num_planned(run, condition.num_replicates(experiment.num_replicates))
+    planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
     around = run.manifest() if rows else None
     config_json = condition.to_json()
     if not lacking(config_json):  # else a note says how to install it

@@ -1,14 +1,22 @@
-"""Files that are either whole or not there, whenever the process or the machine dies."""
+"""Files that are either whole or not there, whenever the process or the machine dies.
+
+A damaged file is named and set aside, never deleted.
+"""
 
 import os
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from evoexp.errors import DamagedStore
+
 NUM_THREADS = 8  # that write files at the same time
 _SUFFIX = ".tmp"
+DAMAGED = ".damaged"  # ends the name of a file that was set aside
+MAX_NAMED = 3  # damaged files in one line
 
 
 class _File(NamedTuple):
@@ -96,3 +104,40 @@ def remove_stale(directories: Iterable[Path]) -> None:
     for directory in directories:
         for path in directory.glob(f".*{_SUFFIX}"):
             path.unlink(missing_ok=True)
+
+
+def warn(text: str) -> None:
+    """Say that something stored is damaged; the command goes on."""
+    warnings.warn(text, DamagedStore, stacklevel=3)
+
+
+def set_aside(path: Path) -> Path:
+    """Rename a damaged file, or whatever stands in its place; return its new path.
+
+    Nothing is overwritten: `0001.mcap.damaged`, then `0001.mcap.damaged.2`, and so on.
+    """
+    count, aside = 1, path.with_name(path.name + DAMAGED)
+    while os.path.lexists(aside):
+        count += 1
+        aside = path.with_name(f"{path.name}{DAMAGED}.{count}")
+    path.rename(aside)
+    sync_directory(path.parent)
+    return aside
+
+
+def is_set_aside(name: str) -> bool:
+    """Return whether a file's name is one that `set_aside` gives."""
+    head, found, tail = name.rpartition(DAMAGED)
+    return bool(head and found) and (not tail or tail.removeprefix(".").isdecimal())
+
+
+def reason(path: Path, error: Exception) -> str:
+    """Return the text of an error about a file without the file's path, in one line."""
+    return " ".join(str(error).removeprefix(f"{path}: ").split())
+
+
+def listed(damaged: Mapping[str, str]) -> str:
+    """Return names of files and what is wrong with them, the first few of many."""
+    named = [f"{name} ({why})" for name, why in list(damaged.items())[:MAX_NAMED]]
+    more = [f"{len(damaged) - MAX_NAMED} more"] if len(damaged) > MAX_NAMED else []
+    return ", ".join([*named, *more])

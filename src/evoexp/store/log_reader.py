@@ -209,6 +209,20 @@ def read_summary(source: Source) -> ReplicateSummary:
         return log.summary()
 
 
+def checked_summary(source: Path | bytes, condition_id: str, replicate: int) -> ReplicateSummary:
+    """Return the summary of the log in the place of a replicate, or of its bytes.
+
+    Raises:
+        CorruptLog: The log is damaged, or it is of another condition or replicate.
+    """
+    summary = read_summary(source)
+    if (summary.condition, summary.replicate) != (condition_id, replicate):
+        theirs = f"replicate {summary.replicate} of {summary.condition[:12]}"
+        name = "log" if isinstance(source, bytes) else source
+        raise CorruptLog(f"{name}: holds {theirs}, which does not belong here")
+    return summary
+
+
 def read_solution(source: Source) -> SolutionRow:
     """Return a log's last solution, the best of the replicate; only its chunk is decompressed.
 

@@ -17,9 +17,9 @@ import pyarrow.parquet as pq
 
 from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import ReplicateSummary, flatten
-from evoexp.store.damage import checked_summary, listed, reason, set_aside, warn
-from evoexp.store.files import write_file
+from evoexp.store.files import listed, reason, set_aside, warn, write_file
 from evoexp.store.log_bounds import check
+from evoexp.store.log_reader import checked_summary
 from evoexp.store.messages import field_types
 from evoexp.store.run_context import run_context, with_context
 from evoexp.store.run_directory import RunDirectory

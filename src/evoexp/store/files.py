@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from evoexp.errors import DamagedStore
 
@@ -19,41 +18,27 @@ DAMAGED = ".damaged"  # ends the name of a file that was set aside
 MAX_NAMED = 3  # damaged files in one line
 
 
-class _File(NamedTuple):
-    """A file to be written: its temporary path, its final one, its content."""
-
-    temporary: str
-    final: str
-    content: bytes
-
-
-def write_files(contents: Mapping[Path, bytes] | Mapping[str, bytes]) -> None:
+def write_files(contents: Mapping[Path, bytes]) -> None:
     """Write files, each atomically and durably.
 
     Each goes through a temporary file, fsync and rename; then the directory is synced.
 
-    No file is renamed before its bytes are on the disk: a name always means a whole file. A batch
-    is cheaper than its files one by one: they are synced at once, which the disk answers together,
-    and the directory once.
+    No file is renamed before its bytes are on the disk: a name always means a whole file. Files of
+    a batch are synced at once, which the disk answers together.
     """
-    ending, files = f".{os.getpid()}{_SUFFIX}", []
-    for path, content in contents.items():
-        folder, name = os.path.split(path)
-        files.append(_File(os.path.join(folder, f".{name}{ending}"), os.fspath(path), content))
-    renamed = 0
+    ending = f".{os.getpid()}{_SUFFIX}"
+    files = {path: path.with_name(f".{path.name}{ending}") for path in contents}  # temporary
     try:
         with ThreadPoolExecutor(min(NUM_THREADS, len(files) or 1)) as threads:
-            for _ in threads.map(_write, files):  # raises what a thread raised
-                pass
-        for temporary, final, _ in files:
-            os.replace(temporary, final)
-            renamed += 1
+            # raises what a thread raised
+            list(threads.map(_write, files, files.values(), contents.values()))
+        for path, temporary in files.items():
+            temporary.replace(path)
     finally:
-        for temporary, _, _ in files[renamed:]:
-            with suppress(FileNotFoundError):
-                os.unlink(temporary)
-    for directory in {os.path.dirname(final) for _, final, _ in files}:
-        sync_directory(directory or ".")
+        for temporary in files.values():
+            temporary.unlink(missing_ok=True)
+    for directory in {path.parent for path in files}:
+        sync_directory(directory)
 
 
 def write_file(path: Path, content: bytes) -> None:
@@ -61,25 +46,25 @@ def write_file(path: Path, content: bytes) -> None:
     write_files({path: content})
 
 
-def _write(file: _File) -> None:
+def _write(path: Path, temporary: Path, content: bytes) -> None:
     """Write a file under its temporary name; return when it is on the disk."""
-    with _named(file.final), open(file.temporary, "wb") as temporary:
-        temporary.write(file.content)
-        temporary.flush()
-        os.fsync(temporary.fileno())
+    with _named(path), open(temporary, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 @contextmanager
-def _named(path: str) -> Iterator[None]:
+def _named(path: Path) -> Iterator[None]:
     """Let errors of the system name a path: those of `write` and `fsync` name none."""
     try:
         yield
     except OSError as error:
-        error.filename = path
+        error.filename = str(path)
         raise
 
 
-def sync_directory(path: Path | str) -> None:
+def sync_directory(path: Path) -> None:
     """Make renames and new names in a directory durable.
 
     Nothing is done where the system cannot open directories.
@@ -87,7 +72,7 @@ def sync_directory(path: Path | str) -> None:
     with suppress(PermissionError):  # Windows
         descriptor = os.open(path, os.O_RDONLY)
         try:
-            with _named(os.fspath(path)):
+            with _named(path):
                 os.fsync(descriptor)
         finally:
             os.close(descriptor)

@@ -190,16 +190,18 @@ def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -
     if stored is None:
         return []
     rows = dict(zip(stored.row_names, stored.table.to_pylist(), strict=True))
-    known = [name for name in summaries if name in rows and stored.files[name] == stamps.get(name)]
-    given = [flatten(summaries[name]) for name in known]
-    columns = {*stored.table.column_names}
-    wider = [name for name, row in zip(known, given, strict=True) if not row.keys() <= columns]
-    expected = pa.Table.from_pylist(given, stored.table.schema).to_pylist()
-    return wider + [
+    return [
         name
-        for name, row in zip(known, expected, strict=True)
-        if name not in wider and repr(row) != repr(rows[name])
+        for name, summary in summaries.items()
+        if name in rows
+        and stored.files[name] == stamps.get(name)
+        and _given(rows[name]) != _given(flatten(summary))
     ]
+
+
+def _given(row: Mapping[str, Any]) -> str:
+    """Return a row as text, so that NaN is equal to itself; without what it does not have."""
+    return repr(sorted((name, value) for name, value in row.items() if value is not None))
 
 
 def replicate_of(name: str) -> int:

@@ -18,8 +18,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.records import generations
 from evoexp.store.files import write_file, write_files
-from evoexp.store.generation_columns import generation_columns
-from evoexp.store.log_reader import read_log, read_summary
+from evoexp.store.log_reader import generation_columns, read_log, read_summary
 
 WORDS = ("experiment=rana_planar", "ga.num_generations=100", "ga.population_size=10")
 BUNDLE = 20  # logs stored together

@@ -13,11 +13,11 @@ from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, 
 from evoexp import attachments
 from evoexp.errors import DamagedStore, StoreError, UnknownHash
 from evoexp.records import Block
-from evoexp.store import damage, summaries
 from evoexp.store import log as log_module
-from evoexp.store.damage import is_set_aside, set_aside
+from evoexp.store import log_reader
+from evoexp.store.files import is_set_aside, set_aside
+from evoexp.store.integrity import damaged_files, lost_replicates, mend
 from evoexp.store.log import Finished
-from evoexp.store.mending import damaged_files, lost_replicates, mend
 from evoexp.store.run_directory import RunDirectory, find_runs, resolve
 from evoexp.store.summaries import damaged_logs, summary_table, whole_logs
 
@@ -137,10 +137,11 @@ def test_logs_that_are_noted_are_not_read_again(
     empty(run.log_path(3))
     with pytest.warns(DamagedStore):
         summary_table(run)
-    summaries._KNOWN.clear()
     names: list[str] = []
-    read = damage.read_summary
-    monkeypatch.setattr(damage, "read_summary", lambda path: names.append(path.name) or read(path))  # type: ignore[func-returns-value]
+    read = log_reader.read_summary
+    monkeypatch.setattr(
+        log_reader, "read_summary", lambda path: names.append(path.name) or read(path)
+    )  # type: ignore[func-returns-value]
     assert whole_logs(run) == {0, 1, 2}
     assert set(names) == {"0003.mcap"}, "the damaged one alone: it may have been repaired"
     add(3)

@@ -18,11 +18,11 @@ def test_chain_is_the_documented_hash() -> None:
     chain = Chain(rng)
     state = state_bytes(bits)
     first = xxhash.xxh3_128(costs.tobytes() + best.tobytes() + state).digest()
-    given = [array_bytes(costs)], [array_bytes(best)]
-    assert chain.extend(*given, [chain.state()]) == [first.hex()]
+    given = array_bytes(costs), array_bytes(best)
+    assert chain.extend(*given, chain.state()) == first.hex()
     rng.random()
     second = xxhash.xxh3_128(first + costs.tobytes() + best.tobytes() + state_bytes(bits)).digest()
-    assert chain.extend(*given, [chain.state()]) == [second.hex()] != [first.hex()]
+    assert chain.extend(*given, chain.state()) == second.hex() != first.hex()
     assert chain.finish(population) == xxhash.xxh3_128_hexdigest(second + population.tobytes())
 
 

@@ -22,9 +22,8 @@ from store_samples import (
 
 from evoexp.records import Block, FrontRow, GenerationRow
 from evoexp.store.digests import Chain, array_bytes
-from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log import Log
-from evoexp.store.log_reader import read_log, read_solution, read_summary
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
 FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
@@ -244,7 +243,7 @@ def test_links_are_those_of_costs_one_by_one() -> None:
     for generation in given:
         log.write(Block.of(generation))
         costs, best = array_bytes(generation.costs), array_bytes(generation.best)
-        expected += chain.extend([costs], [best], [chain.state()])
+        expected.append(chain.extend(costs, best, chain.state()))
         rng.random(3)
     found = read_log(log.finish(summary()).content).generations
     assert [row.chain for row in found] == expected

@@ -88,18 +88,22 @@ class Block(NamedTuple):
     @classmethod
     def of(cls, generation: Generation) -> "Block":
         """Return a block of one generation."""
-        index, best, cost, lowest, mean, std, *counts, solved, terms = generation[:11]
+        g = generation
         return cls(
-            index,
-            [Best(0, best, cost, dict(terms), solved)],
-            [lowest],
-            [mean],
-            [std],
-            *([count] for count in counts),
-            generation.costs[None],
-            lambda place: generation.population,
-            [generation.state] if generation.state else None,
-            *generation[13:16],
+            first=g.index,
+            bests=[Best(0, g.best, g.best_cost, dict(g.terms), g.solved)],
+            lowest=[g.best_cost_in_generation],
+            means=[g.mean_cost],
+            deviations=[g.std_cost],
+            num_feasible=[g.num_feasible],
+            evaluations=[g.evaluations],
+            collision_queries=[g.collision_queries],
+            costs=g.costs[None],
+            population=lambda place: g.population,
+            states=[g.state] if g.state else None,
+            criteria=g.criteria,
+            stop_reason=g.stop_reason,
+            arrays=g.arrays,
         )
 
     @property
@@ -126,27 +130,44 @@ class Block(NamedTuple):
         """
         population = self.population(count - 1) if count else np.empty(0)
         self.population(count)
-        bests = [best for best in self.bests if best.place < count]
-        columns = [column[:count] for column in self[2:9]]
-        states = None if self.states is None else self.states[:count]
-        return Block(self.first, bests, *columns, lambda place: population, states)
+        return self._replace(
+            bests=[best for best in self.bests if best.place < count],
+            lowest=self.lowest[:count],
+            means=self.means[:count],
+            deviations=self.deviations[:count],
+            num_feasible=self.num_feasible[:count],
+            evaluations=self.evaluations[:count],
+            collision_queries=self.collision_queries[:count],
+            costs=self.costs[:count],
+            population=lambda place: population,
+            states=None if self.states is None else self.states[:count],
+            criteria=None,
+            stop_reason="",
+            arrays=None,
+        )
 
     def generations(self) -> Iterator[Generation]:
         """Yield the generations one by one, each valid until the next one is asked for."""
         last = self.num_generations - 1
         for k, best in enumerate(self.best_of_each):
-            of_last = self[11:] if k == last else (None, "", None)
             yield Generation(
-                self.first + k,
-                best.solution,
-                best.cost,
-                *(column[k] for column in self[2:8]),
-                best.solved,
-                best.terms,
-                self.costs[k],
-                self.population(k),
-                *of_last,
-                self.states[k] if self.states is not None else b"",
+                index=self.first + k,
+                best=best.solution,
+                best_cost=best.cost,
+                best_cost_in_generation=self.lowest[k],
+                mean_cost=self.means[k],
+                std_cost=self.deviations[k],
+                num_feasible=self.num_feasible[k],
+                evaluations=self.evaluations[k],
+                collision_queries=self.collision_queries[k],
+                solved=best.solved,
+                terms=best.terms,
+                costs=self.costs[k],
+                population=self.population(k),
+                criteria=self.criteria if k == last else None,
+                stop_reason=self.stop_reason if k == last else "",
+                arrays=self.arrays if k == last else None,
+                state=b"" if self.states is None else self.states[k],
             )
 
 

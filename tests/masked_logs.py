@@ -1,29 +1,37 @@
-"""Logs and tables without the times that no two runs share, and with every other byte.
+"""Logs and tables without the times that no two runs share, and with everything else.
 
-A log is compared as bytes: its times are set to zero where they stand, chunks are compared as what
-they hold, and what depends on length or value of them (offsets, checksums) is set to zero.
+A log is compared record by record: its times are set to zero, chunks are compared as what they
+hold, and what depends on length or value of them (offsets, checksums) is left out.
 """
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
-from mcap.data_stream import RecordBuilder
-from mcap.opcode import Opcode
-from mcap.records import AttachmentIndex, ChunkIndex, Metadata, MetadataIndex
+from mcap.records import (
+    AttachmentIndex,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    McapRecord,
+    Message,
+    MessageIndex,
+    Metadata,
+    MetadataIndex,
+)
+from mcap.stream_reader import StreamReader, breakup_chunk
 
-from evoexp.store.container import check, chunk_messages, parse
 from evoexp.store.log import SUMMARY
 
 TIMES = ("certificate_s", "cpu_s", "wall_s")  # [s] all that two runs of a replicate may differ in
-_HEAD = 9  # [B] opcode and length of a record
 
 
-def masked_log(content: bytes) -> bytes:
-    """Return the bytes of a log with its times, and what follows from them, set to zero."""
-    container = check(content, "log")
-    records = [*container.data_section(), *container.summary_section()]
-    return b"".join(_masked(opcode, body) for opcode, body in records)
+def masked_log(content: bytes) -> str:
+    """Return the records of a log with its times, and what follows from them, set to zero."""
+    records = StreamReader(BytesIO(content), emit_chunks=True).records
+    return "\n".join(map(repr, map(_masked, records)))
 
 
 def masked_rows(summary: Path) -> list[dict[str, Any]]:
@@ -62,36 +70,27 @@ def differing(one: dict[str, Any], two: dict[str, Any]) -> list[str]:
     )
 
 
-def _without_times(body: bytes) -> bytes:
-    metadata = parse(Metadata, body)
-    assert metadata.metadata.keys() >= set(TIMES)
-    metadata.metadata |= dict.fromkeys(TIMES, "0")
-    return _bytes(metadata)[_HEAD:]
-
-
-def _masked(opcode: int, body: bytes) -> bytes:
+def _masked(record: McapRecord) -> Any:
     """Return a record without times, places and checksums."""
-    if opcode == Opcode.METADATA and parse(Metadata, body).name == SUMMARY:
-        body = _without_times(body)
-    elif opcode == Opcode.CHUNK:
-        messages = [message._replace(publish_time=0) for message in chunk_messages(body)]
-        body = repr(messages).encode()
-    elif opcode == Opcode.DATA_END:
-        body = b""
-    elif opcode == Opcode.METADATA_INDEX:
-        body = parse(MetadataIndex, body).name.encode()
-    elif opcode == Opcode.ATTACHMENT_INDEX:
-        attachment = parse(AttachmentIndex, body)
-        attachment.offset = 0
-        body = _bytes(attachment)[_HEAD:]
-    elif opcode == Opcode.CHUNK_INDEX:
-        chunk = parse(ChunkIndex, body)
-        body = repr((chunk.message_start_time, chunk.message_end_time)).encode()
-        body += repr((sorted(chunk.message_index_offsets), chunk.uncompressed_size)).encode()
-    return bytes([opcode]) + len(body).to_bytes(8, "little") + body
+    match record:
+        case Metadata(name=name) if name == SUMMARY:
+            assert record.metadata.keys() >= set(TIMES)
+            record.metadata |= dict.fromkeys(TIMES, "0")
+        case Chunk():
+            return [_untimed(each) for each in breakup_chunk(record)]
+        case MetadataIndex():
+            return record.name
+        case AttachmentIndex():
+            record.offset = 0
+        case ChunkIndex():
+            span = record.message_start_time, record.message_end_time
+            return span, sorted(record.message_index_offsets), record.uncompressed_size
+        case DataEnd() | Footer() | MessageIndex():
+            return type(record).__name__
+    return record
 
 
-def _bytes(record: Any) -> bytes:
-    builder = RecordBuilder()
-    record.write(builder)
-    return builder.end()
+def _untimed(record: McapRecord) -> McapRecord:
+    if isinstance(record, Message):
+        record.publish_time = 0
+    return record

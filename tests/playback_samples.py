@@ -8,6 +8,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.shapes import Outline
+from evoexp.records import generations
 
 SAMPLES = {  # name: overrides, label, whether the search is run to its end
     "two arms": (["experiment=rana_planar", "budget=smoke"], "via-point GA", False),
@@ -38,11 +39,11 @@ def recording(name: str) -> Recording:
     """Return a sample's motion."""
     own = condition(name)
     planner, problem = own.prepare()
-    generations = planner.evolve(problem, own.rng(REPLICATE.get(name, 0)))
-    best = np.array(next(generations).best)
+    rows = generations(planner.evolve(problem, own.rng(REPLICATE.get(name, 0))))
+    best = np.array(next(rows).best)
     improvements = [(0, 2.0)]
     if SAMPLES[name][2]:
-        for generation in generations:
+        for generation in rows:
             best = np.array(generation.best)
             improvements.append((generation.index, float(generation.best_cost)))
     return record(own, best, Heading(name, 0, tuple(improvements)))

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pytest
 from evoexp.cli import main
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import find, options, origin
-from evoexp.store import kept_facts
 from evoexp.store.log_reader import read_log
 from guests import on_path, write_distribution
 
@@ -121,7 +119,6 @@ def test_kept_expansions_follow_the_options_and_code_of_guests(
     kept = tmp_path / "cache" / "expansions"
 
     def count() -> int:
-        time.sleep(kept_facts.LOOK_S)  # the age that a look at the code may have
         expansions.expand(RUN[1:])
         return len(list(kept.iterdir()))
 

@@ -24,7 +24,6 @@ from evoexp.commands.standard_streams import (
     silence_output,
 )
 from evoexp.errors import EvoexpError
-from evoexp.numeric.garbage import search_less
 
 KEPT = "finished replicates are kept, the same command runs the others"
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  # full, or defective
@@ -43,7 +42,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looked for in all packages
         open_streams()
-        search_less()
         interruption.hear()
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:

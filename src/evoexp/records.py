@@ -5,7 +5,9 @@ scene, which then names it (`length_unit`). Costs are minimised; `inf` means inf
 evaluated.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain, repeat
+from operator import sub
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +23,7 @@ TIMES = ("certificate_s", "cpu_s", "wall_s")
 
 
 class Generation(NamedTuple):
-    """One generation of one replicate, as a planner yields it.
+    """One generation of one replicate: a row of a `Block`, as tests and guests see it.
 
     `costs` and `population` are views into the planner's memory: valid until the next generation is
     asked for, hashed into the digest and not recorded. `best` is never changed: a better one is
@@ -41,67 +43,144 @@ class Generation(NamedTuple):
     terms: dict[str, float]  # the paper's own terms of the best so far; written as term_<name>
     # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
     costs: FloatArray
-    population: FloatArray  # any shape
+    population: NDArray[Any]  # any shape
     # (populations, criteria, individuals), of generations whose front is recorded
     criteria: FloatArray | None = None
     # of the last generation: why the planner ends, if not because its generations are used up
     stop_reason: str = ""
     arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached as <name>.npy
+    state: bytes = b""  # of the generator behind it; empty: where the generator is now
 
 
-class Standing(NamedTuple):
-    """The best solution from a generation of a stretch on, up to the next standing."""
+class Best(NamedTuple):
+    """The best solution from a generation of a block on, up to the next one of the block."""
 
-    place: int  # of this generation in its stretch
-    best: FloatArray  # flat solution, never changed
+    place: int  # of this generation in its block
+    solution: FloatArray  # flat, never changed
     cost: float
     terms: dict[str, float]  # never changed
     solved: bool
 
 
-class Stretch(NamedTuple):
-    """Generations in a row: `Generation`, field by field."""
+class Block(NamedTuple):
+    """Generations in a row, as a planner yields them: the fields of `Generation` as columns.
+
+    Costs and populations are views into the planner's memory, valid until the next block.
+    """
 
     first: int  # index of the first generation
-    standings: list[Standing]  # the first one is at place 0
-    lowest: list[float]  # of each generation; see `Generation.best_cost_in_generation`
-    means: list[float]
-    deviations: list[float]
-    num_feasible: list[int]
-    evaluations: list[int]
-    collision_queries: list[int]
-    costs: list[FloatArray]  # (generations, …, individuals) of some generations after the other
-    states: list[bytes]  # of the generator, behind each generation
-    times: list[float]  # [s] when each generation was there
-    population: NDArray[Any] | None  # of the last generation, if it ends the run
-    criteria: FloatArray | None = None  # likewise, if its front is recorded
+    bests: Sequence[Best]  # the first one is at place 0
+    lowest: Sequence[float]  # of each generation, as the columns that follow
+    means: Sequence[float]
+    deviations: Sequence[float]
+    num_feasible: Sequence[int]
+    evaluations: Sequence[int]
+    collision_queries: Sequence[int]
+    costs: FloatArray  # (generations, …, individuals)
+    # shows the population at a place of the block; empty where the planner has it no longer
+    population: Callable[[int], NDArray[Any]]
+    # of the generator behind each generation; None: where it is now
+    states: Sequence[bytes] | None = None
+    criteria: FloatArray | None = None  # of the last generation, see `Generation`
+    stop_reason: str = ""  # likewise
+    arrays: Mapping[str, NDArray[Any]] | None = None  # likewise
 
-    def copied(self) -> "Stretch":
-        """Return the same without views of the planner's memory."""
-        population, criteria = (
-            None if array is None else array.copy() for array in (self.population, self.criteria)
+    @classmethod
+    def of(cls, generation: Generation) -> "Block":
+        """Return a block of one generation."""
+        g = generation
+        return cls(
+            first=g.index,
+            bests=[Best(0, g.best, g.best_cost, dict(g.terms), g.solved)],
+            lowest=[g.best_cost_in_generation],
+            means=[g.mean_cost],
+            deviations=[g.std_cost],
+            num_feasible=[g.num_feasible],
+            evaluations=[g.evaluations],
+            collision_queries=[g.collision_queries],
+            costs=g.costs[None],
+            population=lambda place: g.population,
+            states=[g.state] if g.state else None,
+            criteria=g.criteria,
+            stop_reason=g.stop_reason,
+            arrays=g.arrays,
         )
-        return self._replace(population=population, criteria=criteria)
 
-    def last(self) -> Generation:
-        """Return the last generation; without a population unless it ends the run."""
-        standing, population = self.standings[-1], self.population
-        return Generation(
-            self.first + len(self.lowest) - 1,
-            standing.best,
-            standing.cost,
-            self.lowest[-1],
-            self.means[-1],
-            self.deviations[-1],
-            self.num_feasible[-1],
-            self.evaluations[-1],
-            self.collision_queries[-1],
-            standing.solved,
-            standing.terms,
-            self.costs[-1][-1],
-            np.empty(0) if population is None else population,
-            self.criteria,
+    @property
+    def num_generations(self) -> int:
+        """How many generations there are."""
+        return len(self.lowest)
+
+    @property
+    def best(self) -> FloatArray:
+        """The best solution so far behind the last generation."""
+        return self.bests[-1].solution
+
+    @property
+    def best_of_each(self) -> list[Best]:
+        """The best so far behind each generation."""
+        places = [best.place for best in self.bests[1:]]
+        repeats = map(sub, [*places, self.num_generations], [0, *places])
+        return [*chain.from_iterable(map(repeat, self.bests, repeats))]
+
+    def head(self, count: int) -> "Block":
+        """Return the first generations, behind which the next one was asked for already.
+
+        Where all populations are shown in one array, it holds the next one's then.
+        """
+        population = self.population(count - 1) if count else np.empty(0)
+        self.population(count)
+        return self._replace(
+            bests=[best for best in self.bests if best.place < count],
+            lowest=self.lowest[:count],
+            means=self.means[:count],
+            deviations=self.deviations[:count],
+            num_feasible=self.num_feasible[:count],
+            evaluations=self.evaluations[:count],
+            collision_queries=self.collision_queries[:count],
+            costs=self.costs[:count],
+            population=lambda place: population,
+            states=None if self.states is None else self.states[:count],
+            criteria=None,
+            stop_reason="",
+            arrays=None,
         )
+
+    def generations(self) -> Iterator[Generation]:
+        """Yield the generations one by one, each valid until the next one is asked for."""
+        last = self.num_generations - 1
+        for k, best in enumerate(self.best_of_each):
+            yield Generation(
+                index=self.first + k,
+                best=best.solution,
+                best_cost=best.cost,
+                best_cost_in_generation=self.lowest[k],
+                mean_cost=self.means[k],
+                std_cost=self.deviations[k],
+                num_feasible=self.num_feasible[k],
+                evaluations=self.evaluations[k],
+                collision_queries=self.collision_queries[k],
+                solved=best.solved,
+                terms=best.terms,
+                costs=self.costs[k],
+                population=self.population(k),
+                criteria=self.criteria if k == last else None,
+                stop_reason=self.stop_reason if k == last else "",
+                arrays=self.arrays if k == last else None,
+                state=b"" if self.states is None else self.states[k],
+            )
+
+
+def blocks(evolution: Iterable[Block | Generation]) -> Iterator[Block]:
+    """Yield what a planner yields as blocks; a guest may yield single generations."""
+    for each in evolution:
+        yield each if isinstance(each, Block) else Block.of(each)
+
+
+def generations(evolution: Iterable[Block | Generation]) -> Iterator[Generation]:
+    """Yield what a planner yields as single generations."""
+    for block in blocks(evolution):
+        yield from block.generations()
 
 
 class GenerationRow(NamedTuple):

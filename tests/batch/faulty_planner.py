@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
-from evoexp.records import Generation
+from evoexp.records import Generation, generations
 
 HANG_S = 3600.0  # [s] until somebody ends the process
 
@@ -32,7 +32,7 @@ class Faulty(ViaPointGa):
         seed = rng.bit_generator.seed_seq
         assert isinstance(seed, np.random.SeedSequence)
         faults = faults_of(seed.spawn_key[0])
-        for generation in super().evolve(problem, rng):
+        for generation in generations(super().evolve(problem, rng)):
             if "hang" in faults and generation.index == 1 and in_worker():
                 time.sleep(HANG_S)
             if "slow" in faults and generation.index == 1:

@@ -24,10 +24,10 @@ from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import Busy, DamagedStore, SettingError
-from evoexp.store import damage
+from evoexp.store import log_reader
+from evoexp.store.identity import Plan
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
-from evoexp.store.plans import Plan
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
 from masked_logs import masked_log
@@ -117,7 +117,7 @@ def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     canonical = Condition.to_json
     calls: list[Condition] = []
     monkeypatch.setattr(Condition, "to_json", lambda self: calls.append(self) or canonical(self))  # type: ignore[func-returns-value]
-    monkeypatch.setattr(damage, "read_summary", lambda path: pytest.fail(f"{path} is decoded"))
+    monkeypatch.setattr(log_reader, "read_summary", lambda path: pytest.fail(f"{path} is decoded"))
     batch = new_batch(tmp_path, (faulty, 10))
     assert [job.replicate for job in batch.jobs] == [0, 5, 7, 8, 9]
     assert not batch.is_damaged

@@ -16,9 +16,9 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log, stored_condition
 from evoexp.batch.stored_solutions import contradictions
 from evoexp.errors import CorruptLog
+from evoexp.store.integrity import LogCheck, check_logs
 from evoexp.store.log import SUMMARY, array_file
 from evoexp.store.log_reader import read_log
-from evoexp.store.verification import LogCheck, check_logs
 from forged_logs import Row, with_attachment, with_message, with_metadata
 from store.log_anatomy import put_together, take_apart
 
@@ -152,11 +152,11 @@ def test_no_record_is_hidden_from_who_reads_the_whole_log(tmp_path: Path) -> Non
     log = log_of(REFERENCE)
     other = array_file(read_log(log).arrays()["minima"] + 1.0)
     for name in ("minima.npy", "config.json"):
-        with pytest.raises(CorruptLog, match="index does not tell the records"):
+        with pytest.raises(CorruptLog, match="records of the same name"):
             read_log(with_attachment(log, name, other, beside=True))
     parts = take_apart(log)
     doubled = [part for part in parts if part.opcode == Opcode.METADATA]
-    with pytest.raises(CorruptLog, match="index does not tell the records"):
+    with pytest.raises(CorruptLog, match="records of the same name"):
         read_log(put_together([*parts, doubled[-1]]))
 
 

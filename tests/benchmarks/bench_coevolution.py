@@ -11,6 +11,7 @@ import pytest
 
 from evoexp.collision.models.link_collision import LinkCollision
 from evoexp.configuration import compose
+from evoexp.records import generations
 
 GENERATIONS = 40
 
@@ -30,7 +31,10 @@ def bench_run(beside: Any, label: str) -> None:
     planner, problem = given.prepare()
 
     def run() -> float:
-        return min(generation.best_cost for generation in planner.evolve(problem, given.rng(0)))
+        return min(
+            generation.best_cost
+            for generation in generations(planner.evolve(problem, given.rng(0)))
+        )
 
     def steps() -> float:
         with step_by_step():

@@ -16,6 +16,7 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.records import generations
 from references import rana_numpy
 
 INDIVIDUALS, INSTANTS = 100, 20
@@ -36,7 +37,7 @@ def population_of(when: str) -> Any:
     planner, problem = given.prepare()
     if when == "fresh":
         return planner.sample(problem, np.random.default_rng(0), INDIVIDUALS)
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     return last.population[:, :, :INDIVIDUALS].copy()
 
 

@@ -15,6 +15,7 @@ from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_by_pieces
 from evoexp.planners.grid_path_ga.kernels import RESULTS, Population
 from evoexp.planners.grid_path_ga.path_operators import Scratch
+from evoexp.records import generations
 
 TRIALS = 2000
 
@@ -41,7 +42,10 @@ def bench_grid_run(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
     benchmark(
-        lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))]
+        lambda: [
+            generation.best_cost
+            for generation in generations(planner.evolve(problem, found.rng(0)))
+        ]
     )
 
 

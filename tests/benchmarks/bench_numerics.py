@@ -23,7 +23,6 @@ from evoexp.numeric.elementary import (
     sincos,
     standard_normal,
 )
-from evoexp.numeric.pcg64 import draw_uniforms
 
 SIZE = 4096
 rng = np.random.default_rng(0)
@@ -126,15 +125,3 @@ def test_standard_normal(benchmark: Any, source: str, size: int) -> None:
     benchmark.group = f"normal {size}"
     draw = standard_normal if source == "ours" else np.random.Generator.standard_normal
     assert benchmark(draw, generator, size).shape == (size,)
-
-
-def bench_uniforms(beside: Callable[..., None]) -> None:
-    own, numpys = np.random.default_rng(0), np.random.default_rng(0)
-    beside(
-        f"{4 * SIZE} uniform numbers of PCG64",
-        lambda: draw_uniforms(own, 4 * SIZE),
-        {"numpy": (lambda: numpys.random(4 * SIZE), 4 * SIZE, 20)},
-        unit="number",
-        amount=4 * SIZE,
-        repeat=20,
-    )

@@ -10,6 +10,7 @@ import numpy as np
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.records import generations
 
 
 def condition(*words: str) -> Condition:
@@ -30,7 +31,10 @@ def bench_placement_run(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
     benchmark(
-        lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))]
+        lambda: [
+            generation.best_cost
+            for generation in generations(planner.evolve(problem, found.rng(0)))
+        ]
     )
 
 

@@ -11,6 +11,7 @@ import pinocchio as pin
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.records import generations
 from references import posture_es_python
 
 SIZE = 100
@@ -30,7 +31,7 @@ def bench_search(beside: Any) -> None:
     evaluations = posture_es_python.path(problem, planner, found.rng(0))[1]
 
     def ours() -> None:
-        for _ in planner.evolve(problem, found.rng(0)):
+        for _ in generations(planner.evolve(problem, found.rng(0))):
             pass
 
     beside(

@@ -13,7 +13,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.planners.reaching_tasks import Problem
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, generations
 
 NUM_PATHS = 800
 
@@ -158,7 +158,7 @@ def bench_replicates(beside: Any) -> None:
 
     def planning() -> None:
         for k in range(20):
-            for _ in planner.evolve(problem, given.rng(k)):
+            for _ in generations(planner.evolve(problem, given.rng(k))):
                 pass
 
     planning()

@@ -16,9 +16,9 @@ from mcap.reader import make_reader
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
+from evoexp.records import generations
 from evoexp.store.files import write_file, write_files
-from evoexp.store.generation_columns import generation_columns
-from evoexp.store.log_reader import read_log, read_summary
+from evoexp.store.log_reader import generation_columns, read_log, read_summary
 
 WORDS = ("experiment=rana_planar", "ga.num_generations=100", "ga.population_size=10")
 BUNDLE = 20  # logs stored together
@@ -89,7 +89,7 @@ def bench_replicate_overhead(beside: Any) -> None:
     config_json, (planner, problem) = condition.to_json(), condition.prepare()
 
     def planner_alone() -> None:
-        for _ in planner.evolve(problem, condition.rng(0)):
+        for _ in generations(planner.evolve(problem, condition.rng(0))):
             pass
 
     references = {"its planner alone": (planner_alone, 1.0, 1)}

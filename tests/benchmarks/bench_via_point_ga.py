@@ -18,7 +18,8 @@ from evoexp.configuration import compose
 from evoexp.paths.redistribution import redistribute
 from evoexp.paths.relaxation import relax
 from evoexp.paths.workspace import prepare_redistribution
-from evoexp.planners.via_point_ga.strings import STRETCH
+from evoexp.planners.via_point_ga.strings import PER_CALL
+from evoexp.records import generations
 from evoexp.store.log import Log
 from references import rana_numpy
 
@@ -96,7 +97,7 @@ def bench_generation(beside: Any) -> None:
     """One generation after another of one long run each, no log."""
     given = condition("ga.num_generations=1000000")
     planner, problem = given.prepare()
-    ours = planner.evolve(problem, np.random.default_rng(0))
+    ours = generations(planner.evolve(problem, np.random.default_rng(0)))
     theirs = rana_numpy.evolve(rana_numpy.from_condition(given), np.random.default_rng(0))
     for run in (ours, theirs):
         next(islice(run, LATER, None))
@@ -105,7 +106,7 @@ def bench_generation(beside: Any) -> None:
         lambda: next(ours),
         {"numpy + scipy": (lambda: next(theirs), 1, 2)},
         unit="generation",
-        repeat=5 * STRETCH,  # whole calls of the kernel in every round
+        repeat=5 * PER_CALL,  # whole calls of the kernel in every round
         rounds=25,
     )
 
@@ -156,7 +157,7 @@ def bench_log(beside: Any) -> None:
     """
     given = condition()
     planner, problem = given.prepare()
-    recorded = list(planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0))
+    recorded = list(generations(planner.evolve(problem, given.rng(0))).stretches(lambda: 0.0))
     rng, condition_id, config_json = given.rng(0), given.id, given.to_json()  # once per batch
     finished = run_replicate(given, 0).summary
 
@@ -167,7 +168,7 @@ def bench_log(beside: Any) -> None:
         log.finish(finished)
 
     def run() -> None:
-        for _ in planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0):
+        for _ in generations(planner.evolve(problem, given.rng(0))).stretches(lambda: 0.0):
             pass
 
     beside(

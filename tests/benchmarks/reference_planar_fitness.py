@@ -16,12 +16,10 @@ import numpy as np
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.numeric.compilation import kernel
-from evoexp.numeric.named_tuples import named, plain
 from evoexp.objectives.string_fitness import StringTerms
-from evoexp.planners.via_point_ga.kernels import Judging, judge
+from evoexp.planners.via_point_ga.kernels import judge
 from evoexp.planners.via_point_ga.strings import Strings
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import FloatArray, generations
 
 SOURCE = Path(__file__).with_suffix(".c")
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC")
@@ -111,7 +109,7 @@ def prepared(when: str = "fresh", block: int = BLOCK) -> Fitness:
     if when == "fresh":
         population = planner.sample(problem, rng, INDIVIDUALS)
     else:
-        *_, last = planner.evolve(problem, rng)
+        *_, last = generations(planner.evolve(problem, rng))
         population = last.population
     strings = np.zeros((len(population), POINTS + 1, BLOCK))
     strings[:, :, :INDIVIDUALS] = population[:, :, :INDIVIDUALS]
@@ -124,10 +122,10 @@ def prepared(when: str = "fresh", block: int = BLOCK) -> Fitness:
     judging = Strings(planner, problem).judging
     lengths = np.empty((ARMS, BLOCK)), np.empty((ARMS, BLOCK))
     terms = StringTerms(*lengths, np.empty(BLOCK), np.empty(BLOCK))
-    slices, settings, written = problem.arm_slices, plain(judging), plain(terms)
+    slices = problem.arm_slices
 
     def ours() -> FloatArray:
-        _judge(strings, slices, settings, written)
+        judge(strings, slices, judging, terms)
         return terms.cost[:INDIVIDUALS]
 
     def by_planner() -> FloatArray:
@@ -135,17 +133,6 @@ def prepared(when: str = "fresh", block: int = BLOCK) -> Fitness:
         return found[:INDIVIDUALS]
 
     return Fitness(strings, ours, theirs, by_planner)
-
-
-@kernel
-def _judge(
-    strings: FloatArray,
-    arm_slices: IntArray,
-    judging: tuple[Any, ...],
-    terms: tuple[Any, ...],
-) -> None:
-    """Judge a population as `advance` does, from tables that are quickly recognised."""
-    judge(strings, arm_slices, named(Judging, judging), named(StringTerms, terms))
 
 
 def _least(work: Callable[[], object], calls: int = 20) -> float:

@@ -13,6 +13,7 @@ from confinement import confined, no_longer
 from evoexp.commands.given_motion import flatten, read_motion
 from evoexp.errors import EvoexpError
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 from matrix import counts, matrices_are_asked_for
 from shipped_conditions import Kind, of_kind
 
@@ -37,7 +38,7 @@ def intact(kind: Kind) -> Any:
     """Return a solution of a kind in its documented shape, as nested lists."""
     condition = of_kind(kind, "smoke")
     planner, problem = condition.prepare()
-    best = next(iter(planner.evolve(problem, condition.rng(0)))).best
+    best = next(iter(generations(planner.evolve(problem, condition.rng(0))))).best
     shape = planner.shape(problem)
     if shape[0] is ...:
         return best.reshape(-1, *shape[1]).tolist()

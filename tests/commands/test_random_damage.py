@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from command_samples import SERIAL, Evoexp
 
-from evoexp.store import summaries
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, find_runs
 from matrix import first
@@ -75,7 +74,6 @@ def test_random_damage(evoexp: Evoexp, stored: Path, seed: int) -> None:
     for _ in range(draw.choice((1, 2, 6))):
         path = draw.choice(everything(runs[0].summary_path))
         draw.choice(FAULTS)(path, draw)
-    summaries._KNOWN.clear()  # as another process
     name = draw.choice(runs).hash12
     for words in (
         ("list",),

@@ -15,6 +15,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.evolution.genetic_settings import GeneticSettings
+from evoexp.records import Block, generations
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, find_runs
@@ -306,8 +307,8 @@ def crafted(config: bytes, path: Path, source: Path) -> Path:
     rng = condition.rng(0)
     log = Log(stored.condition_id, config, 0, rng, environment={})
     planner, problem = condition.prepare()
-    for generation in planner.evolve(problem, rng):
-        log.write(generation)
+    for generation in generations(planner.evolve(problem, rng)):
+        log.write(Block.of(generation))
     path.write_bytes(log.finish(stored.summary).content)
     return path
 

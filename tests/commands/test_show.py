@@ -137,8 +137,6 @@ def test_another_revision_and_environment_are_pointed_out(
     manifest["versions"]["numpy"] = "1.0"
     (run.path / "manifest.json").write_text(json.dumps(manifest))
     monkeypatch.setattr(GeneticSettings, "revision", 2)
-    # as it is now, not as an earlier command of the same code found it
-    monkeypatch.setattr(facts, "kept_fact", lambda kind, about, modules, find: find())
     found = sections(evoexp("show", run.hash12).out)
     assert "genetic 1 (here 2)" in found["components"].replace("\n", " ")
     assert "not as here: versions.numpy: was 1.0, now" in found["environment"]

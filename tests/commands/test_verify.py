@@ -18,8 +18,8 @@ from evoexp.commands import verify
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.planners.via_point_ga.planner import ViaPointGa
+from evoexp.store import integrity, run_directory
 from evoexp.store import log as log_module
-from evoexp.store import run_directory, summaries, verification
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from forged_logs import Row, with_message
@@ -54,7 +54,6 @@ def change_a_row(run: RunDirectory) -> None:
     at = table.schema.get_field_index("clearance")
     raised = pc.add(table["clearance"], pa.scalar(1e-9))
     pq.write_table(table.set_column(at, table.schema.field(at), raised), run.summary_path)
-    summaries._KNOWN.clear()
 
 
 def change_a_setting(run: RunDirectory) -> None:
@@ -62,7 +61,6 @@ def change_a_setting(run: RunDirectory) -> None:
     at = table.schema.get_field_index("population_size")
     doubled = pc.multiply(table["population_size"], 2.0)
     pq.write_table(table.set_column(at, table.schema.field(at), doubled), run.summary_path)
-    summaries._KNOWN.clear()
 
 
 def forge(run: RunDirectory) -> None:
@@ -248,7 +246,7 @@ def test_a_directory_that_may_not_be_read_hides_no_other(
     evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As root reads everything, the refusal is played."""
-    known, leftovers = run_directory.stored_id, verification._leftovers
+    known, leftovers = run_directory.stored_id, integrity._leftovers
 
     def forbidden(path: Path) -> Path:
         if path == run.path:
@@ -256,7 +254,7 @@ def test_a_directory_that_may_not_be_read_hides_no_other(
         return path
 
     monkeypatch.setattr(run_directory, "stored_id", lambda path: known(forbidden(path)))
-    monkeypatch.setattr(verification, "_leftovers", lambda path: leftovers(forbidden(path)))
+    monkeypatch.setattr(integrity, "_leftovers", lambda path: leftovers(forbidden(path)))
     said = evoexp("verify", "--json")
     assert said.code == 1
     found = {each["hash"]: each for each in json.loads(said.out)}

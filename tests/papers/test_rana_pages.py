@@ -7,6 +7,7 @@ import pytest
 
 from evoexp.papers.rana import crossover_checks, measures, motions, operators_page, weights_page
 from evoexp.papers.rana.figures import planar_motion
+from evoexp.records import generations
 from evoexp.report import results as report_results
 from evoexp.report import run_measures
 from evoexp.report.pages import page_of
@@ -103,7 +104,7 @@ def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
     shares = crossover_checks.kept_apart(condition)
     assert list(shares) == [0]  # three generations only
     planner, problem = condition.planner, motions.problem(condition)
-    first = next(iter(planner.evolve(problem, condition.condition.rng(0))))
+    first = next(iter(generations(planner.evolve(problem, condition.condition.rng(0)))))
     strings = first.population[:, :, :12]
     apart = 0.0  # over all pairs and all sites of both arms
     near = [

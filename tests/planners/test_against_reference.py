@@ -15,6 +15,7 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.records import generations
 from references import rana_numpy
 
 ROUNDING = 1e-9  # [deg] measured: 7e-13
@@ -36,7 +37,7 @@ def largest_differences(given: Condition, seed: int, **changes: Any) -> tuple[fl
     """
     planner, problem = given.prepare()
     size = planner.ga.population_size
-    ours = planner.evolve(problem, np.random.default_rng(seed))
+    ours = generations(planner.evolve(problem, np.random.default_rng(seed)))
     theirs = rana_numpy.evolve(
         rana_numpy.from_condition(given, **changes), np.random.default_rng(seed)
     )
@@ -131,7 +132,7 @@ def test_runs_end_equally_well() -> None:
     planner, problem = given.prepare()
     ours, theirs = np.empty(8), np.empty(8)
     for seed in range(8):
-        *_, last = planner.evolve(problem, np.random.default_rng(seed))
+        *_, last = generations(planner.evolve(problem, np.random.default_rng(seed)))
         ours[seed] = last.best_cost
         *_, end = rana_numpy.evolve(rana_numpy.from_condition(given), np.random.default_rng(seed))
         theirs[seed] = end.costs.min()

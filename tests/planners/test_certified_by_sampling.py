@@ -13,6 +13,7 @@ import pytest
 from evoexp.collision.scene import Part
 from evoexp.configuration.compose import expand
 from evoexp.paths.motion import Motion
+from evoexp.records import generations
 from matrix import counts, first
 
 SAMPLES = 40  # per segment
@@ -55,7 +56,7 @@ def least_distance(part: Part, motion: Motion) -> float:
 def accepted(planner: Any, problem: Any, seed: int) -> list[Any]:
     """Return every solution that one run accepts on its way."""
     found: list[Any] = []
-    for record in planner.evolve(problem, np.random.default_rng(seed)):
+    for record in generations(planner.evolve(problem, np.random.default_rng(seed))):
         if record.solved and (not found or record.best is not found[-1]):
             found.append(record.best)
     return found

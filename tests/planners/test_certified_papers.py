@@ -13,6 +13,7 @@ from evoexp.evolution.best_team import best_team
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.planner import Planner
 from evoexp.planners.proofs import Proofs, judge_motion
+from evoexp.records import generations
 
 EXPERIMENTS = {
     "curkovic_motion": (),
@@ -31,7 +32,7 @@ def condition(experiment: str, *words: str, acceptance: str = "certified") -> Co
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:
     planner, problem = chosen.prepare()
-    return list(planner.evolve(problem, np.random.default_rng(seed)))
+    return list(generations(planner.evolve(problem, np.random.default_rng(seed))))
 
 
 def is_proven(planner: Planner, problem: Any, solution: Any) -> bool:

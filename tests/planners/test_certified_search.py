@@ -13,6 +13,7 @@ from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.string_proofs import Prover
+from evoexp.records import generations
 from evoexp.store.log_reader import read_log
 
 
@@ -22,7 +23,7 @@ def condition(*words: str, experiment: str = "rana_planar") -> Condition:
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:
     planner, problem = chosen.prepare()
-    return list(planner.evolve(problem, np.random.default_rng(seed)))
+    return list(generations(planner.evolve(problem, np.random.default_rng(seed))))
 
 
 def is_proven(chosen: Condition, solution: Any) -> bool:

@@ -11,10 +11,17 @@ import numpy as np
 import pytest
 
 from evoexp.configuration import compose
+from evoexp.planners.grid_path_ga import planner as grid_planner
+from evoexp.records import generations
 from planners.grid_samples import planner, robot, scenario, solvable
 from references import chen_python
 
 ROUNDING = 1e-12  # relative, of costs
+
+
+@pytest.fixture(autouse=True)
+def _paths_of_all_generations(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grid_planner, "KEPT", grid_planner.PER_CALL + 1)
 
 
 def same_paths(own: Any, problem: Any, seed: int, fault: str = "") -> bool:
@@ -25,7 +32,7 @@ def same_paths(own: Any, problem: Any, seed: int, fault: str = "") -> bool:
     expected = chen_python.evolve_paths(own, problem, first, rng, fault)
     best = np.inf
     for generation, (paths, costs) in zip(
-        own.evolve(problem, np.random.default_rng(seed)), expected, strict=True
+        generations(own.evolve(problem, np.random.default_rng(seed))), expected, strict=True
     ):
         if [row[1 : row[0] + 1].tolist() for row in generation.population] != paths:
             return False
@@ -86,7 +93,7 @@ def same_postures(planner: Any, problem: Any, seed: int, fault: str = "") -> boo
     expected = chen_python.evolve_postures(planner, problem, rng, fault)
     bits, best = planner.bits_per_gene, np.inf
     for generation, (strings, costs, num_feasible) in zip(
-        planner.evolve(problem, np.random.default_rng(seed)), expected, strict=True
+        generations(planner.evolve(problem, np.random.default_rng(seed))), expected, strict=True
     ):
         if ["".join(f"{n:0{bits}b}" for n in pair) for pair in generation.population.T] != strings:
             return False

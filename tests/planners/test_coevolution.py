@@ -12,6 +12,7 @@ from evoexp.papers.curkovic.measures import lower_bound
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.planners.coevolution.planner import Coevolution, Evaluated
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 
 SMALL = ("ga.population_size=12", "ga.num_generations=15", "ga.hall_depth=0.25")
 NO_HALL = ("ga=curkovic_1", "ga.population_size=12", "ga.num_generations=15")
@@ -106,7 +107,7 @@ def test_lines_that_are_not_finite_are_refused() -> None:
 def test_a_run_keeps_its_promises(settings: tuple[str, ...]) -> None:
     planner, problem = prepared(*settings)
     last, runs = np.inf, []
-    for generation in planner.evolve(problem, np.random.default_rng(1)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(1))):
         assert generation.best_cost <= last
         assert generation.best_cost <= generation.best_cost_in_generation
         last = generation.best_cost
@@ -115,13 +116,13 @@ def test_a_run_keeps_its_promises(settings: tuple[str, ...]) -> None:
         assert generation.evaluations == 24 * (generation.index + 1)
         assert generation.collision_queries == 144 * 4 * (generation.index + 1)
         runs.append(generation.costs.copy())
-    again = [g.costs.copy() for g in planner.evolve(problem, np.random.default_rng(1))]
+    again = [g.costs.copy() for g in generations(planner.evolve(problem, np.random.default_rng(1)))]
     assert all(np.array_equal(a, b) for a, b in zip(runs, again, strict=True))
 
 
 def test_the_best_team_is_what_it_says() -> None:
     planner, problem = prepared(*SMALL)
-    *_, last = planner.evolve(problem, np.random.default_rng(2))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(2)))
     assert last.solved
     terms = planner.evaluate(problem, last.best)
     assert terms["team_collisions"] == 0.0
@@ -139,7 +140,7 @@ def test_the_best_team_is_what_it_says() -> None:
 def test_what_stands_where_the_hall_does_is_soon_free_of_collision() -> None:
     planner, problem = prepared(*SMALL)
     keys: list[tuple[int, float]] = []
-    for generation in planner.evolve(problem, np.random.default_rng(3)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(3))):
         found = planner.evaluated(problem, generation.population)
         team = found.collisions[0, -1, -1]
         keys.append((int(team), float(found.own[:, -1].sum())))
@@ -152,7 +153,10 @@ def test_with_a_hall_the_best_team_of_a_generation_never_gets_worse() -> None:
     for settings, worsens in ((SMALL, False), (NO_HALL, True)):
         planner, problem = prepared(*settings)
         best = np.array(
-            [g.best_cost_in_generation for g in planner.evolve(problem, np.random.default_rng(7))]
+            [
+                g.best_cost_in_generation
+                for g in generations(planner.evolve(problem, np.random.default_rng(7)))
+            ]
         )
         found = best[np.isfinite(best)]
         assert len(found) > 10
@@ -189,13 +193,18 @@ def test_restarts_draw_fresh_populations() -> None:
         seed
         for seed in range(50)
         if not next(
-            iter(prepared(*lonely)[0].evolve(prepared(*lonely)[1], np.random.default_rng(seed)))
+            iter(
+                generations(
+                    prepared(*lonely)[0].evolve(prepared(*lonely)[1], np.random.default_rng(seed))
+                )
+            )
         ).solved
     )
     for restart, changed in (("null", 1), ("1", 8)):
         planner, problem = prepared(*lonely, f"ga.restart_after={restart}")
         first, second, *_ = (
-            g.population.copy() for g in planner.evolve(problem, np.random.default_rng(seed))
+            g.population.copy()
+            for g in generations(planner.evolve(problem, np.random.default_rng(seed)))
         )
         assert (first != second).sum(axis=1).max() <= changed
         assert (first != second).sum() > (changed - 1) * 2 - 1
@@ -255,7 +264,7 @@ def test_a_robot_that_stands_still_keeps_its_posture() -> None:
         "scenario.q_start=[{angles:[150.0,60.0]},{angles:[10.0,80.0]}]",
         "scenario.q_goal=[{angles:[30.0,0.0]},{angles:[10.0,80.0]}]",
     )
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert (last.population[1] == np.tile(problem.start[1], 4)[:, None]).all()
     assert last.best.reshape(2, 6, 2)[1] == pytest.approx(np.tile([10.0, 80.0], (6, 1)))
 
@@ -269,7 +278,7 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
     nothing: Any = None
     bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, None, {}))
     planner, problem = prepared(*SMALL)
-    *_, last = planner.evolve(problem, np.random.default_rng(6))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(6)))
     assert last.best_cost > bound
     turns = np.abs(problem.goal - problem.start).sum()
     assert bound > turns
@@ -278,8 +287,8 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
 def test_a_spline_is_executed_between_the_same_configurations() -> None:
     planner, problem = prepared(*SMALL)
     curved, _ = prepared(*SMALL, "planner.interpolation=cubic")
-    solution = list(planner.evolve(problem, np.random.default_rng(8)))[-1].best
-    again = list(curved.evolve(problem, np.random.default_rng(8)))[-1].best
+    solution = list(generations(planner.evolve(problem, np.random.default_rng(8))))[-1].best
+    again = list(generations(curved.evolve(problem, np.random.default_rng(8))))[-1].best
     assert np.array_equal(solution, again)  # the search does not know
     straight, spline = planner.motion(problem, solution), curved.motion(problem, solution)
     assert spline.q == pytest.approx(straight.q, abs=1e-12)
@@ -307,8 +316,8 @@ def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() 
     front, problem = condition.prepare()
     method, _ = prepared()
     pairs = zip(
-        front.evolve(problem, np.random.default_rng(9)),
-        method.evolve(problem, np.random.default_rng(9)),
+        generations(front.evolve(problem, np.random.default_rng(9))),
+        generations(method.evolve(problem, np.random.default_rng(9))),
         strict=False,
     )
     for one, other in pairs:
@@ -331,6 +340,6 @@ def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
     assert names == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}
     radii = [shape.radius for shape, _, _ in problem.scene.shapes]
     assert radii == [0.02, 0.02, 0.04] * 2
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
     assert verdict.certified is not None

@@ -19,6 +19,7 @@ from evoexp.planners.coevolution import breeder as breeder_module
 from evoexp.planners.coevolution import kernels
 from evoexp.planners.coevolution import settings as settings_module
 from evoexp.planners.coevolution.planner import Coevolution
+from evoexp.records import generations
 from references import curkovic_numpy
 
 ROUNDING = 1e-12  # relative, of costs; measured: 5e-15
@@ -56,7 +57,7 @@ def compare(given: Condition, seed: int) -> dict[str, int]:
         they are 0, the comparison says nothing of them.
     """
     planner, problem = given.prepare()
-    ours = planner.evolve(problem, np.random.default_rng(seed))
+    ours = generations(planner.evolve(problem, np.random.default_rng(seed)))
     slow = curkovic_numpy.from_condition(given)
     theirs = curkovic_numpy.evolve(slow, np.random.default_rng(seed))
     events = {"collisions": 0, "contacts": 0, "feasible": 0, "restarts": 0}

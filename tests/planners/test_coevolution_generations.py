@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from evoexp.configuration import compose
-from evoexp.planners.coevolution import generations
-from evoexp.planners.coevolution.generations import CACHED, STRETCH, TeamSearch, stretch
-from evoexp.records import Generation
+from evoexp.numeric.generator_state import state_bytes
+from evoexp.planners.coevolution import generations as team_generations
+from evoexp.planners.coevolution.generations import CACHED, PER_CALL, TeamSearch, per_call
+from evoexp.records import Generation, generations
 
 SMALL = ("ga.population_size=12", "ga.num_generations=30")
 
@@ -25,9 +26,11 @@ def told(found: Iterator[Generation], rng: np.random.Generator) -> Iterator[tupl
     """Yield everything that a log takes of a generation, and the state of the generator there."""
     for generation in found:
         arrays = generation.best, generation.costs, generation.population, generation.criteria
-        rest = [value for value in generation if not isinstance(value, np.ndarray)]
+        state = generation.state or state_bytes(rng.bit_generator)
+        row = generation._replace(state=state)
+        rest = [value for value in row if not isinstance(value, np.ndarray)]
         copies = [None if array is None else array.tobytes() for array in arrays]
-        yield *copies, repr(rest), rng.bit_generator.state["state"]["state"]
+        yield *copies, repr(rest)
 
 
 @pytest.mark.examples(4)
@@ -52,37 +55,29 @@ def test_generations_in_one_call_are_those_of_one_kernel_after_the_other(
     small = [word for word in SMALL if word.split("=")[0] not in named]
     planner, problem = prepared(*given, *small, only=words[1])
     one, other = np.random.default_rng(5), np.random.default_rng(5)
-    at_once = told(TeamSearch(planner, problem).generations(one), one)
-    in_turn = told(planner._step_by_step(problem, other), other)
+    at_once = told(generations(TeamSearch(planner, problem).blocks(one)), one)
+    in_turn = told(generations(planner._step_by_step(problem, other)), other)
     for ours, expected in zip(at_once, in_turn, strict=True):
         assert ours == expected
 
 
-def test_the_lengths_of_stretches_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_generations_per_call_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
     rng = np.random.default_rng(2)
-    expected = list(told(planner.evolve(problem, rng), rng))
+    expected = list(told(generations(planner.evolve(problem, rng)), rng))
     for length in (1, 3, 100):
-        monkeypatch.setattr(generations, "stretch", lambda robots, count, most=length: most)
+        monkeypatch.setattr(team_generations, "per_call", lambda robots, count, most=length: most)
         rng = np.random.default_rng(2)
-        assert list(told(planner.evolve(problem, rng), rng)) == expected
-
-
-def test_a_generation_stays_while_the_next_one_is_looked_at() -> None:
-    """A run that its budget ends is told by the generation before the one that was too much."""
-    planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
-    last, copy = None, b""
-    for generation in planner.evolve(problem, np.random.default_rng(3)):
-        if last is not None:
-            assert last.population.tobytes() == copy
-        last, copy = generation, generation.population.tobytes()
+        assert list(told(generations(planner.evolve(problem, rng)), rng)) == expected
 
 
 def test_large_populations_are_computed_generation_by_generation() -> None:
-    assert stretch(2, 100) == STRETCH
-    assert stretch(2, 5000) == 1
+    assert per_call(2, 100) == PER_CALL
+    assert per_call(2, 5000) == 1
     for count in (1, 10, 150, 200, 1000):
-        length = stretch(2, count)
+        length = per_call(2, count)
         assert length == 1 or 2 * length * count * count <= CACHED
 
 
@@ -90,4 +85,4 @@ def test_coordinates_that_are_not_finite_are_refused() -> None:
     planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
     problem = problem._replace(arms=np.full_like(problem.arms, 1e200))
     with pytest.raises(ValueError, match="must be finite"):
-        next(iter(planner.evolve(problem, np.random.default_rng(0))))
+        next(iter(generations(planner.evolve(problem, np.random.default_rng(0)))))

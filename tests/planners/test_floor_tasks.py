@@ -7,6 +7,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 
 FLOOR = "robot=floor_platform", "scenario=chen"
 RRT = "planner=rrt_connect_floor", "ga=rrt_connect", "objective=null", "collision=floor_edges"
@@ -35,7 +36,7 @@ def test_ends_limits_and_bodies_are_those_of_the_grid() -> None:
 def test_trees_and_strings_reach_the_goal() -> None:
     for words in (RRT, (*STRINGS, "ga.num_generations=60")):
         planner, problem = condition(*FLOOR, *words).prepare()
-        *_, last = planner.evolve(problem, np.random.default_rng(0))
+        *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
         assert last.solved
         assert planner.departures(problem, last.best) == []
         motion = planner.motion(problem, last.best)
@@ -62,7 +63,7 @@ def test_maps_in_space() -> None:
     words = "robot=floor_platform", "robot.dimensions=3", "scenario=chen", *RRT
     size = "scenario.size=[9,9,9]", "scenario.start=[0,0,0]", "scenario.goal=[8,8,8]"
     planner, problem = condition(*words, *size, "scenario.obstacles=[[3,3,3,5,5,5]]").prepare()
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert last.solved
     assert planner.motion(problem, last.best).q.shape[1] == 3
 

@@ -9,21 +9,26 @@ from hypothesis import strategies as st
 
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
+from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
-from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
-from evoexp.planners.grid_path_ga.path_sampling import PathSampling
-from evoexp.planners.grid_path_ga.planner import STRETCH
+from evoexp.planners.grid_path_ga.path_sampling import PER_CALL, PathSampling
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 from evoexp.testing.small_conditions import conditions
 from matrix import num_cases
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
 SEEDS = st.integers(0, 2**32)
 SHAPES = st.sampled_from([(3, 3), (6, 5), (9, 9), (12, 4), (4, 4, 4)])
+
+
+@pytest.fixture(autouse=True)
+def _paths_of_all_generations(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grid_planner, "KEPT", grid_planner.PER_CALL + 1)
 
 
 def rng(seed: int) -> np.random.Generator:
@@ -50,7 +55,7 @@ def test_every_path_of_every_generation_is_valid_and_costs_what_the_equations_sa
     own = planner(revisits=revisits)
     problem = solvable(shape, share, seed, own)
     grid = problem.fields.grid
-    for generation in own.evolve(problem, rng(seed)):
+    for generation in generations(own.evolve(problem, rng(seed))):
         for path, cost in zip(generation.population, generation.costs, strict=True):
             assert faults(problem, path, revisits=revisits) == []
             nodes = grid.coordinates[nodes_of(path)].astype(float)
@@ -117,7 +122,7 @@ def test_without_crossover_and_mutation_only_selection_is_left() -> None:
     own = planner(crossover_rate=0.0, mutation_rate=0.0, num_elites=0)
     problem = solvable((9, 9), 0.3, 1, own)
     first: set[tuple[int, ...]] = set()
-    for generation in own.evolve(problem, rng(3)):
+    for generation in generations(own.evolve(problem, rng(3))):
         paths = {tuple(nodes_of(path)) for path in generation.population}
         first = first or paths
         assert paths <= first
@@ -126,7 +131,10 @@ def test_without_crossover_and_mutation_only_selection_is_left() -> None:
 def test_elites_stay() -> None:
     own = planner(num_elites=2, mutation_rate=1.0, num_generations=20)
     problem = solvable((12, 12), 0.3, 2, own)
-    bests = [generation.best_cost_in_generation for generation in own.evolve(problem, rng(0))]
+    bests = [
+        generation.best_cost_in_generation
+        for generation in generations(own.evolve(problem, rng(0)))
+    ]
     assert all(b <= a for a, b in zip(bests, bests[1:], strict=False))
 
 
@@ -141,7 +149,7 @@ def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
         blocked[x] = np.roll(blocked[x], 1 if x % 4 == 3 else 0)
     own = planner(population_size=60, mutation_rate=1.0, num_generations=2)
     problem = own.prepare(robot(), scenario(blocked))
-    for generation in own.evolve(problem, rng(5)):
+    for generation in generations(own.evolve(problem, rng(5))):
         assert all(faults(problem, path, revisits=False) == [] for path in generation.population)
 
 
@@ -161,19 +169,19 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
                 g.costs.tolist(),
                 [g.best_cost, g.mean_cost, g.std_cost],
             )
-            for g in own.evolve(problem, rng(6))
+            for g in generations(own.evolve(problem, rng(6)))
         ]
 
     expected = run()
     monkeypatch.setattr(grid_planner, "BLOCK", block)
-    monkeypatch.setattr(grid_planner, "ROUND", stretch)
+    monkeypatch.setattr(grid_planner, "PER_CALL", stretch)
     assert run() == expected
 
 
 def test_the_last_population_is_only_its_paths() -> None:
     own = planner()
     problem = solvable((9, 9), 0.3, 4, own)
-    *_, last = own.evolve(problem, rng(6))
+    *_, last = generations(own.evolve(problem, rng(6)))
     assert last.population.shape[1] == last.population[:, 0].max() + 1
     assert all(not path[path[0] + 1 :].any() for path in last.population)
     np.testing.assert_array_equal(own.cost(problem, last.population).cost, last.costs)
@@ -192,7 +200,7 @@ def test_large_grids_work_out_fronts_as_they_go() -> None:
     own = planner(population_size=6, mutation_rate=1.0, num_generations=2)
     problem = own.prepare(robot(), scenario(np.zeros((50, 50), dtype=bool)))
     assert len(problem.world.fronts) == 0
-    last = list(own.evolve(problem, rng(0)))[-1]
+    last = list(generations(own.evolve(problem, rng(0))))[-1]
     assert all(faults(problem, path, revisits=False) == [] for path in last.population)
 
 
@@ -279,7 +287,7 @@ def test_the_cap_is_kept_by_all_paths() -> None:
     own = planner(collision=capped)
     inside: dict[str, Any] = {"start": (1, 1), "goal": (8, 8)}
     problem = own.prepare(robot(), scenario(np.zeros((10, 10), dtype=bool), **inside))
-    for generation in own.evolve(problem, rng(0)):
+    for generation in generations(own.evolve(problem, rng(0))):
         for path in generation.population:
             assert problem.fields.unsafeness[nodes_of(path)].max() <= 7.0
 
@@ -302,7 +310,10 @@ def test_random_search_draws_the_same_first_paths() -> None:
     own = planner()
     problem = solvable((9, 9), 0.3, 4, own)
     control = RandomSearch(planner=own)
-    first, drawn = next(own.evolve(problem, rng(7))), next(control.evolve(problem, rng(7)))
+    first, drawn = (
+        next(generations(own.evolve(problem, rng(7)))),
+        next(generations(control.evolve(problem, rng(7)))),
+    )
     assert [nodes_of(path) for path in first.population] == [
         nodes_of(path) for path in drawn.population
     ]
@@ -313,23 +324,21 @@ def test_random_search_draws_the_same_first_paths() -> None:
 def test_random_paths_drawn_generations_at_once_are_those_of_words_drawn_before(
     shape: tuple[int, ...], num_elites: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own = planner(num_elites=num_elites, num_generations=2 * STRETCH + 3)
+    own = planner(num_elites=num_elites, num_generations=2 * PER_CALL + 3)
     problem, at_once, one_by_one = solvable(shape, 0.3, 4, own), rng(5), rng(5)
     control = RandomSearch(planner=own)
-    run = control.evolve(problem, at_once)
-    assert isinstance(run, Run)
-    stretches = list(run.stretches(lambda: 0.0))
-    costs = [row for each in stretches for block in each.costs for row in block]
-    states = [state for each in stretches for state in each.states]
+    rows = [
+        row._replace(state=row.state or state_bytes(at_once.bit_generator))
+        for row in generations(control.evolve(problem, at_once))
+    ]
     # the longer way, of any generator
     monkeypatch.setattr(PathSampling, "is_fit", lambda *_: False)
-    for g in control.evolve(problem, one_by_one):
-        np.testing.assert_array_equal(g.costs, costs[g.index])
-        state = one_by_one.bit_generator.state["state"]["state"]
-        assert states[g.index][:16] == state.to_bytes(16, "little")
-    np.testing.assert_array_equal(stretches[-1].population, g.population)
-    np.testing.assert_array_equal(stretches[-1].standings[-1].best, g.best)
-    assert stretches[-1].standings[-1].terms == g.terms
+    for g in generations(control.evolve(problem, one_by_one)):
+        np.testing.assert_array_equal(g.costs, rows[g.index].costs)
+        assert rows[g.index].state == state_bytes(one_by_one.bit_generator)
+    np.testing.assert_array_equal(rows[-1].population, g.population)
+    np.testing.assert_array_equal(rows[-1].best, g.best)
+    assert rows[-1].terms == g.terms
     assert at_once.bit_generator.state == one_by_one.bit_generator.state
 
 

@@ -9,6 +9,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.planners.coevolution import breeder as breeder_module
 from evoexp.planners.coevolution import kernels
+from evoexp.records import generations
 from matrix import first
 
 METHODS = ("V", "VI", "VII", "VIII")
@@ -23,7 +24,7 @@ def condition(label: str, *overrides: str, experiment: str = "curkovic_methods")
 def worsens(given: Condition, rng: np.random.Generator) -> bool:
     """Whether the best pair of a generation is ever more expensive than the one before."""
     planner, problem = given.prepare()
-    costs = [found.best_cost_in_generation for found in planner.evolve(problem, rng)]
+    costs = [found.best_cost_in_generation for found in generations(planner.evolve(problem, rng))]
     return any(after > before for before, after in zip(costs, costs[1:], strict=False))
 
 

@@ -9,6 +9,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 
 RRT = "planner=rrt_connect", "ga=rrt_connect", "objective=null", "collision=curkovic_edges"
 STRINGS = "planner=rana_planar", "ga=rana_planar", "objective=rana_planar", RRT[-1]
@@ -25,7 +26,7 @@ def condition(*words: str) -> Condition:
 
 def last_of(chosen: Condition, seed: int = 0) -> Any:
     planner, problem = chosen.prepare()
-    *_, last = planner.evolve(problem, np.random.default_rng(seed))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(seed)))
     return last
 
 

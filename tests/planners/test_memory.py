@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from evoexp.condition import Condition
+from evoexp.records import generations
 from shipped_conditions import of_kind
 
 FACTOR = 4.0  # between the estimate and what is measured, either way
@@ -49,7 +50,7 @@ def with_population(condition: Condition, size: int) -> Condition:
 def evolve(condition: Condition, num_generations: int) -> None:
     """Run the first generations."""
     planner, problem = condition.prepare()
-    for index, _ in enumerate(planner.evolve(problem, condition.rng(0))):
+    for index, _ in enumerate(generations(planner.evolve(problem, condition.rng(0)))):
         if index == num_generations:
             break
 

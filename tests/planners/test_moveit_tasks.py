@@ -13,6 +13,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
+from evoexp.records import generations
 from moveit_samples import (
     COVERED,
     GOAL,
@@ -93,7 +94,7 @@ def test_covered_paths_agree_with_exact_bodies_and_keep_limits(tmp_path: Path) -
     planner, problem = found.prepare()
     strings = CoveredStrings(planner, problem)
     assert strings.low.max() < strings.high.min()
-    *_, last = planner.evolve(problem, found.rng(0))
+    *_, last = generations(planner.evolve(problem, found.rng(0)))
     assert last.solved
     motion = planner.motion(problem, last.best)
     assert judge_motion(planner, problem, motion).certified
@@ -173,7 +174,7 @@ def test_posture_es_reaches_the_pose_of_a_goal_of_joints(tmp_path: Path) -> None
     assert np.allclose(phase.goal.point, pose.translation, atol=1e-12)
     angles = DEGREE * np.array(phase.goal.rotation)
     assert np.allclose(pin.rpy.rpyToMatrix(angles), pose.rotation, atol=1e-9)
-    *_, last = planner.evolve(problem, found.rng(0))
+    *_, last = generations(planner.evolve(problem, found.rng(0)))
     assert last.solved
     assert judge_motion(planner, problem, planner.motion(problem, last.best)).certified
 
@@ -188,7 +189,7 @@ def test_posture_es_takes_goals_of_links_and_via_points_say_that_they_do_not(
     found = condition(tmp_path, *SPHERES, world=scene(), asked=asked)
     assert found.robot.tool_frame == "tip"  # type: ignore[attr-defined]
     planner, problem = found.prepare()
-    *_, last = planner.evolve(problem, found.rng(0))
+    *_, last = generations(planner.evolve(problem, found.rng(0)))
     assert last.solved
     with pytest.raises(SettingError, match=r"robot\.tool_frame: must be 'tip'"):
         condition(tmp_path, *SPHERES, "robot.tool_frame=lower", world=scene(), asked=asked)

@@ -6,6 +6,7 @@ import pytest
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
+from evoexp.records import generations
 from references import rana_numpy
 
 
@@ -19,7 +20,11 @@ def test_every_generation_evaluates_as_many_as_the_planner() -> None:
     planner, problem = given.prepare()
     own = given.planner.planner
     rng = np.random.default_rng(0)
-    beside = zip(own.evolve(problem, rng), planner.evolve(problem, rng), strict=True)
+    beside = zip(
+        generations(own.evolve(problem, rng)),
+        generations(planner.evolve(problem, rng)),
+        strict=True,
+    )
     counts = [(evolved.evaluations, swept.evaluations) for evolved, swept in beside]
     assert counts == [(50 + 48 * k, 50 + 48 * k) for k in range(10)]
 
@@ -36,7 +41,7 @@ def test_generations_are_starts_and_sweeps_as_a_slow_version_makes_them() -> Non
     rng = np.random.default_rng(3)
     strings = np.empty((0, 2, 21, 2))
     lowest = np.inf
-    for k, generation in enumerate(planner.evolve(problem, np.random.default_rng(3))):
+    for k, generation in enumerate(generations(planner.evolve(problem, np.random.default_rng(3)))):
         if k % 3 == 0:
             strings = rana_numpy.smooth(slow, rana_numpy.walks(slow, rng, 50 if k == 0 else 48))
         else:
@@ -57,7 +62,8 @@ def test_where_more_are_to_be_evaluated_fresh_samples_join() -> None:
     growing.num_evaluations = staticmethod(lambda index: 5 + 3 * index)
     found = planner.model_copy(update={"planner": growing})
     populations = [
-        each.population.copy() for each in found.evolve(problem, np.random.default_rng(1))
+        each.population.copy()
+        for each in generations(found.evolve(problem, np.random.default_rng(1)))
     ]
     assert [each.shape[-1] for each in populations] == [5, 8, 11]
     rng = np.random.default_rng(1)

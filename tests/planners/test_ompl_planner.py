@@ -14,6 +14,7 @@ from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 
 geometric = pytest.importorskip("ompl.geometric", reason="an extra")
 OMPL = ("planner=ompl", "ga=ompl", "ga.num_generations=20")
@@ -28,7 +29,7 @@ def condition(*words: str, label: str = "rana_planar") -> Condition:
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:
     planner, problem = chosen.prepare()
-    return planner, problem, list(planner.evolve(problem, np.random.default_rng(seed)))
+    return planner, problem, list(generations(planner.evolve(problem, np.random.default_rng(seed))))
 
 
 def of(algorithm: str, *words: str, shortcuts: int = 200) -> Condition:

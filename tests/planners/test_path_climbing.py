@@ -16,6 +16,7 @@ from evoexp.planners.grid_path_ga.kernels import RESULTS, Population
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import GridPathGa
+from evoexp.records import generations
 from matrix import num_cases
 from paths.walked_worlds import SEEDS
 from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
@@ -30,21 +31,21 @@ def test_every_path_stays_valid_and_no_generation_is_worse(num_paths: int, revis
     own = planner((0.1, 2.0), revisits=revisits)
     problem = solvable((9, 8), 0.2, 1, own)
     climbing = PathClimbing(planner=own, num_paths=num_paths)
-    generations = [
+    rows = [
         one._replace(costs=one.costs.copy())
-        for one in climbing.evolve(problem, np.random.default_rng(2))
+        for one in generations(climbing.evolve(problem, np.random.default_rng(2)))
     ]
-    assert len(generations) == own.num_generations + 1
+    assert len(rows) == own.num_generations + 1
     counts = [own.num_evaluations(k) for k in range(own.num_generations + 1)]
-    assert [one.evaluations for one in generations] == np.cumsum(counts).tolist()
-    for before, after in pairwise(generations):
+    assert [one.evaluations for one in rows] == np.cumsum(counts).tolist()
+    for before, after in pairwise(rows):
         assert (after.costs <= before.costs).all()  # path by path
-    for one in generations:
+    for one in rows:
         assert len(one.costs) == num_paths
         terms = own.evaluate(problem, one.best)
         assert terms["cost"] == pytest.approx(one.best_cost, rel=1e-12)
         assert own.departures(problem, one.best) == []
-    assert generations[-1].best_cost < generations[0].best_cost
+    assert rows[-1].best_cost < rows[0].best_cost
 
 
 @settings(max_examples=num_cases(5, 40), deadline=None)
@@ -86,15 +87,15 @@ def test_paths_whose_unsafeness_or_weights_are_no_whole_numbers_are_measured_as_
         own = planner((0.1, 2.0), collision=PotentialFields(**(FIELDS | changed)))
         problem = solvable((9, 8), 0.2, 1, own)
         assert not Ledger.is_fit(problem.world)
-        generations = list(PathClimbing(planner=own, num_paths=2).evolve(problem, _rng()))
-        assert generations[-1].best_cost < generations[0].best_cost
-        assert own.departures(problem, generations[-1].best) == []
+        rows = list(generations(PathClimbing(planner=own, num_paths=2).evolve(problem, _rng())))
+        assert rows[-1].best_cost < rows[0].best_cost
+        assert own.departures(problem, rows[-1].best) == []
 
 
 def test_the_first_paths_are_the_best_of_as_many_walks_as_the_planner_draws() -> None:
     own = planner((0.1, 2.0))
     problem = solvable((9, 8), 0.2, 1, own)
-    first = next(iter(PathClimbing(planner=own, num_paths=2).evolve(problem, _rng())))
+    first = next(iter(generations(PathClimbing(planner=own, num_paths=2).evolve(problem, _rng()))))
     drawn = own.sample(problem, _rng(), own.num_evaluations(0))
     np.testing.assert_array_equal(first.costs, np.sort(own.cost(problem, drawn).cost)[:2])
 

@@ -9,6 +9,7 @@ from evoexp.errors import EvoexpError
 from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.planners.placement_ga.planner import Problem
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 
 BASE = ("experiment=chen_placement",)
 
@@ -30,7 +31,7 @@ def test_the_ends_of_the_range_are_values(coding: str) -> None:
 def test_cost_and_solution_are_those_of_evolve() -> None:
     planner, problem = prepared("ga.num_generations=3")
     rng = np.random.Generator(np.random.PCG64(3))
-    for generation in planner.evolve(problem, rng):  # type: ignore[attr-defined]
+    for generation in generations(planner.evolve(problem, rng)):  # type: ignore[attr-defined]
         judged = planner.cost(problem, generation.population)  # type: ignore[attr-defined]
         np.testing.assert_array_equal(judged.cost, generation.costs)
         assert generation.num_feasible == np.count_nonzero(judged.feasible)
@@ -46,26 +47,26 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
     planner, problem = prepared("ga.num_generations=20", f"ga.num_elites={elites}")
 
     def run() -> list[tuple[list[list[int]], list[float], list[float]]]:
-        generations = planner.evolve(problem, np.random.Generator(np.random.PCG64(3)))  # type: ignore[attr-defined]
+        rows = generations(planner.evolve(problem, np.random.Generator(np.random.PCG64(3))))  # type: ignore[attr-defined]
         return [
             (
                 g.population.tolist(),
                 g.costs.tolist(),
                 [g.best_cost, g.mean_cost, g.std_cost, g.num_feasible],
             )
-            for g in generations
+            for g in rows
         ]
 
     expected = run()
     monkeypatch.setattr(placement_planner, "BLOCK", block)
-    monkeypatch.setattr(placement_planner, "ROUND", stretch)
+    monkeypatch.setattr(placement_planner, "PER_CALL", stretch)
     assert run() == expected
 
 
 def test_records_are_those_of_the_costs() -> None:
     planner, problem = prepared("ga.num_generations=20", "ga.num_elites=2")
     before = np.empty(0)
-    for g in planner.evolve(problem, np.random.Generator(np.random.PCG64(3))):  # type: ignore[attr-defined]
+    for g in generations(planner.evolve(problem, np.random.Generator(np.random.PCG64(3)))):  # type: ignore[attr-defined]
         assert g.best_cost_in_generation == g.costs.min()
         assert (g.mean_cost, g.std_cost) == pytest.approx(
             (g.costs.mean(), g.costs.std()), rel=1e-12
@@ -80,7 +81,7 @@ def test_without_elitism_the_best_can_get_lost_and_with_it_never() -> None:
     for elites in (0, 1):
         planner, problem = prepared(f"ga.num_elites={elites}")
         rng = np.random.Generator(np.random.PCG64(0))
-        costs = [g.best_cost_in_generation for g in planner.evolve(problem, rng)]  # type: ignore[attr-defined]
+        costs = [g.best_cost_in_generation for g in generations(planner.evolve(problem, rng))]  # type: ignore[attr-defined]
         lost[elites] = sum(b > a for a, b in zip(costs, costs[1:], strict=False))
     assert lost[0] > 10
     assert lost[1] == 0

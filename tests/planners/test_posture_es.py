@@ -15,6 +15,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import UPRIGHT
 from evoexp.planners.posture_es.planner import dense
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 from references import posture_es_python
 
 FREE = ("corsepius_ball", "collision=corsepius_capsules")
@@ -25,7 +26,7 @@ def differs(given: Any, fault: str = "") -> bool:
     planner, problem = given.prepare()
     rng, slow_rng = given.rng(0), given.rng(0)
     expected = posture_es_python.cycles(problem, planner, slow_rng, fault)
-    found = planner.evolve(problem, rng)
+    found = generations(planner.evolve(problem, rng))
     last = float(len(problem.phases))
     for ours, theirs in itertools.zip_longest(found, expected):
         if ours is None or theirs is None or ours.population.shape != theirs.postures.shape:

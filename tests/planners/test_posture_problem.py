@@ -9,6 +9,7 @@ from posture_samples import condition, prepared, random_postures
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.planners.posture_es.problem import reach
+from evoexp.records import generations
 from evoexp.robots.poses import frame_poses
 
 BALL, PICK = "experiment=corsepius_ball", "experiment=corsepius_pick_and_place"
@@ -176,7 +177,7 @@ def test_goals_out_of_reach_are_searched_on_request() -> None:
     planner, problem = prepared(
         "corsepius_ball", far, "scenario.check_reach=false", "ga.num_generations=30"
     )
-    last = list(planner.evolve(problem, condition("corsepius_ball").rng(0)))[-1]
+    last = list(generations(planner.evolve(problem, condition("corsepius_ball").rng(0))))[-1]
     assert not last.solved
     assert last.terms["goal_distance"] > 1.0
 

@@ -8,6 +8,7 @@ from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.planner import Planner
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from planners.grid_samples import planner, scenario
@@ -72,7 +73,7 @@ def test_every_path_is_proven(control: bool) -> None:
         chosen: Planner = PathClimbing(num_paths=3, planner=searched) if control else searched
         for seed in range(12):
             problem = chosen.prepare(platform(0.72), random_scene(seed))
-            for generation in chosen.evolve(problem, np.random.default_rng(seed)):
+            for generation in generations(chosen.evolve(problem, np.random.default_rng(seed))):
                 motion = chosen.motion(problem, generation.best)
                 found = judge_motion(chosen, problem, motion)
                 assert found.certified is True or acceptance == "model"

@@ -12,6 +12,7 @@ from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.baselines.real_vectors import correlated, real_vectors, transposed_root
+from evoexp.records import generations
 
 HAS_PYMOO = importlib.util.find_spec("pymoo") is not None
 CONTROLS = (
@@ -28,7 +29,7 @@ def control(name: str, *words: str, experiment: str = "rana_planar") -> Conditio
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:
     planner, problem = chosen.prepare()
-    found = planner.evolve(problem, np.random.default_rng(seed))
+    found = generations(planner.evolve(problem, np.random.default_rng(seed)))
     return [each._replace(costs=each.costs.copy()) for each in found]
 
 

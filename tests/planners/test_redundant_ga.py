@@ -13,7 +13,7 @@ from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, generations
 
 SMALL = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")
 LENGTHS = (10.0, 10.0, 10.0, 4.0, 4.0, 3.0, 2.0)
@@ -82,7 +82,7 @@ def test_a_whole_run_keeps_its_promises(replicate: int) -> None:
     planner, problem = prepared()
     condition = compose.expand(["experiment=lavoie_7dof"])[0].conditions[0].condition
     best, searches = np.inf, []
-    for generation in planner.evolve(problem, condition.rng(replicate)):
+    for generation in generations(planner.evolve(problem, condition.rng(replicate))):
         key = (generation.terms["attempts"], generation.terms["sub_path"])
         lowest = float(generation.costs.min())
         if not searches or searches[-1][0] != key:
@@ -151,7 +151,7 @@ def test_all_settings_run_and_the_best_never_gets_worse(overrides: tuple[str, ..
         *(text for text in SMALL if text.split("=")[0] not in given), *overrides
     )
     best = np.inf
-    for generation in planner.evolve(problem, np.random.default_rng(3)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(3))):
         assert np.isfinite(generation.population).all()
         assert np.isfinite(generation.best).all()
         assert generation.best_cost <= best
@@ -175,7 +175,7 @@ def test_what_a_generation_knows_of_itself_is_what_judging_it_again_gives(
     """
     planner, problem = prepared("ga.num_generations=30", "planner.stop_cost_sp1=0.1", *overrides)
     judged = 0
-    for generation in planner.evolve(problem, np.random.default_rng(5)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(5))):
         if generation.terms["sub_path"] == 1.0:  # from the start, the same in every attempt
             starts = np.repeat(problem.start[:, None], generation.population.shape[1], axis=1)
             again = planner._judge(problem, 0, starts, generation.population)
@@ -190,7 +190,7 @@ def test_a_population_without_one_feasible_member_is_searched_on() -> None:
     And all attempts are made.
     """
     planner, problem = prepared(*SMALL, "scenario.box_x=[60.0,61.0]", "planner.stop_cost_sp1=60")
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert last.terms["attempts"] == 3.0
     assert last.best_cost == np.inf
     assert not last.solved
@@ -203,11 +203,11 @@ def test_a_population_without_one_feasible_member_is_searched_on() -> None:
 
 def test_success_by_threshold_and_by_finite_cost() -> None:
     strict, problem = prepared(*SMALL, "planner.stop_cost_sp2=0.001")
-    *_, last = strict.evolve(problem, np.random.default_rng(1))
+    *_, last = generations(strict.evolve(problem, np.random.default_rng(1)))
     assert not last.solved
     assert last.terms["attempts"] == 3.0
     lenient, problem = prepared(*SMALL, "planner.stop_cost_sp2=0.001", "planner.success=finite")
-    *_, last = lenient.evolve(problem, np.random.default_rng(1))
+    *_, last = generations(lenient.evolve(problem, np.random.default_rng(1)))
     assert last.solved
     assert math.isfinite(last.best_cost)
 
@@ -218,7 +218,7 @@ def test_blind_arms_are_refuted_and_seeing_ones_mostly_not() -> None:
         planner, problem = prepared(f"collision.blind={blind}")
         found = []
         for seed in range(6):
-            *_, last = planner.evolve(problem, np.random.default_rng(seed))
+            *_, last = generations(planner.evolve(problem, np.random.default_rng(seed)))
             motion = planner.motion(problem, last.best)
             found.append(judge_motion(planner, problem, motion).certified)
             assert last.solved

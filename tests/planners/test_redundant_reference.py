@@ -15,6 +15,7 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.records import generations
 from references import lavoie_numpy
 
 ROUNDING = 1e-11  # [rad], [cost]
@@ -49,7 +50,7 @@ def largest_difference(given: Any, seed: int, fault: str = "") -> tuple[float, s
     """
     planner = given.planner
     rng, slow_rng = np.random.default_rng(seed), np.random.default_rng(seed)
-    ours = planner.evolve(planner.prepare(given.robot, given.scenario), rng)
+    ours = generations(planner.evolve(planner.prepare(given.robot, given.scenario), rng))
     theirs = lavoie_numpy.evolve(given, slow_rng, fault)
     largest, searched, count = 0.0, set(), 0
     for found, expected in itertools.zip_longest(ours, theirs):

@@ -24,6 +24,7 @@ from evoexp.planners.sampling_based.kernels import (
 from evoexp.planners.sampling_based.kernels import (
     tested_configurations as configurations_on,
 )
+from evoexp.records import generations
 from moveit_samples import COVERED, body, scene, write_problem, write_robot
 from references import rrt_connect_python
 
@@ -39,7 +40,7 @@ def condition(label: str, *changes: str) -> Condition:
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:
     planner, problem = chosen.prepare()
-    return planner, problem, list(planner.evolve(problem, np.random.default_rng(seed)))
+    return planner, problem, list(generations(planner.evolve(problem, np.random.default_rng(seed))))
 
 
 @given(st.integers(1, 300), st.integers(1, 8), st.integers(0, 99))

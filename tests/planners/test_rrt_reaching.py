@@ -11,6 +11,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
+from evoexp.records import generations
 from evoexp.robots.planar_postures import bring_tip_to, tip
 
 ARMS = "lavoie_7dof", "lavoie_10dof"
@@ -24,7 +25,7 @@ def condition(arm: str, *words: str) -> Condition:
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:
     planner, problem = chosen.prepare()
-    return list(planner.evolve(problem, np.random.default_rng(seed)))
+    return list(generations(planner.evolve(problem, np.random.default_rng(seed))))
 
 
 def complex_tip(q: Any, arm: Any) -> complex:

@@ -12,6 +12,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.redundant_ga.sequential_search import SequentialSearch
+from evoexp.records import generations
 from references import lavoie_numpy
 
 SMALL = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")
@@ -75,7 +76,7 @@ def test_it_draws_what_a_plain_loop_draws(overrides: tuple[str, ...], solved: bo
     wrapped: Any = given.planner
     planner, problem = given.prepare()
     found = []  # costs are views that the next generation overwrites
-    for last in planner.evolve(problem, np.random.default_rng(1)):
+    for last in generations(planner.evolve(problem, np.random.default_rng(1))):
         found.append(float(last.costs.min()))
     scene = lavoie_numpy.Scene(
         given._replace(planner=wrapped.planner)  # the scene reads settings of the algorithm
@@ -92,8 +93,8 @@ def test_the_first_generation_is_that_of_the_algorithm_and_none_descends_from_an
     given = condition(*SMALL)
     planner, problem = given.prepare()
     own: Any = given.planner
-    search = planner.evolve(problem, np.random.default_rng(4))
-    algorithm = own.planner.evolve(problem, np.random.default_rng(4))
+    search = generations(planner.evolve(problem, np.random.default_rng(4)))
+    algorithm = generations(own.planner.evolve(problem, np.random.default_rng(4)))
     first, other = next(search), next(algorithm)
     np.testing.assert_array_equal(first.population, other.population)
     before = first.population.copy()
@@ -112,7 +113,7 @@ def test_draws_are_the_same_however_many_are_made_per_call(monkeypatch: pytest.M
         runs.append(
             [
                 (each.population.tobytes(), each.costs.tobytes(), str(rng.bit_generator.state))
-                for each in planner.evolve(problem, rng)
+                for each in generations(planner.evolve(problem, rng))
             ]
         )
     assert runs[0] == runs[1] == runs[2]
@@ -122,7 +123,7 @@ def test_draws_are_the_same_however_many_are_made_per_call(monkeypatch: pytest.M
 def test_without_offspring_nothing_is_drawn_after_the_first_population() -> None:
     planner, problem = condition(*SMALL, "ga.num_elites=60").prepare()
     searches = set()
-    for last in planner.evolve(problem, np.random.default_rng(0)):
+    for last in generations(planner.evolve(problem, np.random.default_rng(0))):
         searches.add((last.terms["attempts"], last.terms["sub_path"]))
     assert last.evaluations == 60 * len(searches)
 
@@ -134,8 +135,8 @@ def test_it_solves_the_arm_of_ten_joints_less_often_than_evolution() -> None:
     own: Any = given.planner
     solved = []
     for seed in range(4):
-        *_, search = planner.evolve(problem, given.rng(seed))
-        *_, algorithm = own.planner.evolve(problem, given.rng(seed))
+        *_, search = generations(planner.evolve(problem, given.rng(seed)))
+        *_, algorithm = generations(own.planner.evolve(problem, given.rng(seed)))
         assert algorithm.solved
         solved.append(search.solved)
     assert sum(solved) <= 2

@@ -10,8 +10,8 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.planner import Keeper
 from evoexp.planners.proofs import Proofs, judge_motion
+from evoexp.records import generations
 from evoexp.robots.floor_manipulator import FloorManipulator
 from evoexp.store.log_reader import read_log
 
@@ -76,7 +76,7 @@ def test_another_docking_place_has_another_goal(
     scenario = condition.scenario.model_copy(update={"task_origin": (23.2, 26.0)})
     moved = problem._replace(scenario=scenario)
     docked = last_of(planner, problem, condition)
-    *_, last = planner._drive(moved, condition.rng(0), Keeper(), docked)
+    *_, last = planner._drive(moved, condition.rng(0), docked)
     assert last.best[-2:].tolist() == [28.0, 26.0]
     blocked = problem._replace(
         scenario=condition.scenario.model_copy(update={"task_origin": (18.0, 23.0)})
@@ -91,7 +91,7 @@ def last_of(planner: Any, problem: Any, condition: Condition) -> Any:
 
 def test_the_first_stage_has_no_plan_yet(condition: Condition) -> None:
     planner, problem = condition.prepare()
-    rows = list(planner.evolve(problem, condition.rng(2)))
+    rows = list(generations(planner.evolve(problem, condition.rng(2))))
     stages = [row.terms["sub_path"] for row in rows]
     assert stages == sorted(stages)
     assert all(
@@ -134,7 +134,7 @@ def test_by_proof_every_mission_is_proven() -> None:
         (experiment,) = compose.expand(["experiment=chen_mission", "budget=smoke", *words])
         planner, problem = experiment.conditions[0].condition.prepare()
         for seed in (0, 3):
-            *_, last = planner.evolve(problem, np.random.default_rng(seed))
+            *_, last = generations(planner.evolve(problem, np.random.default_rng(seed)))
             verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
             assert last.solved
             assert verdict.certified or acceptance == "model"
@@ -146,7 +146,7 @@ def test_a_mission_whose_end_is_refuted_is_no_answer(monkeypatch: pytest.MonkeyP
     words = "experiment=chen_mission", "budget=smoke", "planner.acceptance=certified"
     planner, problem = compose.expand(words)[0].conditions[0].condition.prepare()
     monkeypatch.setattr(Proofs, "is_proven", lambda self, plan: False)
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert not last.solved
     assert last.best_cost == np.inf
 

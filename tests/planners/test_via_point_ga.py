@@ -11,6 +11,7 @@ from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa, sampled
+from evoexp.records import generations
 from evoexp.robots.arms import Arms
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.arm_motion import ArmMotion
@@ -152,7 +153,7 @@ def test_two_arms_of_six_joints_are_planned_by_the_same_planner() -> None:
         [((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel() for a, b in SIX]
     )
     assert planner.evaluate(problem, straight)["collisions"] > 0.0
-    first, *_, last = planner.evolve(problem, np.random.default_rng(0))
+    first, *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert last.best.shape == (2 * 41 * 6,)
     assert planner.shape(problem) == ((41, 6), (41, 6))
     assert planner.motion(problem, last.best).q.shape == (41, 12)
@@ -199,7 +200,7 @@ def test_puma_like_arms_move_by_eq_10_and_their_straight_line_collides() -> None
 def test_elites_survive_untouched() -> None:
     planner, problem = prepared()
     previous = None
-    for generation in planner.evolve(problem, np.random.default_rng(1)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(1))):
         population = generation.population[:, :, :50].copy()
         if previous is not None:
             costs, strings = previous
@@ -211,7 +212,7 @@ def test_elites_survive_untouched() -> None:
 
 def test_ends_never_move() -> None:
     planner, problem = prepared(experiment="rana_three_arms")
-    for generation in planner.evolve(problem, np.random.default_rng(2)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(2))):
         strings = generation.population[:, :, :50]
         assert np.all(strings[:, 0] == problem.start[:, None])
         assert np.all(strings[:, -1] == problem.goal[:, None])
@@ -229,7 +230,7 @@ def test_substeps_find_more_collisions_and_never_fewer() -> None:
 
 def test_more_evaluations_than_the_papers_are_not_made() -> None:
     planner, problem = prepared()
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert last.evaluations == 50 + 5 * 48
     assert last.collision_queries == last.evaluations * 20
 
@@ -261,7 +262,7 @@ def test_more_evaluations_than_the_papers_are_not_made() -> None:
 )
 def test_degenerate_settings_run(overrides: tuple[str, ...]) -> None:
     planner, problem = prepared(*overrides)
-    for generation in planner.evolve(problem, np.random.default_rng(0)):
+    for generation in generations(planner.evolve(problem, np.random.default_rng(0))):
         assert np.all(np.isfinite(generation.costs))
         assert np.all(np.isfinite(generation.population))
 
@@ -310,7 +311,7 @@ def test_arms_and_obstacles_have_margins_of_their_own() -> None:
     data, placements = bodies.model.createData(), bodies.geometry.createData()
     free = 0
     for seed in range(6):
-        *_, last = planner.evolve(problem, np.random.default_rng(seed))
+        *_, last = generations(planner.evolve(problem, np.random.default_rng(seed)))
         motion = planner.motion(problem, last.best)
         least = np.full(len(among), np.inf)
         for t in np.linspace(0.0, motion.num_segments, 401):

@@ -17,6 +17,7 @@ from chromium import CHROMIUM, Browser
 from evoexp.configuration.compose import expand
 from evoexp.playback.player_page import page
 from evoexp.playback.recording import Heading, Recording, record
+from evoexp.records import generations
 from playback_samples import SAMPLES, recording, refuted
 
 pytestmark = [
@@ -46,7 +47,7 @@ def panda() -> Recording:
     words = ("experiment=motionbenchmaker", "budget=smoke")
     ((_, own),) = expand(words, only=("box_panda",))[0].conditions
     planner, problem = own.prepare()
-    best = next(planner.evolve(problem, own.rng(0))).best
+    best = next(generations(planner.evolve(problem, own.rng(0)))).best
     return record(own, np.array(best), Heading("panda"))
 
 

@@ -13,6 +13,7 @@ from evoexp.playback.contacts import at_instant, clearance, remainder
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import outline
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
+from evoexp.records import generations
 from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 NAMES = sorted(SAMPLES)
@@ -257,7 +258,9 @@ def test_distances_are_those_of_all_pairs_though_few_are_asked_for(
     words = ("experiment=motionbenchmaker", "budget=smoke")
     (panda,) = expand(words, only=("box_panda",))[0].conditions
     planner, problem = panda.condition.prepare()
-    motion = planner.motion(problem, next(planner.evolve(problem, panda.condition.rng(0))).best)
+    motion = planner.motion(
+        problem, next(generations(planner.evolve(problem, panda.condition.rng(0)))).best
+    )
     parts = list(planner.parts(problem, motion))
     times = np.linspace(0.0, motion.num_segments, 7)
     few = clearance(parts, motion, times)

@@ -12,8 +12,8 @@ from evoexp.report.index import render
 from evoexp.report.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
+from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
-from evoexp.store.plans import Plan
 from evoexp.store.run_directory import RunDirectory
 from report_samples import REPORT, expand, store
 

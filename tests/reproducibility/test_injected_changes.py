@@ -17,7 +17,8 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import Comparison, reproduce_log
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.records import Generation
+from evoexp.numeric.generator_state import state_bytes
+from evoexp.records import Generation, generations
 
 LAST = 10  # generations of the smoke budget
 REPLICATE = 1
@@ -57,7 +58,9 @@ def record_changed(condition: Condition, directory: Path, change: Change) -> Pat
     evolve = kind.evolve
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            kind, "evolve", lambda planner, problem, rng: change(evolve(planner, problem, rng), rng)
+            kind,
+            "evolve",
+            lambda planner, problem, rng: change(generations(evolve(planner, problem, rng)), rng),
         )
         return record(condition, directory)
 
@@ -123,7 +126,9 @@ def test_one_number_drawn_from_the_generator(
         for row in generations:
             if row.index == generation:
                 rng.random()
-            yield row
+                yield row._replace(state=state_bytes(rng.bit_generator))
+            else:
+                yield row
 
     assert (
         compare_changed(condition, tmp_path, change).verdict

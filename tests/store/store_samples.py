@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.records import FrontRow, Generation, ReplicateSummary, Standing, Stretch
-from evoexp.store.digests import Chain
+from evoexp.records import Block, FrontRow, Generation, ReplicateSummary
 from evoexp.store.log import Finished, Log
 
 CONFIG = b'{"planner": "demo", "seed": 1}'
@@ -82,31 +81,19 @@ def summary(replicate: int = 7, **changes: Any) -> ReplicateSummary:
     return row._replace(**changes)
 
 
-def in_stretches(written: Sequence[Generation], most: int) -> list[Stretch]:
-    """Return the same generations, so many together; all with one state of the generator."""
-    state = Chain(np.random.default_rng(5)).state()
+def in_blocks(written: Sequence[Generation], most: int) -> list[Block]:
+    """Return the same generations, so many together."""
     found = []
     for begin in range(0, len(written), most):
-        own = written[begin : begin + most]
-        standings: list[Standing] = []
-        for k, each in enumerate(own):
-            standing = Standing(k, each.best, each.best_cost, each.terms, each.solved)
-            if not standings or each.terms is not standings[-1].terms:
-                standings.append(standing)
+        own = [Block.of(each) for each in written[begin : begin + most]]
+        columns = [[value for each in own for value in each[k]] for k in range(2, 8)]
         found.append(
-            Stretch(
-                first=own[0].index,
-                standings=standings,
-                lowest=[each.best_cost_in_generation for each in own],
-                means=[each.mean_cost for each in own],
-                deviations=[each.std_cost for each in own],
-                num_feasible=[each.num_feasible for each in own],
-                evaluations=[each.evaluations for each in own],
-                collision_queries=[each.collision_queries for each in own],
-                costs=[each.costs[None] for each in own],
-                states=[state] * len(own),
-                times=[0.0] * len(own),
-                population=own[-1].population,
+            Block(
+                own[0].first,
+                [each.bests[0]._replace(place=k) for k, each in enumerate(own)],
+                *columns,
+                costs=np.concatenate([each.costs for each in own]),
+                population=lambda place, own=own: own[place].population(0),
             )
         )
     return found
@@ -125,7 +112,7 @@ def write(
     by_generation = {front.generation: front for front in fronts}
     for generation in written:
         rng.random()
-        log.write(generation, seconds[generation.index] if seconds else 0.0)
+        log.write(Block.of(generation), seconds[generation.index] if seconds else 0.0)
         if generation.index in by_generation:
             log.write_front(by_generation[generation.index])
     return log.finish(summary(replicate, **changes))

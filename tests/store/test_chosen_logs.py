@@ -1,4 +1,4 @@
-"""The replicate that is meant, told by the logs or by the table of their summaries: the same."""
+"""The replicate that is meant."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from evoexp.errors import DamagedStore, NothingStored
-from evoexp.store import chosen_logs
 from evoexp.store.chosen_logs import chosen_log
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
@@ -20,12 +19,9 @@ RESULTS: tuple[dict[str, Any], ...] = (
 )
 
 
-@pytest.fixture(params=[100, 0], ids=["few logs", "many logs"])
-def filled(
-    request: pytest.FixtureRequest, run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch
-) -> RunDirectory:
-    """Return a run with results, read from its logs or, as if they were many, from the table."""
-    monkeypatch.setattr(chosen_logs, "FEW", request.param)
+@pytest.fixture
+def filled(run: RunDirectory, add: Add) -> RunDirectory:
+    """Return a run with results."""
     for replicate, result in enumerate(RESULTS):
         add(replicate, **result)
     return run

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
-from store_samples import CONDITION, CONFIG, generations, summary, write
+from store_samples import generations, summary, write
 
 from evoexp.errors import CorruptLog
 from evoexp.store import log as log_module
 from evoexp.store.digests import ContentDigest
-from evoexp.store.generation_columns import generation_columns
-from evoexp.store.log import Log
-from evoexp.store.log_reader import read_log, read_solution, read_summary
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
 READERS = [read_log, read_summary, read_solution, generation_columns]
 Reader = Callable[[bytes | Path], object]
@@ -119,15 +117,6 @@ def test_other_schema_version(
     assert f"written by {age} evoexp: schema version {other}, this one reads 2" in refusal(
         reader, foreign
     )
-
-
-def test_killed_before_finish() -> None:
-    log = Log(CONDITION, CONFIG, 7, np.random.default_rng(0))
-    for generation in generations(400):
-        log.write(generation)
-    unfinished = b"".join(log._writer._parts)
-    assert len(unfinished) > 10_000
-    assert "cut" in refusal(read_log, unfinished)
 
 
 def test_content_digest_sees_what_good_checksums_hide(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,11 +12,12 @@ from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, 
 
 from evoexp import attachments
 from evoexp.errors import DamagedStore, StoreError, UnknownHash
-from evoexp.store import damage, summaries
+from evoexp.records import Block
 from evoexp.store import log as log_module
-from evoexp.store.damage import is_set_aside, set_aside
+from evoexp.store import log_reader
+from evoexp.store.files import is_set_aside, set_aside
+from evoexp.store.integrity import damaged_files, lost_replicates, mend
 from evoexp.store.log import Finished
-from evoexp.store.mending import damaged_files, lost_replicates, mend
 from evoexp.store.run_directory import RunDirectory, find_runs, resolve
 from evoexp.store.summaries import damaged_logs, summary_table, whole_logs
 
@@ -64,7 +65,7 @@ def be_of_another_replicate(path: Path) -> None:
 def be_of_another_run(path: Path) -> None:
     other = hashlib.sha256(b"other").hexdigest()
     log = log_module.Log(other, b"other", 1, np.random.default_rng(0))
-    log.write(generations(1)[0])
+    log.write(Block.of(generations(1)[0]))
     path.write_bytes(log.finish(summary(1, condition=other)).content)
 
 
@@ -136,10 +137,11 @@ def test_logs_that_are_noted_are_not_read_again(
     empty(run.log_path(3))
     with pytest.warns(DamagedStore):
         summary_table(run)
-    summaries._KNOWN.clear()
     names: list[str] = []
-    read = damage.read_summary
-    monkeypatch.setattr(damage, "read_summary", lambda path: names.append(path.name) or read(path))  # type: ignore[func-returns-value]
+    read = log_reader.read_summary
+    monkeypatch.setattr(
+        log_reader, "read_summary", lambda path: names.append(path.name) or read(path)
+    )  # type: ignore[func-returns-value]
     assert whole_logs(run) == {0, 1, 2}
     assert set(names) == {"0003.mcap"}, "the damaged one alone: it may have been repaired"
     add(3)
@@ -210,7 +212,7 @@ def test_a_lost_file_of_the_configuration_is_taken_from_a_log(
     run.create(config, {}, files)
     path = run.path / "files" / sha256
     log = log_module.Log(run.condition_id, config, 0, np.random.default_rng(0), files)
-    log.write(generations(1)[0])
+    log.write(Block.of(generations(1)[0]))
     row = summary(0, condition=run.condition_id)
     run.write_logs({0: log.finish(row).content})
     assert run.config_json() == config

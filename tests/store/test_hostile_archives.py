@@ -11,8 +11,8 @@ from store_samples import CONDITION, CONFIG, generations, write
 
 from confinement import confined
 from evoexp.store.archive import ArchiveError, take_in
-from evoexp.store.container import MAX_LOG
-from evoexp.store.plans import as_json
+from evoexp.store.identity import as_json
+from evoexp.store.log_bounds import MAX_LOG
 from evoexp.store.run_directory import RunDirectory
 
 ROOT = f"runs/{CONDITION[:12]}"
@@ -170,8 +170,8 @@ def test_many_large_files_take_the_memory_of_one(tmp_path: Path) -> None:
 
 def test_the_plans_of_an_archive_may_ask_for_any_number(tmp_path: Path) -> None:
     """A number that nobody could count up to costs no memory where the run is looked at."""
-    from evoexp.store.plans import Plan
-    from evoexp.store.verification import check_run
+    from evoexp.store.identity import Plan
+    from evoexp.store.integrity import check_run
 
     plans = as_json([Plan(10**15, 0)])
     log = write(generations(4)).content

@@ -34,10 +34,10 @@ from evoexp.commands.fact_screen import screen
 from evoexp.commands.facts import log_facts
 from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.records import FrontRow
-from evoexp.store import container, log_reader
-from evoexp.store.generation_columns import generation_columns
+from evoexp.store import log_bounds, log_reader
 from evoexp.store.log_reader import (
     array_names,
+    generation_columns,
     read_array,
     read_log,
     read_solution,
@@ -55,7 +55,7 @@ READERS: tuple[Callable[[Any], object], ...] = (
 )
 NUM_LOGS = counts(10_000, 100_000) if matrices_are_asked_for() else 300
 # [MiB] beyond what the process has: for logs of a few kB, and for those as large as they may be
-LITTLE, MOST = 500, container.MEMORY_FACTOR * container.MAX_LOG // 2**20
+LITTLE, MOST = 500, log_bounds.MEMORY_FACTOR * log_bounds.MAX_LOG // 2**20
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def test_a_chunk_that_unpacks_to_gigabytes(content: bytes, tmp_path: Path) -> No
         bomb = put_together(parts)
         assert len(bomb) < 150_000
         refusals = confined(functools.partial(attempt, bomb), tmp_path, LITTLE)
-        assert len(refusals) == 4  # by all that read messages
+        assert len(refusals) == len(READERS)
         assert any(reason in text for text in refusals)
 
 
@@ -218,7 +218,7 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
     content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, share: int
 ) -> None:
     """The costliest log is one of short numbers, or of many small generations."""
-    for module in (container, log_reader):
+    for module in (log_bounds, log_reader):
         for name in ("MAX_LOG", "MAX_MESSAGE", "MAX_CHUNK"):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, getattr(module, name) // share)
@@ -235,7 +235,7 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
     rows = [Part(Opcode.CHUNK, short) for _ in range(28)]
     for more in (solutions, rows):
         whole = put_together([*parts, *more])
-        assert 28 * size > container.MAX_LOG * 0.8
+        assert 28 * size > log_bounds.MAX_LOG * 0.8
         task = functools.partial(attempt, whole)
         assert confined(task, tmp_path, MOST // share) == []
 

@@ -45,26 +45,3 @@ def test_pages_do_not_count_where_verdicts_are_kept(
     path.write_text(f"{path.read_text()}# another line\n")
     after = hashes(copy)
     assert [a != b for a, b in zip(before, after, strict=True)] == changed
-
-
-def test_code_that_is_edited_after_the_first_look_is_nobody_elses(copy: Path) -> None:
-    """Facts of the loaded code would be kept as facts of the edited one."""
-    path = copy / "evoexp/report/style.py"
-    edit = f"""
-import evoexp.store.kept_facts as facts
-facts.installed_code()
-open({str(path)!r}, 'a').write('# one more line\\n')
-facts.LOOK_S = 0.0
-"""
-    command = [sys.executable, "-c"]
-    hashes = [
-        subprocess.run(
-            [*command, f"import sys; sys.path.insert(0, {str(copy)!r})\n{script}"],
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout.split()[0]
-        for script in (edit + SCRIPT, SCRIPT, SCRIPT)
-    ]
-    assert hashes[0] != hashes[1] == hashes[2]
-    assert hashes[0].startswith(hashes[1])

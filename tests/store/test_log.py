@@ -15,17 +15,15 @@ from store_samples import (
     CONFIG,
     ENVIRONMENT,
     generations,
-    in_stretches,
+    in_blocks,
     summary,
     write,
 )
 
-from evoexp.records import FrontRow, GenerationRow
+from evoexp.records import Block, FrontRow, GenerationRow
 from evoexp.store.digests import Chain, array_bytes
-from evoexp.store.generation_columns import generation_columns
-from evoexp.store.generation_texts import encode_generations
 from evoexp.store.log import Log
-from evoexp.store.log_reader import read_log, read_solution, read_summary
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
 FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
@@ -213,7 +211,7 @@ def test_misuse_is_refused() -> None:
     with pytest.raises(ValueError, match="no generation"):
         Log(CONDITION, CONFIG, 7, rng).finish(summary())
     log = Log(CONDITION, CONFIG, 8, rng)
-    log.write(generations(1)[0])
+    log.write(Block.of(generations(1)[0]))
     with pytest.raises(ValueError, match="replicate 7"):
         log.finish(summary(7))
 
@@ -243,9 +241,9 @@ def test_links_are_those_of_costs_one_by_one() -> None:
     given[81] = given[81]._replace(costs=np.array([math.nan, 1.0], dtype=np.float32))
     log, chain = Log(CONDITION, CONFIG, 7, rng), Chain(rng)
     for generation in given:
-        log.write(generation)
+        log.write(Block.of(generation))
         costs, best = array_bytes(generation.costs), array_bytes(generation.best)
-        expected += chain.extend([costs], [best], [chain.state()])
+        expected.append(chain.extend(costs, best, chain.state()))
         rng.random(3)
     found = read_log(log.finish(summary()).content).generations
     assert [row.chain for row in found] == expected
@@ -261,16 +259,9 @@ def test_names_of_terms_may_look_like_json(name: str) -> None:
     assert [row.terms[name] for row in rows] == [float(k) for k in range(70)]
 
 
-def test_rows_together_are_the_rows_one_by_one() -> None:
-    rows = [{"index": k, "cost": k / 3.0, "solved": k > 2, "chain": f"{k:032x}"} for k in range(9)]
-    assert encode_generations(rows) == [orjson.dumps(row) for row in rows]
-    assert encode_generations(rows[:1]) == [orjson.dumps(rows[0])]
-    assert encode_generations([]) == []
-
-
 @pytest.mark.parametrize("most", [1, 2, 7, 64, 400])
 @pytest.mark.parametrize("name", ["length", "},{", "null", 'x":1},{"y', "β"])
-def test_stretches_give_the_log_of_their_generations(most: int, name: str) -> None:
+def test_blocks_give_the_log_of_their_generations(most: int, name: str) -> None:
     """Among them generations whose numbers or costs are not finite, or NaN with a payload."""
     written = [
         each._replace(terms={**each.terms, name: float(each.index)}) for each in generations(150)
@@ -281,36 +272,22 @@ def test_stretches_give_the_log_of_their_generations(most: int, name: str) -> No
     for given in (written, whole):
         logs = [Log(CONDITION, CONFIG, 7, np.random.default_rng(5)) for _ in range(2)]
         for each in given:
-            logs[0].write(each)
-        for stretch in in_stretches(given, most):
-            logs[1].write_stretch(stretch)
+            logs[0].write(Block.of(each))
+        for block in in_blocks(given, most):
+            logs[1].write(block)
         one, other = (log.finish(summary()) for log in logs)
         assert one.content == other.content
 
 
-def test_generations_and_stretches_may_follow_each_other() -> None:
-    written = generations(30)
-    log, expected = (Log(CONDITION, CONFIG, 7, np.random.default_rng(5)) for _ in range(2))
-    for each in written:
-        expected.write(each)
-    for each in written[:10]:
-        log.write(each)
-    for stretch in in_stretches(written[10:20], 4):
-        log.write_stretch(stretch)
-    for each in written[20:]:
-        log.write(each)
-    assert log.finish(summary()).content == expected.finish(summary()).content
-
-
 @pytest.mark.parametrize("kind", [np.float32, np.int32, np.int64])
-def test_costs_of_other_types_are_the_same_in_stretches(kind: type) -> None:
+def test_costs_of_other_types_are_the_same_in_blocks(kind: type) -> None:
     written = [
         each._replace(costs=np.arange(20).astype(kind) + kind(each.index))
         for each in generations(30)
     ]
     log, expected = (Log(CONDITION, CONFIG, 7, np.random.default_rng(5)) for _ in range(2))
     for each in written:
-        expected.write(each)
-    for stretch in in_stretches(written, 9):
-        log.write_stretch(stretch)
+        expected.write(Block.of(each))
+    for block in in_blocks(written, 9):
+        log.write(block)
     assert log.finish(summary()).summary.digest == expected.finish(summary()).summary.digest

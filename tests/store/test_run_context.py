@@ -12,7 +12,7 @@ from evoexp.configuration import expansions
 from evoexp.load import load
 from evoexp.shipped import shipped
 from evoexp.store.manifest import manifest
-from evoexp.store.run_context import origin, run_context, with_context
+from evoexp.store.run_context import origin, run_context
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 
@@ -80,17 +80,6 @@ def test_names_are_short_where_nothing_else_has_them(tmp_path: Path) -> None:
     }
     (tmp_path / "config.json").write_text("[" * 100_000)
     assert run_context(tmp_path, "0" * 64, []) == {"experiment": "e", "label": "l"}
-
-
-def test_constant_columns_are_what_arrow_makes_of_them() -> None:
-    table = pa.table({"k": [1, 2, 3]})
-    given = {"text": "aé", "number": 3, "real": 0.5, "truth": True}
-    found = with_context(table, given)
-    for name, value in given.items():
-        truth = pa.array([float(value) if type(value) is int else value] * 3)
-        assert found[name].to_pylist() == truth.to_pylist()
-        assert found[name].type == truth.type
-    assert with_context(table.slice(0, 0), given).num_rows == 0
 
 
 def test_the_origin_of_a_run_follows_from_its_condition() -> None:

@@ -15,9 +15,9 @@ import pytest
 
 from evoexp.cli import main
 from evoexp.condition import Condition, revisions
-from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log_reader import (
     array_names,
+    generation_columns,
     read_array,
     read_log,
     read_solution,

@@ -10,7 +10,7 @@ import pytest
 from evoexp.condition import Condition
 from evoexp.planners.answers import Listing
 from evoexp.planners.via_point_ga.planner import ViaPointGa
-from evoexp.records import Generation
+from evoexp.records import Generation, generations
 from evoexp.testing import CHECKS, Check, ContractBroken, check_planner, conditions
 
 SMALL = ("ga.population_size=8", "ga.num_generations=3", "planner.num_new_trajectories=1")
@@ -39,7 +39,7 @@ def evolving(change: Change) -> dict[str, Any]:
     """Return an `evolve` whose generations are changed."""
 
     def evolve(self: ViaPointGa, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
-        yield from map(change, ViaPointGa.evolve(self, problem, rng))
+        yield from map(change, generations(ViaPointGa.evolve(self, problem, rng)))
 
     return {"evolve": evolve}
 
@@ -153,7 +153,7 @@ def changing_after_the_end(
     self: ViaPointGa, problem: Any, rng: np.random.Generator
 ) -> Iterator[Generation]:
     population = np.empty(0)
-    for generation in ViaPointGa.evolve(self, problem, rng):
+    for generation in generations(ViaPointGa.evolve(self, problem, rng)):
         population = generation.population
         yield generation
     population += 1.0
@@ -164,12 +164,13 @@ RUNS: list[int] = []
 
 def remembering(self: ViaPointGa, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
     RUNS.append(1)
-    for generation in ViaPointGa.evolve(self, problem, rng):
+    for generation in generations(ViaPointGa.evolve(self, problem, rng)):
         yield generation._replace(best=generation.best + len(RUNS))
 
 
 def without_rng(self: ViaPointGa, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
-    yield from ViaPointGa.evolve(self, problem, np.random.Generator(np.random.PCG64(0)))
+    other = np.random.Generator(np.random.PCG64(0))
+    yield from generations(ViaPointGa.evolve(self, problem, other))
 
 
 def by_position(self: ViaPointGa, problem: Any, population: Any) -> Any:

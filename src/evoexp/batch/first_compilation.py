@@ -16,7 +16,7 @@ from evoexp.batch.jobs import load
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.compiled_kinds import is_compiled, note_compiled
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, generations
 from evoexp.registry import component_modules
 
 MOST_GENERATIONS = 1000  # of a search whose kernels are compiled
@@ -100,7 +100,9 @@ def _search(kind: _Kind) -> _Searched | None:
     with contextlib.suppress(Exception):
         planner, problem, rng = _prepared(kind)
         found = list[FloatArray]()
-        for generation in itertools.islice(planner.evolve(problem, rng), MOST_GENERATIONS):
+        for generation in itertools.islice(
+            generations(planner.evolve(problem, rng)), MOST_GENERATIONS
+        ):
             with contextlib.suppress(SettingError):
                 planner.evaluate(problem, generation.best)
                 found.append(generation.best.copy())

@@ -2,8 +2,6 @@
 
 import contextlib
 import functools
-import itertools
-import math
 import time
 import traceback
 from collections.abc import Callable, Sequence
@@ -14,13 +12,10 @@ from evoexp.attachments import keep_all
 from evoexp.batch.live_curves import CurveFile
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.condition import Condition
-from evoexp.records import Generation, ReplicateSummary
+from evoexp.records import Block, ReplicateSummary
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
-SHORT_S = 0.05  # [s] replicates shorter than this run step by step, several together:
-TOGETHER = 16  # so many at most, and as many as take
-MEMORY = 1 << 28  # [B] at most
 
 
 class Job(NamedTuple):
@@ -98,45 +93,12 @@ def run_jobs(
         Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
     """
     outcomes: list[Outcome] = []
-    begun, mean_s = time.perf_counter(), math.inf
-    while (done := len(outcomes)) < len(jobs):
+    begun = time.perf_counter()
+    for job in jobs:
         if outcomes and time.perf_counter() - begun > LONGEST_TASK_S:
             break
-        are_short = mean_s < SHORT_S and limits.timeout_s is None and curves is None
-        some = _alike(jobs[done - 1], jobs[done:]) if are_short else []
-        new = _run_together(some, limits, in_worker) if some else None
-        new = new or [_run_one(job, limits, in_worker, curves) for job in some or [jobs[done]]]
-        outcomes += new
-        mean_s = sum(each.wall_s for each in new) / len(new)
+        outcomes.append(_run_one(job, limits, in_worker, curves))
     return outcomes
-
-
-def _alike(before: Job, jobs: Sequence[Job]) -> list[Job]:
-    """Return the first jobs that may run together, behind one of the same condition."""
-    alike = itertools.takewhile(lambda job: job.condition_id == before.condition_id, jobs)
-    return list(itertools.islice(alike, TOGETHER))
-
-
-def _run_together(
-    jobs: Sequence[Job], limits: ReplicateLimits, in_worker: bool
-) -> list[Outcome] | None:
-    """Run short replicates of a condition step by step; None: one failed."""
-    from evoexp.batch.replicate import run_together
-
-    start, config_json = time.perf_counter(), jobs[0].condition_json
-    try:
-        condition = _condition(config_json)
-        planner, problem = condition.prepare()
-        jobs = jobs[: max(1, int(MEMORY // max(planner.memory(problem), 1.0)))]
-        with limited(limits, in_worker=in_worker):
-            found = run_together(condition, [job.replicate for job in jobs], config_json)
-    except Exception:  # then each runs by itself, and tells its own failure
-        return None
-    seconds = (time.perf_counter() - start) / len(jobs)
-    return [
-        Outcome(job.condition_id, job.replicate, "", "", content, seconds, summary)
-        for job, (content, summary) in zip(jobs, found, strict=True)
-    ]
 
 
 def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | None) -> Outcome:
@@ -164,7 +126,7 @@ def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | 
     )
 
 
-def _heard(curves: Path | None, job: Job) -> Callable[[Generation], None] | None:
+def _heard(curves: Path | None, job: Job) -> Callable[[Block], None] | None:
     return None if curves is None else CurveFile(curves, *job.key).hear
 
 

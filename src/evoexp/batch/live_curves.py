@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from evoexp.records import Generation
+from evoexp.records import Block
 
 INTERVAL_S = 0.2  # [s] between two files of a worker
 NUM_POINTS = 48  # of a curve, at most
@@ -46,13 +46,13 @@ class CurveFile:
         self._folder, self._of = folder, (condition_id, replicate)
         self._costs: list[float] = []
 
-    def hear(self, generation: Generation) -> None:
-        """Note a generation; write at most every `INTERVAL_S`, whatever replicate is running."""
-        self._costs.append(float(generation.best_cost))
+    def hear(self, block: Block) -> None:
+        """Note generations; write at most every `INTERVAL_S`, whatever replicate is running."""
+        self._costs += [float(best.cost) for best in block.best_of_each]
         now, key = time.monotonic(), str(self._folder)
         if now - _written.setdefault(key, now) >= INTERVAL_S:
             _written[key] = now
-            curve = Curve(*self._of, int(generation.index), thinned(self._costs))
+            curve = Curve(*self._of, len(self._costs) - 1, thinned(self._costs))
             with suppress(OSError):  # nobody looks any more, or the disk is full
                 unfinished = self._folder / f"{os.getpid()}.unfinished"
                 unfinished.write_text(json.dumps(curve))

@@ -21,8 +21,8 @@ from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, MissingDistribution
 from evoexp.records import TIMES, GenerationRow, ReplicateSummary, flatten
 from evoexp.registry import missing
-from evoexp.store.damage import reason
 from evoexp.store.digests import array_bytes
+from evoexp.store.files import reason
 from evoexp.store.log import ARRAY
 from evoexp.store.log_reader import LogContents, decode_array, read_log
 from evoexp.store.manifest import differences

@@ -19,8 +19,8 @@ from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import component_modules, guests
 from evoexp.store.identity import MANIFEST, restored_manifest
+from evoexp.store.integrity import lost_replicates, mend, needs_mending
 from evoexp.store.manifest import manifest
-from evoexp.store.mending import lost_replicates, mend, needs_mending
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import whole_logs, write_summary
 

@@ -21,7 +21,6 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 from evoexp.errors import EvoexpError
-from evoexp.numeric.garbage import search_less
 
 HEADER = struct.Struct("!Q")  # [B] length of the message behind it
 
@@ -38,7 +37,6 @@ def main() -> None:
 
     The words of the process are the number of its own socket, and names of modules to load.
     """
-    search_less()
     door = socket.socket(fileno=int(sys.argv[1]))
     try:
         _load(sys.argv[2:])

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
 from evoexp.condition import revisions
 from evoexp.errors import Busy, StoreError, UnknownOption
-from evoexp.store.damage import is_set_aside
-from evoexp.store.files import is_temporary
+from evoexp.store.files import is_set_aside, is_temporary
 from evoexp.store.identity import CONFIG, REPLICATES, read
 from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
 

@@ -24,7 +24,7 @@ from evoexp.playback.trajectory_files import (
     read_columns,
     read_message,
 )
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, generations
 from evoexp.robots.assembly import Robot
 from evoexp.store.log_reader import read_log
 
@@ -170,7 +170,7 @@ def initial_motion(
             + " | ".join(repr(each.label) for each in chosen)
         )
     (label, condition), (planner, problem) = chosen[0], prepared[0]
-    first = next(planner.evolve(problem, condition.rng(0)))
+    first = next(generations(planner.evolve(problem, condition.rng(0))))
     return _solved(label, condition, planner, problem, first.best)
 
 

@@ -20,8 +20,8 @@ from evoexp.commands.hashes import stored_runs
 from evoexp.commands.run_origins import origin_of
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, printable
-from evoexp.store.damage import listed
-from evoexp.store.mending import damaged_files
+from evoexp.store.files import listed
+from evoexp.store.integrity import damaged_files
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_rows
 

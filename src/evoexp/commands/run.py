@@ -29,7 +29,6 @@ from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
 from evoexp.report.pages import page_registration
 from evoexp.report.standing_reports import StandingReport, inputs_of_reports
-from evoexp.store.plans import num_planned
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
@@ -228,7 +227,7 @@ def summary_table(experiment: Experiment) -> Table:
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
         rows = stored_summaries(run)
-        planned = num_planned(run, condition.num_replicates(experiment.num_replicates))
+        planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
         columns = rows.select(["status", "solved", "best_cost", "cpu_s"]).to_pylist()
         done = [row for row in columns if row["status"] == "done"]
         table.add_row(

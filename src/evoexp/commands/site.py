@@ -18,9 +18,7 @@ from evoexp.report.build import ReportFiles
 from evoexp.report.claim_rules import Rules
 from evoexp.report.home_page import Paper, StoredRun, home_page, summaries
 from evoexp.report.page_summary import HTML
-from evoexp.store.busy_runs import is_being_written
 from evoexp.store.files import write_file
-from evoexp.store.plans import num_planned
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written
@@ -76,8 +74,8 @@ def say_busy(console: Console) -> None:
         name
         for name, run in stored_runs(outputs_root())
         if isinstance(run, RunDirectory)
-        and num_planned(run) > len(run.completed())
-        and is_being_written(run)
+        and run.num_planned() > len(run.completed())
+        and run.is_being_written()
     ]
     if busy:
         more = ", …" if len(busy) > MAX_NAMED else ""
@@ -120,4 +118,4 @@ def _runs(outputs: Path) -> Iterator[StoredRun]:
             str(origin[key] or "") for key in ("experiment", "label", "budget")
         )
         done, failed = len(run.completed()), len(run.failed())
-        yield StoredRun(name, experiment, label, budget, done, num_planned(run), failed)
+        yield StoredRun(name, experiment, label, budget, done, run.num_planned(), failed)

@@ -20,8 +20,8 @@ from evoexp.commands.console import (
 from evoexp.commands.hashes import with_candidates
 from evoexp.errors import UnknownHash
 from evoexp.store.identity import CONFIG
+from evoexp.store.integrity import LogCheck, RunCheck, check_logs, check_rows, check_run
 from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, resolve, run_names
-from evoexp.store.verification import LogCheck, RunCheck, check_logs, check_rows, check_run
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
 MANY = 200  # logs, likewise: their solutions are evaluated

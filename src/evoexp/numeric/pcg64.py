@@ -5,9 +5,7 @@ increment; a number is made of the halves of the state. Here four states that ar
 go on at once, because a multiplication takes longer than the next one has to wait for it; the
 numbers are then made of many states at once, in vectors.
 
-A kernel takes a generator as `words`: high and low half of the state, of the increment. Outside of
-kernels `draw_uniforms` and `draw_words` draw for a generator; where numpy's layout of it in memory
-is not the known one, numpy draws the numbers itself.
+A kernel takes a generator as `words`: high and low half of the state, of the increment.
 """
 
 from collections.abc import Callable
@@ -21,7 +19,7 @@ from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.elementary import scale_to_normal
-from evoexp.numeric.generator_memory import MULTIPLIER, layout_is_known, words_of
+from evoexp.numeric.generator_state import MULTIPLIER, demand_pcg64
 
 Words = NDArray[np.uint64]
 
@@ -29,7 +27,6 @@ _HALF = 2**64
 HIGH_FACTOR, LOW_FACTOR = np.uint64(MULTIPLIER // _HALF), np.uint64(MULTIPLIER % _HALF)
 _BLOCK = 64  # states of which numbers are made at once
 _STREAMS = 4
-_HIGH_FIRST = [1, 0, 3, 2]  # order of the words in a generator's memory
 _INT64, _INT128, _DOUBLE = ir.IntType(64), ir.IntType(128), ir.DoubleType()
 
 
@@ -49,26 +46,18 @@ class Twin:
         Raises:
             TypeError: Another bit generator.
         """
-        if not isinstance(rng.bit_generator, np.random.PCG64):
-            raise TypeError(f"rng: must be a PCG64, was a {type(rng.bit_generator).__name__}")
+        demand_pcg64(rng.bit_generator)
         self._bits, self.words = rng.bit_generator, np.empty(4, dtype=np.uint64)
-        self._memory = words_of(self._bits) if layout_is_known() else None
         self.meet()
 
     def meet(self) -> None:
         """Go where the generator is."""
-        if self._memory is not None:
-            self.words[:] = self._memory[_HIGH_FIRST]
-            return
         words: Any = self._bits.state["state"]
         state, increment = words["state"], words["inc"]
         self.words[:] = state // _HALF, state % _HALF, increment // _HALF, increment % _HALF
 
     def follow(self, state: Words) -> None:
         """Let the generator go to a state: high and low half."""
-        if self._memory is not None:  # a tenth of the time
-            self._memory[1], self._memory[0] = state[0], state[1]
-            return
         high, low = state.tolist()
         whole: Any = self._bits.state
         whole["state"]["state"] = high * _HALF + low
@@ -119,41 +108,6 @@ step_state: Callable[..., tuple[np.uint64, np.uint64]] = cast(Any, _step)
 
 word_of_state: Callable[[np.uint64, np.uint64], np.uint64] = cast(Any, _make_word)
 """Return the word of a state: exclusive or of its halves, rotated."""
-
-
-def draw_uniforms(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-    """Return the next uniform numbers in [0, 1), as `rng.random(count)` does."""
-    return _drawn(rng, np.empty(count), fill_uniforms, rng.random)
-
-
-def put_uniforms(rng: np.random.Generator, out: NDArray[np.float64]) -> None:
-    """Fill out (n,), contiguous, with the next uniform numbers, as `rng.random(out=out)` does."""
-    drawn = _drawn(rng, out, fill_uniforms, rng.random)
-    if drawn is not out:
-        out[:] = drawn
-
-
-def draw_words(rng: np.random.Generator, count: int) -> Words:
-    """Return the next words of 64 random bits, as `rng.bit_generator.random_raw(count)` does."""
-    raw: Any = rng.bit_generator.random_raw
-    return _drawn(rng, np.empty(count, dtype=np.uint64), fill_words, raw)
-
-
-def _drawn(
-    rng: np.random.Generator,
-    out: NDArray[Any],
-    fill: Callable[..., None],
-    otherwise: Callable[[int], NDArray[Any]],
-) -> NDArray[Any]:
-    bits = rng.bit_generator
-    if not isinstance(bits, np.random.PCG64) or not layout_is_known():
-        return otherwise(len(out))
-    with bits.lock:
-        memory = words_of(bits)
-        words = memory[_HIGH_FIRST]
-        fill(words, out)
-        memory[1], memory[0] = words[0], words[1]
-    return out
 
 
 @inlined

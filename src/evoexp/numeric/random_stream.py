@@ -5,16 +5,13 @@ then repeats the step that took them, from the same place of a longer block. So 
 not depend on where blocks end.
 """
 
-from collections import deque
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel, uncounted
-from evoexp.numeric.generator_memory import state_reader, states_behind
-from evoexp.numeric.pcg64 import draw_uniforms, put_uniforms
+from evoexp.numeric.generator_state import state_bytes, states_behind
 
 
 class Block(NamedTuple):
@@ -52,101 +49,42 @@ class Draws:
         if count > len(self._memory):
             self._memory = np.empty(2 * count)
         self._memory[: len(left)] = left
-        put_uniforms(rng, self._memory[len(left) : count])
+        rng.random(out=self._memory[len(left) : count])
         self.block = Block(self._memory[:count], self.block.taken)
         self.block.taken[0] = 0
 
 
-def twin(rng: np.random.Generator) -> np.random.Generator:
-    """Return a generator that draws what another one will draw."""
-    bits = type(rng.bit_generator)(0)
-    bits.state = rng.bit_generator.state
-    return np.random.Generator(bits)
-
-
-def passer(rng: np.random.Generator) -> Callable[[int], object]:
-    """Return a function that lets a generator pass uniform numbers, as if they were drawn.
-
-    Advancing a PCG64 takes a third of the time. It forgets half a number that is left of drawing
-    32 bits, which drawing uniform numbers does not.
-    """
-    bits: Any = rng.bit_generator
-    if isinstance(bits, np.random.PCG64) and not bits.state["has_uint32"]:
-        return bits.advance
-    return rng.random
-
-
 class DrawnAhead:
-    """Uniform numbers for several steps at once, drawn ahead of a generator by a twin of it.
-
-    The generator follows step by step: between two steps it is where it would be if each step had
-    drawn its own numbers.
-    """
-
-    def __init__(self, rng: np.random.Generator, count: int) -> None:
-        """Begin where a generator is.
-
-        Args:
-            rng: The generator.
-            count: Numbers that each step takes.
-        """
-        self._twin, self._pass, self._count = twin(rng), passer(rng), count
-        self._bits = rng.bit_generator
-
-    def draw(self, steps: int) -> NDArray[np.float64]:
-        """Return the numbers of the next steps, (steps, count)."""
-        return draw_uniforms(self._twin, steps * self._count).reshape(steps, self._count)
-
-    def follow(self) -> None:
-        """Let the generator pass the numbers of one step."""
-        self._pass(self._count)
-
-    def follow_all(self, steps: int) -> list[bytes]:
-        """Let the generator pass the numbers of some steps; return its state behind each."""
-        states = states_behind(self._bits, self._count, steps)
-        self._pass(steps * self._count)
-        return states
-
-
-class DrawnByNeed:
-    """Uniform numbers for several steps at once, as `DrawnAhead`, of steps that take more or less.
-
-    How many each one took is known only behind it; what is left is for the next steps.
-    """
+    """Uniform numbers for several steps at once; what they leave is for the next steps."""
 
     def __init__(self, rng: np.random.Generator, most: int) -> None:
         """Begin where a generator is.
 
         Args:
-            rng: The generator.
+            rng: The generator, a PCG64.
             most: Numbers that a step takes at most.
         """
-        self._twin, self._pass, self._most = twin(rng), passer(rng), most
-        self._bits = rng.bit_generator
-        self._left, self._taken = np.empty(0), deque[int]()
+        self._rng, self._most, self._left = rng, most, np.empty(0)
+        self._state = state_bytes(rng.bit_generator)
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return at least as many numbers as the next steps may take."""
-        missing = max(0, steps * self._most - len(self._left))
-        self._left = np.concatenate([self._left, draw_uniforms(self._twin, missing)])
+        missing = steps * self._most - len(self._left)
+        if missing > 0:
+            fresh = self._rng.random(missing)
+            self._left = np.concatenate([self._left, fresh]) if len(self._left) else fresh
         return self._left
 
-    def took(self, counts: list[int]) -> None:
-        """Tell how many of these numbers each of the steps took."""
-        self._taken.extend(counts)
+    def take(self, counts: list[int]) -> list[bytes]:
+        """Tell how many of these numbers each of the steps took.
+
+        Returns:
+            The states that the generator would have had behind each step.
+        """
         self._left = self._left[sum(counts) :]
-
-    def follow(self) -> None:
-        """Let the generator pass the numbers of one step."""
-        self._pass(self._taken.popleft())
-
-    def follow_all(self, steps: int) -> list[bytes]:
-        """Let the generator pass the numbers of some steps; return its state behind each."""
-        read, found = state_reader(self._bits), list[bytes]()
-        for _ in range(steps):
-            self.follow()
-            found.append(read())
-        return found
+        states = states_behind(self._state, counts)
+        self._state = states[-1]
+        return states
 
 
 @uncounted

@@ -20,7 +20,7 @@ from evoexp.planners.answers import Shape as Shape
 from evoexp.planners.answers import num_values as num_values
 from evoexp.planners.judgements import Judgement as Judgement
 from evoexp.planners.judgements import JudgementArrays as JudgementArrays
-from evoexp.records import BoolArray, FloatArray, Generation
+from evoexp.records import Best, Block, BoolArray, FloatArray
 
 Reproducibility = Literal["bits", "environment"]
 # Copies of a population that a run of most planners holds: parents, offspring, paths between them.
@@ -54,8 +54,8 @@ class Planner(Protocol):
             SettingError: If robot, scenario and settings contradict each other.
         """
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield the initial population, then one `Generation` per generation."""
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield the initial population, then all generations, one or several per `Block`."""
 
     @property
     def num_generations(self) -> int:
@@ -206,7 +206,7 @@ class PlannerDefaults:
         """Return None: there is no local operator."""
         return None
 
-    def random_run(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation] | None:
+    def random_run(self, problem: Any, rng: np.random.Generator) -> Iterator[Block] | None:
         """Return the generations of random search, many drawn per call; None: one by one.
 
         They are those of `RandomSearch`: as many individuals as the planner evaluates, drawn as
@@ -271,7 +271,7 @@ class Candidate(NamedTuple):
 
 
 class Keeper:
-    """Keeps the best solution so far and the counts, and makes the records of generations.
+    """Keeps the best solution so far and the counts, and makes blocks of generations.
 
     Attributes:
         index: Index of the last recorded generation; −1 before the first.
@@ -281,11 +281,12 @@ class Keeper:
         collision_queries: Configurations asked for so far.
     """
 
-    __slots__ = ("_tried", "best", "collision_queries", "cost", "evaluations", "index")
+    __slots__ = ("_standing", "_tried", "best", "collision_queries", "cost", "evaluations", "index")
 
     def __init__(self) -> None:
         self.index, self.cost, self._tried = -1, np.inf, np.inf
         self.best = Candidate(np.empty(0), {}, False)
+        self._standing: Best | None = None  # the best so far as it is recorded
         self.evaluations = self.collision_queries = 0
 
     def improves(self, cost: float) -> bool:
@@ -294,7 +295,15 @@ class Keeper:
 
     def keep(self, cost: float, best: Candidate) -> None:
         """Keep a solution and its cost as the best so far."""
-        self.cost, self.best = cost, best
+        self.cost, self.best, self._standing = cost, best, None
+
+    @property
+    def standing(self) -> Best:
+        """The best so far, as a block begins with it."""
+        if self._standing is None:
+            solution, terms, solved = self.best
+            self._standing = Best(0, solution, self.cost, terms, solved)
+        return self._standing
 
     def keep_proven(
         self, costs: FloatArray, proven: BoolArray, candidate: Callable[[int, bool], Candidate]
@@ -315,8 +324,8 @@ class Keeper:
 
     def record_judged(
         self, planner: Planner, problem: Any, population: FloatArray, judgement: Judgement
-    ) -> Generation:
-        """Keep the best individual of a generation if it improves, and return the record.
+    ) -> Block:
+        """Keep the best individual of a generation if it improves, and return a block of it.
 
         Args:
             planner: The planner, which makes a solution of the best individual.
@@ -359,8 +368,8 @@ class Keeper:
         criteria: FloatArray | None = None,
         stop_reason: str = "",
         arrays: Mapping[str, NDArray[Any]] | None = None,
-    ) -> Generation:
-        """Count a generation and return its record.
+    ) -> Block:
+        """Count a generation and return a block of it.
 
         Args:
             statistics: Mean and deviation of its costs.
@@ -377,21 +386,18 @@ class Keeper:
         self.index += 1
         self.evaluations += evaluations
         self.collision_queries += collision_queries
-        solution, terms, solved = self.best
-        return Generation(  # by position: half the time
+        return Block(  # by position: half the time
             self.index,
-            solution,
-            self.cost,
-            lowest,
-            statistics.mean,
-            statistics.std,
-            num_feasible,
-            self.evaluations,
-            self.collision_queries,
-            solved,
-            terms,
-            costs,
-            population,
+            [self.standing],
+            [lowest],
+            [statistics.mean],
+            [statistics.std],
+            [num_feasible],
+            [self.evaluations],
+            [self.collision_queries],
+            costs[None],
+            lambda place: population,
+            None,
             criteria,
             stop_reason,
             arrays,

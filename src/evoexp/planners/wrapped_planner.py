@@ -10,7 +10,7 @@ from evoexp.collision.scene import Part
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.planner import Judgement, Planner, PlannerDefaults, Shape
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.validation import Component
 
 # `Condition` checks that it is one, and names it as the user typed it
@@ -30,7 +30,7 @@ class WrappedPlanner(PlannerDefaults, Component):
         """Prepare the wrapped planner's problem."""
         return self.planner.prepare(robot, scenario)
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the generations of the control or reference."""
         raise NotImplementedError
 

@@ -14,7 +14,7 @@ import numpy as np
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.planners.planner import Candidate, Keeper, Reproducibility
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.references.one_thread import one_thread
 
 
@@ -59,7 +59,7 @@ class Reference(WrappedPlanner):
         """None follows the one that there is."""
         return 0
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the truth as the one generation that there is; no number is drawn."""
         with one_thread():
             found, keeper = self.truth(problem), Keeper()

@@ -18,11 +18,10 @@ from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
-from evoexp.store.damage import warn
-from evoexp.store.identity import DamagedFile
+from evoexp.store.files import warn
+from evoexp.store.identity import DamagedFile, Plan
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
-from evoexp.store.plans import Plan, num_planned
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
 from evoexp.store.tables import read_generations, read_summaries
@@ -352,7 +351,7 @@ def _read(
     return ConditionResults(
         label,
         condition,
-        num_planned(run, asked),
+        run.num_planned(asked),
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,

@@ -20,11 +20,10 @@ from typing import Any, BinaryIO, NamedTuple
 from evoexp.attachments import PREFIX
 from evoexp.errors import CorruptLog, EvoexpError, printable
 from evoexp.input_files import MAX_INPUT, MEGABYTE
-from evoexp.store.container import MAX_LOG
-from evoexp.store.damage import checked_summary
 from evoexp.store.files import write_file, write_files
-from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES, TAKEN
-from evoexp.store.plans import PLANS
+from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES, TAKEN
+from evoexp.store.log_bounds import MAX_LOG
+from evoexp.store.log_reader import checked_summary
 from evoexp.store.run_directory import HASH_LENGTH, RunDirectory
 
 MOST_FILES = 2_000_000  # of an archive

@@ -1,17 +1,13 @@
 """The chain of digests, which tells from which generation on two runs differ; that of a log."""
 
 import struct
-from collections.abc import Callable, Iterable
-from functools import cached_property
-from itertools import chain
 from typing import Any
 
 import numpy as np
 import xxhash
 from numpy.typing import NDArray
 
-from evoexp.numeric.generator_memory import demand_pcg64, state_reader
-from evoexp.store.container_writer import Messages
+from evoexp.numeric.generator_state import demand_pcg64, state_bytes
 
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 
@@ -34,27 +30,20 @@ class Chain:
         demand_pcg64(rng.bit_generator)
         self._rng, self.link = rng, b""
 
-    @cached_property
-    def state(self) -> Callable[[], bytes]:
-        """Returns the state of the generator now, for `extend`."""
-        return state_reader(self._rng.bit_generator)
+    def state(self) -> bytes:
+        """Return the state of the generator now."""
+        return state_bytes(self._rng.bit_generator)
 
-    def extend(
-        self, costs: Iterable[bytes], best: Iterable[bytes], states: Iterable[bytes]
-    ) -> list[str]:
-        """Append generations and return their links in hex.
+    def extend(self, costs: bytes, best: bytes, state: bytes) -> str:
+        """Append a generation and return its link in hex.
 
         Args:
-            costs: `array_bytes` of the costs of each generation.
-            best: `array_bytes` of the best solution until each of them.
-            states: What `state` returned at each of them.
+            costs: `array_bytes` of its costs.
+            best: `array_bytes` of the best solution so far.
+            state: Of the generator behind it.
         """
-        link, links, digest, join = self.link, [], xxhash.xxh3_128_digest, b"".join
-        for parts in zip(costs, best, states, strict=True):
-            link = digest(join((link, *parts)))
-            links.append(link.hex())
-        self.link = link
-        return links
+        self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
+        return self.link.hex()
 
     def finish(self, population: NDArray[Any]) -> str:
         """Return the replicate's digest, xxh3_128(last link ‖ population), as 32 hex digits."""
@@ -77,11 +66,6 @@ def array_bytes(array: NDArray[Any]) -> bytes:
     return array.tobytes()
 
 
-def any_nan(arrays: Iterable[bytes]) -> bool:
-    """Return whether float64 arrays, given as bytes, hold any NaN."""
-    return bool(np.isnan(np.frombuffer(b"".join(arrays))).any())
-
-
 class ContentDigest:
     """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
 
@@ -92,12 +76,6 @@ class ContentDigest:
     def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
         """Append one message; `channel` comes from `channel_identity`."""
         self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
-
-    def update_all(self, channels: Iterable[bytes], messages: Messages) -> None:
-        """Append messages; `channels` has one entry for each of them."""
-        heads = map(_MESSAGE.pack, messages.times, messages.sequences, map(len, messages.data))
-        parts = zip(channels, heads, messages.data, strict=True)
-        self._hash.update(b"".join(chain.from_iterable(parts)))
 
     def hexdigest(self) -> str:
         """Return the digest so far as 32 hex digits."""

@@ -1,9 +1,13 @@
-"""The identity of a run directory: its configuration, or where that is lost a log's."""
+"""What a run directory holds beside its logs: its configuration, its manifest, its plans.
+
+The configuration is the identity of the run; where it is lost, a log has it.
+"""
 
 import hashlib
 import json
+import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +17,7 @@ from evoexp.input_files import read_bounded
 from evoexp.store.log_reader import LogContents, read_log
 
 CONFIG, MANIFEST, REPLICATES = "config.json", "manifest.json", "replicates"
+PLANS = "plans.json"  # how many replicates were asked for, and how many were stored by then
 RESTORED = "restored_from"  # the entry of a restored manifest that names a log
 TAKEN = "taken_from"  # the entry of a manifest out of an archive that names the archive
 _TEXTS = ("experiment", "label", "budget", "command", TAKEN)  # entries of a manifest
@@ -36,6 +41,18 @@ class FoundLog(NamedTuple):
 
     name: str
     contents: LogContents
+
+
+class Plan(NamedTuple):
+    """A number of replicates that was asked for.
+
+    Attributes:
+        num_replicates: All of them, those stored by then included.
+        stored: Logs that were there already, whose results could be known.
+    """
+
+    num_replicates: int
+    stored: int
 
 
 def stored_id(path: Path) -> str:
@@ -188,3 +205,26 @@ def _manifest_id(path: Path) -> str | None:
         return None
     is_id = isinstance(known, str) and _ID.fullmatch(known) and known.startswith(path.name)
     return str(known) if is_id else None
+
+
+def read_plans(path: Path) -> list[Plan]:
+    """Return the plans that a file holds, the first one first; none where there is no file.
+
+    Raises:
+        DamagedFile: The file is damaged.
+    """
+    if not os.path.lexists(path):
+        return []
+    try:
+        found = [(each["num_replicates"], each["stored"]) for each in read_object(path)["plans"]]
+    except (KeyError, TypeError) as error:
+        raise DamagedFile(f"{path}: damaged: no list of plans") from error
+    if not all(type(number) is int and number >= 0 for plan in found for number in plan):
+        raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
+    return [Plan(*each) for each in found]
+
+
+def as_json(plans: Iterable[Plan]) -> bytes:
+    """Return plans as the content of their file."""
+    text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
+    return text.encode() + b"\n"

@@ -1,31 +1,21 @@
 """One replicate as one self-contained MCAP, written in memory."""
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain, compress, repeat
-from operator import sub
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
-from evoexp.records import (
-    FrontRow,
-    Generation,
-    GenerationRow,
-    ReplicateSummary,
-    SolutionRow,
-    Stretch,
-)
-from evoexp.store.container import MAX_LOG
-from evoexp.store.container_writer import ContainerWriter, Messages
-from evoexp.store.digests import Chain, ContentDigest, any_nan, array_bytes, channel_identity
-from evoexp.store.generation_texts import encode_generations, encode_stretch, generation_row
+from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
+from evoexp.store.digests import Chain, ContentDigest, array_bytes, channel_identity
+from evoexp.store.log_bounds import MAX_LOG
 from evoexp.store.messages import (
-    TERM,
     encode_front,
+    encode_generation,
     encode_solution,
     encode_summary,
     encode_values,
@@ -46,8 +36,6 @@ PUBLISHED, CPU_TIME = "publish_time", "cpu"  # the entry of `RUN` that tells pub
 GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
 
 _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
-_BATCH = 64  # generations encoded together
-_NUM_VALUES = Generation._fields.index("terms")  # fields of a generation before its terms
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 
@@ -76,17 +64,17 @@ class _Channel:
     """A channel of the log: its id, its part in the content digest, its number of messages."""
 
     def __init__(
-        self, writer: ContainerWriter, topic: str, record: type, terms: tuple[str, ...] = ()
+        self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()
     ) -> None:
         name = f"evoexp.{record.__name__.removesuffix('Row')}"
-        schema_id = writer.add_schema(name, "jsonschema", json_schema(record, terms))
-        self.id = writer.add_channel(topic, "json", schema_id)
+        schema_id = writer.register_schema(name, "jsonschema", json_schema(record, terms))
+        self.id = writer.register_channel(topic, "json", schema_id)
         self.identity = channel_identity(topic, name, "json")
         self.num_messages = 0
 
 
 class Log:
-    """The log of one replicate: written generation by generation, finished into bytes.
+    """The log of one replicate: written block by block, finished into bytes.
 
     The same content gives the same messages, chain and digests; wall and CPU times and the
     environment are metadata and enter none of them.
@@ -122,20 +110,23 @@ class Log:
         self._chain = Chain(rng)
         self._content = ContentDigest()
         self._channels: dict[str, _Channel] = {}
-        self._terms: dict[str, str] = {}  # name → column, in the order of the columns
-        self._last: Generation | None = None
-        # Generations that wait to be encoded: values up to `solved`; a copy of the terms; (name,
-        # column) of all terms; the bytes of the costs; whether these are floats, whose NaNs have
-        # the bits that they had; `array_bytes` of the best; the generator's state; CPU time [ns].
-        self._pending: list[tuple[Any, ...]] = []
-        self._best_bytes = b""  # array_bytes of the best so far
-        self._best = self._written = (
-            b""  # of the generation encoded last, and of the last solution written
+        self._last = -1  # index of the last generation
+        self._population: NDArray[Any] = np.empty(0)  # of it, a view of the planner's memory
+        # of the last generation, and of the last solution written: `array_bytes` of the best
+        self._best = self._written = b""
+        self._best_cost, self._written_cost = np.inf, np.inf
+        self._cpu_ns = 0  # of the replicate, when the last generation was there
+        self._size = 0  # [B] of all messages
+        self._buffer = io.BytesIO()
+        self._writer = Writer(
+            self._buffer,
+            chunk_size=_CHUNK_SIZE,
+            compression=CompressionType.ZSTD,
+            use_summary_offsets=False,
+            enable_crcs=True,
+            enable_data_crcs=True,
         )
-        self._best_cost, self._written_cost, self._size = np.inf, np.inf, 0  # [B] of messages
-        self._messages = Messages([], [], [], [], [])  # that wait to be written
-        self._cpu = 0  # [ns] of the replicate, when the generation encoded last was written
-        self._writer = ContainerWriter(LIBRARY, _CHUNK_SIZE)
+        self._writer.start(library=LIBRARY)
         run = {
             "condition": condition_id,
             "replicate": str(replicate),
@@ -143,152 +134,57 @@ class Log:
             PUBLISHED: CPU_TIME,
         }
         self._writer.add_metadata(RUN, run)
-        self._writer.add_attachment(CONFIG, config_json)
+        self._attach(CONFIG, config_json)
         for name, data in sorted((attachments or {}).items()):
             if name == CONFIG:
                 raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
-            self._writer.add_attachment(name, data)
+            self._attach(name, data)
 
-    def write(self, generation: Generation, cpu_s: float = 0.0) -> None:
-        """Append a generation, and its best solution where that is better than the last written.
-
-        What the planner may change is copied here; encoding waits for a batch of generations,
-        because between kernels its code would run from a cold cache each time (a fifth of a
-        replicate's time).
+    def write(self, block: Block, cpu_s: float = 0.0) -> None:
+        """Append generations, and every best solution that is better than the last written.
 
         Args:
-            generation: The generation.
+            block: The generations.
             cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
                 part of any digest.
         """
-        terms, costs = generation.terms, generation.costs
-        are_floats = costs.dtype.char == "d"
-        if terms.keys() != self._terms.keys():
-            self._terms = {name: TERM + name for name in sorted(terms)}
-        if self._last is None or generation.best is not self._last.best:
-            self._best_bytes = array_bytes(np.asarray(generation.best, dtype=np.float64))
-        self._pending.append(
-            (
-                generation[:_NUM_VALUES],  # without views of the planner's memory
-                terms.copy(),
-                self._terms.items(),
-                costs.tobytes() if are_floats else array_bytes(costs),
-                are_floats,
-                self._best_bytes,
-                self._chain.state(),
-                int(cpu_s * 1e9),
+        self._cpu_ns = int(cpu_s * 1e9)
+        state = self._chain.state() if block.states is None else b""
+        solution: Best | None = None
+        for k, best in enumerate(block.best_of_each):
+            if best is not solution:
+                solution, self._best_cost = best, best.cost
+                self._best = array_bytes(np.asarray(best.solution, np.float64))
+            costs = array_bytes(block.costs[k])
+            link = self._chain.extend(costs, self._best, block.states[k] if block.states else state)
+            row = GenerationRow(
+                index=block.first + k,
+                best_cost=best.cost,
+                best_cost_in_generation=block.lowest[k],
+                mean_cost=block.means[k],
+                std_cost=block.deviations[k],
+                num_feasible=block.num_feasible[k],
+                evaluations=block.evaluations[k],
+                collision_queries=block.collision_queries[k],
+                solved=best.solved,
+                terms=best.terms,
+                chain=link,
             )
-        )
-        self._last = generation
-        if len(self._pending) >= _BATCH:
-            self._flush()
-        if generation.arrays:
-            self._send()  # an attachment comes behind the chunks that end before it
-            for name, array in sorted(generation.arrays.items()):
-                self._writer.add_attachment(name + ARRAY, array_file(array))
-        self._write_fronts(generation)
-
-    def write_stretch(self, stretch: Stretch) -> None:
-        """Append generations as `write` does one by one, in half the time.
-
-        Args:
-            stretch: The generations; its times are CPU times of the replicate.
-        """
-        self._flush()
-        count, standings = len(stretch.lowest), stretch.standings
-        if standings[0].terms.keys() != self._terms.keys():
-            self._terms = {name: TERM + name for name in sorted(standings[0].terms)}
-        places, bests, best_costs, _, _ = zip(*standings, strict=True)
-        solutions = [array_bytes(np.asarray(best, dtype=np.float64)) for best in bests]
-        of_each = chain.from_iterable(
-            map(repeat, solutions, map(sub, (*places[1:], count), places))
-        )
-        costs = chain.from_iterable(map(_rows_as_bytes, stretch.costs))
-        links = self._chain.extend(costs, of_each, stretch.states)
-        data, indices = encode_stretch(stretch, links), range(stretch.first, stretch.first + count)
-        cpu = [int(time * 1e9) for time in stretch.times]
-        self._append(data, indices, cpu, places, solutions, best_costs)
-        self._last, self._best_bytes = stretch.last(), solutions[-1]
-        self._send()
-        self._write_fronts(self._last)
-
-    def _flush(self) -> None:
-        """Encode the generations that wait; a better solution stands behind its generation."""
-        if not self._pending:
-            return
-        values, terms, columns, costs, are_floats, solutions, states, cpu = zip(
-            *self._pending, strict=True
-        )
-        self._pending.clear()
-        links = self._chain.extend(_without_payloads(costs, are_floats), solutions, states)
-        rows = list(map(generation_row, values, terms, columns, links))
-        data, best_costs = encode_generations(rows), [row["best_cost"] for row in rows]
-        indices = [row["index"] for row in rows]
-        self._append(data, indices, cpu, range(len(rows)), solutions, best_costs)
-        self._send()
-
-    def _append(
-        self,
-        data: Sequence[bytes],
-        indices: Sequence[int],
-        cpu: Sequence[int],
-        places: Iterable[int],
-        solutions: Sequence[bytes],
-        best_costs: Sequence[float],
-    ) -> None:
-        """Let the messages of generations wait, with each better solution behind its generation.
-
-        Args:
-            data: Of the generations, encoded.
-            indices: Of the generations.
-            cpu: Times of the replicate [ns].
-            places: Of the generations whose best may be better than that before.
-            solutions: `array_bytes` of the best, one for each of these places.
-            best_costs: Likewise, their costs.
-        """
-        begin, count = 0, 0
-        if not self._channels:  # each is registered with its first message
-            self._add(GENERATION_TOPIC, GenerationRow, indices[:1], data[:1], cpu[:1])
-            self._best, self._best_cost, self._cpu = solutions[0], best_costs[0], cpu[0]
-            self._write_solution(indices[0])
-            begin = 1
-        messages = self._numbered(GENERATION_TOPIC, indices[begin:], data[begin:], cpu[begin:])
-        for k, self._best, self._best_cost in zip(places, solutions, best_costs, strict=True):
-            if self._best_cost < self._written_cost:
-                solution = [self._encoded_solution(indices[k])]
-                one = self._numbered(SOLUTION_TOPIC, indices[k : k + 1], solution, cpu[k : k + 1])
-                count, at = count + 1, k - begin + 1 + count
-                columns: Iterable[tuple[list[Any], list[Any]]] = zip(messages, one, strict=True)
-                for column, value in columns:
-                    column[at:at] = value
-        self._cpu = cpu[-1]
-        self._wait(messages)
-
-    def _send(self) -> None:
-        """Write the messages that wait."""
-        self._size += sum(map(len, self._messages.data))
-        if self._size > MAX_LOG:
-            raise LogTooLarge(
-                f"log: its generations and solutions take more than {MAX_LOG // MEGABYTE} MB, "
-                "more than any log that is read; run fewer generations"
-            )
-        self._writer.add_messages(self._messages)
-        identities = {channel.id: channel.identity for channel in self._channels.values()}
-        channels = map(identities.__getitem__, self._messages.channels)
-        self._content.update_all(channels, self._messages)
-        self._messages = Messages([], [], [], [], [])
-
-    def _write_fronts(self, generation: Generation) -> None:
-        """Append the fronts of a generation that has some."""
-        if generation.criteria is not None:
-            for population, criteria in enumerate(generation.criteria):
-                self.write_front(FrontRow(generation.index, population, criteria.T))
+            data, is_first = encode_generation(row), not self._channels
+            self._add(GENERATION_TOPIC, GenerationRow, row.index, data, tuple(row.terms))
+            if is_first or self._best_cost < self._written_cost:
+                self._write_solution(row.index)
+            self._last = row.index
+        self._population = block.population(block.num_generations - 1)
+        for name, array in sorted((block.arrays or {}).items()):
+            self._attach(name + ARRAY, array_file(array))
+        if block.criteria is not None:
+            for population, criteria in enumerate(block.criteria):
+                self.write_front(FrontRow(self._last, population, criteria.T))
 
     def write_front(self, front: FrontRow) -> None:
         """Append the front of a population of the generation last written."""
-        self._flush()
-        data = encode_front(front)
-        self._add(FRONT_TOPIC, FrontRow, [front.generation], [data], [self._cpu])
+        self._add(FRONT_TOPIC, FrontRow, front.generation, encode_front(front))
 
     def finish(self, summary: ReplicateSummary) -> Finished:
         """Close the log.
@@ -302,8 +198,7 @@ class Log:
         Raises:
             ValueError: No generation was written, or the summary is of another replicate.
         """
-        self._flush()
-        if self._last is None:
+        if self._last < 0:
             raise ValueError("finish: no generation was written")
         if (summary.condition, summary.replicate) != (self._condition_id, self._replicate):
             raise ValueError(
@@ -311,83 +206,46 @@ class Log:
                 "of this"
             )
         if self._best != self._written or self._best_cost != self._written_cost:
-            self._write_solution(self._last.index)
-        self._send()
-        summary = summary._replace(digest=self._chain.finish(self._last.population))
+            self._write_solution(self._last)
+        summary = summary._replace(digest=self._chain.finish(self._population))
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
         self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
-        return Finished(self._writer.finish(), summary)
+        self._writer.finish()
+        return Finished(self._buffer.getvalue(), summary)
 
     def _write_solution(self, index: int) -> None:
-        self._add(
-            SOLUTION_TOPIC, SolutionRow, [index], [self._encoded_solution(index)], [self._cpu]
-        )
-
-    def _encoded_solution(self, index: int) -> bytes:
-        """Return the message of the best solution, which is then written."""
         self._written, self._written_cost = self._best, self._best_cost
-        return encode_solution(index, self._best_cost, np.frombuffer(self._best))
+        data = encode_solution(index, self._best_cost, np.frombuffer(self._best))
+        self._add(SOLUTION_TOPIC, SolutionRow, index, data)
+
+    def _attach(self, name: str, data: bytes) -> None:
+        is_json = name.endswith(".json")
+        kind = "application/json" if is_json else "application/octet-stream"
+        self._writer.add_attachment(0, 0, name, kind, data)
 
     def _add(
-        self,
-        topic: str,
-        record: type,
-        generations: Sequence[int],
-        data: Sequence[bytes],
-        cpu: Sequence[int],
+        self, topic: str, record: type, generation: int, data: bytes, terms: tuple[str, ...] = ()
     ) -> None:
-        """Let messages of one channel wait to be written.
+        """Append a message.
 
         Args:
-            topic: Of the channel.
-            record: Whose messages it has.
-            generations: Their indices.
-            data: Encoded.
-            cpu: Times of the replicate [ns].
+            topic: Of its channel, which is registered with its first message.
+            record: Whose messages the channel has.
+            generation: Its index.
+            data: The message.
+            terms: Names of the terms that the record has besides its fields.
         """
-        if topic not in self._channels:  # registered with its first message: the terms are known
-            self._send()  # the channel comes behind the messages before
-            terms = tuple(self._terms) if record is GenerationRow else ()
-            self._channels[topic] = _Channel(self._writer, topic, record, terms)
-        self._wait(self._numbered(topic, generations, data, cpu))
-
-    def _numbered(
-        self, topic: str, generations: Sequence[int], data: Sequence[bytes], cpu: Sequence[int]
-    ) -> Messages:
-        """Return messages of a channel with their numbers; see `_add`."""
-        channel = self._channels[topic]
-        first, channel.num_messages = channel.num_messages, channel.num_messages + len(data)
-        return Messages(
-            [channel.id] * len(data),
-            [*range(first, channel.num_messages)],
-            [int(generation) * _TICK for generation in generations],
-            [*cpu],
-            [*data],
-        )
-
-    def _wait(self, messages: Messages) -> None:
-        """Let messages wait to be written."""
-        columns: Iterable[tuple[list[Any], list[Any]]] = zip(self._messages, messages, strict=True)
-        for column, values in columns:
-            column += values
-
-
-def _rows_as_bytes(block: NDArray[Any]) -> Iterable[bytes]:
-    """Return `array_bytes` of each row of a block of costs."""
-    is_plain = block.dtype.char == "d" and block.size > 0
-    if not is_plain or np.isnan(block.item(block.argmin())):  # argmin finds a NaN first
-        return map(array_bytes, block)
-    content = block.tobytes()
-    size = len(content) // len(block)
-    return [content[begin : begin + size] for begin in range(0, len(content), size)]
-
-
-def _without_payloads(costs: Sequence[bytes], are_floats: Sequence[bool]) -> Sequence[bytes]:
-    """Return costs as `array_bytes` does, of which those that are floats hold NaNs of any bits."""
-    if not any_nan(compress(costs, are_floats)):
-        return costs
-    return [
-        array_bytes(np.frombuffer(each)) if is_float else each
-        for each, is_float in zip(costs, are_floats, strict=True)
-    ]
+        self._size += len(data)
+        if self._size > MAX_LOG:
+            raise LogTooLarge(
+                f"log: its generations and solutions take more than {MAX_LOG // MEGABYTE} MB, "
+                "more than any log that is read; run fewer generations"
+            )
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
+        log_time, sequence = int(generation) * _TICK, channel.num_messages
+        channel.num_messages += 1
+        self._writer.add_message(channel.id, log_time, data, self._cpu_ns, sequence)
+        self._content.update(channel.identity, log_time, sequence, data)

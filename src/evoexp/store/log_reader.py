@@ -1,54 +1,50 @@
 """Logs read back: whole and verified, or only the part that is asked for.
 
-Every reader first checks all bytes against their checksums; only `read_log` also decodes every
-message and compares the content digest. Limits of size and memory stand in `container`.
+Every reader first checks all bytes, see `log_bounds`; only `read_log` also decodes every message
+and compares the content digest.
 """
 
 import errno
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-)
+import orjson
+from mcap.reader import SeekingReader
+from mcap.records import Message
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
 from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store.container import (
-    MAX_ATTACHMENTS,
-    MAX_LOG,
-    MAX_METADATA,
-    Container,
-    Message,
-    check,
-    parse,
-    unreadable_is_corrupt,
-)
 from evoexp.store.digests import ContentDigest, channel_identity
+from evoexp.store.log_bounds import MAX_LOG, check, unreadable_is_corrupt
 from evoexp.store.messages import (
+    NONFINITE,
+    TERM,
     decode_environment,
     decode_front,
     decode_generation,
     decode_solution,
     decode_summary,
     decode_values,
+    field_types,
+    restore,
 )
 
 Source = str | PathLike[str] | bytes
+Value = TypeVar("Value")
+DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}
+_DECODE: dict[str, Callable[[bytes], Any]] = {
+    written.GENERATION_TOPIC: decode_generation,
+    written.SOLUTION_TOPIC: decode_solution,
+    written.FRONT_TOPIC: decode_front,
+}
 
 
 class LogContents(NamedTuple):
@@ -80,14 +76,83 @@ class LogContents(NamedTuple):
         }
 
 
-class _Index(NamedTuple):
-    """The summary section of a log: where everything is."""
+class _OpenLog:
+    """A log of a run, checked, behind mcap's reader."""
 
-    metadata: dict[str, int]  # name → offset
-    channels: dict[str, Channel]  # by topic
-    schemas: dict[int, str]  # id → name
-    chunks: list[ChunkIndex]
-    attachments: dict[str, int]  # name → offset
+    def __init__(self, content: bytes, name: str) -> None:
+        """Read its metadata.
+
+        Raises:
+            CorruptLog: It is a log of another program, or of another version.
+        """
+        self.name = name
+        self.reader = SeekingReader(BytesIO(content), validate_crcs=True)
+        records = [(each.name, each.metadata) for each in self.reader.iter_metadata()]
+        self._metadata = self._by_name(records)
+        if written.RUN not in self._metadata:
+            raise CorruptLog(
+                f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'"
+            )
+        self.run = self._metadata[written.RUN]
+        version = int(self.run["schema_version"])
+        if version != written.SCHEMA_VERSION:
+            age = "a newer" if version > written.SCHEMA_VERSION else "an older"
+            raise OtherVersion(
+                f"{name}: written by {age} evoexp: schema version {version}, this one reads "
+                f"{written.SCHEMA_VERSION}"
+            )
+
+    def metadata(self, record: str) -> dict[str, str]:
+        """Return a record of metadata."""
+        if record not in self._metadata:
+            raise CorruptLog(f"{self.name}: incomplete: no metadata record '{record}'")
+        return self._metadata[record]
+
+    def summary(self) -> ReplicateSummary:
+        """Return the summary of the replicate."""
+        summary = decode_summary(self.metadata(written.SUMMARY))
+        if (summary.condition, summary.replicate) != (
+            self.run["condition"],
+            int(self.run["replicate"]),
+        ):
+            raise CorruptLog(f"{self.name}: altered: its summary is of another replicate")
+        return summary
+
+    def attachments(self) -> dict[str, bytes]:
+        """Return all attachments by name."""
+        return self._by_name([(each.name, each.data) for each in self.reader.iter_attachments()])
+
+    def messages(self, topic: str) -> Iterator[Message]:
+        """Yield the messages of a topic in the order of the file."""
+        for _, _, message in self.reader.iter_messages(topic, log_time_order=False):
+            yield message
+
+    def _by_name(self, records: list[tuple[str, Value]]) -> dict[str, Value]:
+        """Return records by their names, of which none stands there twice."""
+        if len(by_name := dict(records)) < len(records):
+            raise CorruptLog(f"{self.name}: altered: it holds records of the same name")
+        return by_name
+
+
+@contextmanager
+def _opened(source: Source) -> Iterator[_OpenLog]:
+    """Check a log of a run and open it; a body that cannot be read is a damaged log."""
+    content, name = _content(source)
+    check(content, name)
+    with unreadable_is_corrupt(name):
+        yield _OpenLog(content, name)
+
+
+def _content(source: Source) -> tuple[bytes, str]:
+    """Return the bytes of a log and the name that errors give it."""
+    if isinstance(source, bytes):
+        return source, "log"
+    try:
+        return read_bounded(Path(source), MAX_LOG), str(source)
+    except OSError as error:
+        if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
+            raise
+        raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
 
 
 def read_log(source: Source) -> LogContents:
@@ -100,31 +165,37 @@ def read_log(source: Source) -> LogContents:
         CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be
             opened.
     """
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        run = _run(container, index, name)
-        attachments = _attachments(container, index, name)
-        messages, content_digest = _messages(container, index)
-        generations = messages.get(written.GENERATION_TOPIC, ())
-        metadata = _metadata(container, index, written.SUMMARY, name)
-        if content_digest != decode_values(metadata)[written.CONTENT_DIGEST]:
+    with _opened(source) as log:
+        attachments = log.attachments()
+        rows: dict[str, list[Any]] = {topic: [] for topic in _DECODE}
+        digest, cpu_ns = ContentDigest(), list[int]()
+        for schema, channel, message in log.reader.iter_messages(log_time_order=False):
+            name = schema.name if schema is not None else ""
+            identity = channel_identity(channel.topic, name, channel.message_encoding)
+            digest.update(identity, message.log_time, message.sequence, message.data)
+            if channel.topic in rows:
+                rows[channel.topic].append(_DECODE[channel.topic](message.data))
+            if channel.topic == written.GENERATION_TOPIC:
+                cpu_ns.append(message.publish_time)
+        content_digest = digest.hexdigest()
+        if content_digest != decode_values(log.metadata(written.SUMMARY))[written.CONTENT_DIGEST]:
             raise CorruptLog(
-                f"{name}: altered: its messages do not give the content digest it carries"
+                f"{log.name}: altered: its messages do not give the content digest it carries"
             )
-        summary = _summary(metadata, run, name)
+        is_timed = log.run.get(written.PUBLISHED) == written.CPU_TIME
+        summary = log.summary()
         return LogContents(
-            condition_id=run["condition"],
+            condition_id=log.run["condition"],
             config_json=attachments.pop(written.CONFIG),
             replicate=summary.replicate,
-            generations=[decode_generation(m.data) for m in generations],
-            solutions=[decode_solution(m.data) for m in messages.get(written.SOLUTION_TOPIC, ())],
-            fronts=[decode_front(m.data) for m in messages.get(written.FRONT_TOPIC, ())],
+            generations=rows[written.GENERATION_TOPIC],
+            solutions=rows[written.SOLUTION_TOPIC],
+            fronts=rows[written.FRONT_TOPIC],
             summary=summary,
-            environment=decode_environment(_metadata(container, index, written.ENVIRONMENT, name)),
+            environment=decode_environment(log.metadata(written.ENVIRONMENT)),
             attachments=attachments,
             content_digest=content_digest,
-            cpu_s=_cpu_times(run, generations),
+            cpu_s=1e-9 * np.array(cpu_ns, np.float64) if is_timed else np.full(len(cpu_ns), np.nan),
         )
 
 
@@ -134,21 +205,22 @@ def read_summary(source: Source) -> ReplicateSummary:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        run = _run(container, index, name)
-        return _summary(_metadata(container, index, written.SUMMARY, name), run, name)
+    with _opened(source) as log:
+        return log.summary()
 
 
-@contextmanager
-def indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
-    """Open a log of a run by its index; a body that cannot be read is a damaged log."""
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        _run(container, index, name)
-        yield container, index
+def checked_summary(source: Path | bytes, condition_id: str, replicate: int) -> ReplicateSummary:
+    """Return the summary of the log in the place of a replicate, or of its bytes.
+
+    Raises:
+        CorruptLog: The log is damaged, or it is of another condition or replicate.
+    """
+    summary = read_summary(source)
+    if (summary.condition, summary.replicate) != (condition_id, replicate):
+        theirs = f"replicate {summary.replicate} of {summary.condition[:12]}"
+        name = "log" if isinstance(source, bytes) else source
+        raise CorruptLog(f"{name}: holds {theirs}, which does not belong here")
+    return summary
 
 
 def read_solution(source: Source) -> SolutionRow:
@@ -157,11 +229,39 @@ def read_solution(source: Source) -> SolutionRow:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    with indexed(source) as (container, index):
-        channel_id = index.channels[written.SOLUTION_TOPIC].id
-        last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
-        solutions = [m.data for m in container.messages_at(last) if m.channel_id == channel_id]
-        return decode_solution(solutions[-1])
+    with _opened(source) as log:
+        for _, _, message in log.reader.iter_messages(written.SOLUTION_TOPIC, reverse=True):
+            return decode_solution(message.data)
+        raise ValueError("no solution")
+
+
+def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
+    """Return the records on /generation, without their chain, as arrays (generations,) by name.
+
+    A term that a generation does not have is NaN there.
+
+    Raises:
+        CorruptLog: As `read_log`, except that the content digest is not compared.
+    """
+    with _opened(source) as log:
+        rows = [orjson.loads(message.data) for message in log.messages(written.GENERATION_TOPIC)]
+        names = dict.fromkeys(name for row in rows for name in row if name.startswith(TERM))
+        # rows that each have terms of their own: their table would be larger than any log
+        if len(names) * len(rows) * 8 > MAX_LOG:
+            raise ValueError(f"{len(rows)} generations with {len(names)} different terms")
+        for row in rows:
+            if NONFINITE in row:
+                restore(row)
+        fields = field_types(GenerationRow).items()
+        columns = {
+            name: np.array([row[name] for row in rows], dtype=DTYPES[kind])
+            for name, kind in fields
+            if name != "chain"
+        }
+        return columns | {
+            name: np.array([row.get(name, np.nan) for row in rows], dtype=np.float64)
+            for name in sorted(names)
+        }
 
 
 def array_names(source: Source) -> list[str]:
@@ -170,10 +270,9 @@ def array_names(source: Source) -> list[str]:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    with indexed(source) as (_, index):
-        return sorted(
-            n.removesuffix(written.ARRAY) for n in index.attachments if n.endswith(written.ARRAY)
-        )
+    with _opened(source) as log:
+        names = sorted(log.attachments())
+        return [name.removesuffix(written.ARRAY) for name in names if name.endswith(written.ARRAY)]
 
 
 def read_array(source: Source, array: str) -> NDArray[Any]:
@@ -187,10 +286,10 @@ def read_array(source: Source, array: str) -> NDArray[Any]:
         KeyError: There is none of this name.
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    with indexed(source) as (container, index):
-        offset = index.attachments.get(array + written.ARRAY)
-        if offset is not None:
-            return decode_array(parse(Attachment, container.record_at(offset)).data)
+    with _opened(source) as log:
+        data = log.attachments().get(array + written.ARRAY)
+        if data is not None:
+            return decode_array(data)
     raise KeyError(array)
 
 
@@ -202,124 +301,3 @@ def decode_array(data: bytes) -> NDArray[Any]:
     """
     with unreadable_is_corrupt("attached array"):
         return read_npy(data)
-
-
-def _open(source: Source) -> tuple[Container, str]:
-    if isinstance(source, bytes):
-        return check(source, "log"), "log"
-    try:
-        return check(read_bounded(Path(source), MAX_LOG), str(source)), str(source)
-    except OSError as error:
-        if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
-            raise
-        raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
-
-
-def _index(container: Container) -> _Index:
-    index = _Index({}, {}, {}, [], {})
-    for opcode, body in container.summary_section():
-        _refuse_long(body)
-        if opcode == Opcode.METADATA_INDEX:
-            entry = parse(MetadataIndex, body)
-            index.metadata[entry.name] = entry.offset
-        elif opcode == Opcode.CHANNEL:
-            channel = parse(Channel, body)
-            index.channels[channel.topic] = channel
-        elif opcode == Opcode.SCHEMA:
-            schema = parse(Schema, body)
-            index.schemas[schema.id] = schema.name
-        elif opcode == Opcode.CHUNK_INDEX:
-            index.chunks.append(parse(ChunkIndex, body))
-        elif opcode == Opcode.ATTACHMENT_INDEX:
-            attachment = parse(AttachmentIndex, body)
-            index.attachments[attachment.name] = attachment.offset
-    if len(index.attachments) > MAX_ATTACHMENTS:
-        raise ValueError(f"{len(index.attachments)} attachments; {MAX_ATTACHMENTS} are read")
-    return index
-
-
-def _refuse_long(body: bytes) -> None:
-    if len(body) > MAX_METADATA:
-        raise ValueError(f"{len(body)} bytes in a record of at most {MAX_METADATA}")
-
-
-def _metadata(container: Container, index: _Index, record: str, name: str) -> dict[str, str]:
-    if record not in index.metadata:
-        raise CorruptLog(f"{name}: incomplete: no metadata record '{record}'")
-    body = container.record_at(index.metadata[record])
-    _refuse_long(body)
-    metadata: dict[str, str] = parse(Metadata, body).metadata
-    return metadata
-
-
-def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
-    """Return the metadata of a log's condition and replicate.
-
-    A log of another program or version is refused.
-    """
-    if written.RUN not in index.metadata:
-        raise CorruptLog(
-            f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'"
-        )
-    run = _metadata(container, index, written.RUN, name)
-    version = int(run["schema_version"])
-    if version != written.SCHEMA_VERSION:
-        age = "a newer" if version > written.SCHEMA_VERSION else "an older"
-        raise OtherVersion(
-            f"{name}: written by {age} evoexp: schema version {version}, this one reads "
-            f"{written.SCHEMA_VERSION}"
-        )
-    return run
-
-
-def _summary(metadata: dict[str, str], run: dict[str, str], name: str) -> ReplicateSummary:
-    summary = decode_summary(metadata)
-    if (summary.condition, summary.replicate) != (run["condition"], int(run["replicate"])):
-        raise CorruptLog(f"{name}: altered: its summary is of another replicate")
-    return summary
-
-
-def _attachments(container: Container, index: _Index, name: str) -> dict[str, bytes]:
-    """Return all attachments by name, after comparing the index with the records it points to.
-
-    Readers that follow the index must see what is verified here: no record stands in the file
-    twice, under another name or beside its index.
-    """
-    attachments, metadata, chunks = list[tuple[int, Attachment]](), list[tuple[str, int]](), []
-    for opcode, start, body in container.places():
-        if opcode == Opcode.ATTACHMENT:
-            attachments.append((start, parse(Attachment, body)))
-        elif opcode == Opcode.METADATA:
-            _refuse_long(body)
-            metadata.append((parse(Metadata, body).name, start))
-        elif opcode == Opcode.CHUNK:
-            chunks.append(start)
-    named = [(each.name, start) for start, each in attachments]
-    if named != list(index.attachments.items()) or metadata != list(index.metadata.items()):
-        raise CorruptLog(f"{name}: altered: its index does not tell the records that it holds")
-    if chunks != [chunk.chunk_start_offset for chunk in index.chunks]:
-        raise CorruptLog(f"{name}: altered: its index does not tell the messages that it holds")
-    return {each.name: each.data for _, each in attachments}
-
-
-def _messages(container: Container, index: _Index) -> tuple[dict[str, list[Message]], str]:
-    """Return all messages by topic, and the content digest over them."""
-    digest = ContentDigest()
-    topics = {channel.id: topic for topic, channel in index.channels.items()}
-    identities = {
-        c.id: channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
-        for c in index.channels.values()
-    }
-    messages: dict[str, list[Message]] = {}
-    for message in container.messages():
-        channel_id, sequence, log_time, _, data = message
-        digest.update(identities[channel_id], log_time, sequence, data)
-        messages.setdefault(topics[channel_id], []).append(message)
-    return messages, digest.hexdigest()
-
-
-def _cpu_times(run: dict[str, str], generations: Sequence[Message]) -> FloatArray:
-    """Return the CPU time at which each generation was logged [s]; NaN where logs do not tell."""
-    if run.get(written.PUBLISHED) != written.CPU_TIME:
-        return np.full(len(generations), np.nan)
-    return 1e-9 * np.array([message.publish_time for message in generations], dtype=np.float64)

@@ -62,6 +62,25 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
     return orjson.dumps({"title": title, "type": "object", "properties": properties})
 
 
+def encode_generation(row: GenerationRow) -> bytes:
+    """Return the message of one generation; its terms stand in alphabetical order."""
+    values: dict[str, Any] = {
+        "index": int(row.index),
+        "best_cost": float(row.best_cost),
+        "best_cost_in_generation": float(row.best_cost_in_generation),
+        "mean_cost": float(row.mean_cost),
+        "std_cost": float(row.std_cost),
+        "num_feasible": int(row.num_feasible),
+        "evaluations": int(row.evaluations),
+        "collision_queries": int(row.collision_queries),
+        "solved": bool(row.solved),
+    }
+    for name in sorted(row.terms):
+        values[TERM + name] = float(row.terms[name])
+    values["chain"] = row.chain
+    return _encode(values)
+
+
 def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
     """Return the message of one solution; `values` is flat."""
     row = {"generation": int(generation), "cost": float(cost), "values": values}
@@ -111,7 +130,7 @@ def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
 
 
 def decode_generation(data: bytes) -> GenerationRow:
-    """Undo `generation_texts.encode_generations`."""
+    """Undo `encode_generation`."""
     fields, terms = _decode(GenerationRow, data)
     return GenerationRow(**fields, terms=terms)
 
@@ -136,7 +155,6 @@ def decode_front(data: bytes) -> FrontRow:
 
 
 def _encode(row: dict[str, Any]) -> bytes:
-    """Return a row whose texts are names of ours: none holds what a missing number looks like."""
     text = orjson.dumps(row, option=orjson.OPT_SERIALIZE_NUMPY)
     if b"null" in text:  # a number is not finite
         return orjson.dumps(flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)

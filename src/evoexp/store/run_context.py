@@ -11,7 +11,6 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
 from evoexp.errors import StoreError
@@ -83,7 +82,9 @@ def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[s
 def with_context(table: pa.Table, context: Mapping[str, Any]) -> pa.Table:
     """Return a table with constant columns added at its end."""
     for name, value in context.items():
-        table = table.append_column(name, _constant(value, table.num_rows))
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        constant = pa.repeat(float(value) if is_number else value, table.num_rows)
+        table = table.append_column(name, constant)
     return table
 
 
@@ -110,17 +111,3 @@ def _settings(config: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             text = json.dumps(value)
             if len(text) <= LONGEST and "{" not in text:
                 yield dotted, text
-
-
-def _constant(value: Any, count: int) -> pa.Array:
-    """Return a column of one value; `pa.array` would load pandas."""
-    if isinstance(value, str):
-        text = value.encode()
-        ends = np.arange(count + 1, dtype=np.int32) * len(text)
-        buffers = [None, pa.py_buffer(ends), pa.py_buffer(text * count)]
-        return pa.Array.from_buffers(pa.string(), count, buffers)
-    if isinstance(value, bool):
-        bits = np.packbits(np.full(count, value), bitorder="little")
-        return pa.Array.from_buffers(pa.bool_(), count, [None, pa.py_buffer(bits)])
-    numbers = np.full(count, float(value))
-    return pa.Array.from_buffers(pa.float64(), count, [None, pa.py_buffer(numbers)])

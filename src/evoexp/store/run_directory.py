@@ -10,28 +10,31 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
-from evoexp.store.damage import warn
-from evoexp.store.files import remove_stale, sync_directory, write_file, write_files
+from evoexp.store.files import remove_stale, sync_directory, warn, write_file, write_files
 from evoexp.store.identity import (
     CONFIG,
     MANIFEST,
+    PLANS,
     REPLICATES,
     RESTORED,
     TAKEN,
     DamagedFile,
+    Plan,
+    as_json,
     checked_manifest,
     config_id,
     lost_files,
     read,
     read_object,
+    read_plans,
     restored_manifest,
     stored_id,
     whole_log,
 )
-from evoexp.store.plans import PLANS, Plan, as_json, read_plans
-from evoexp.store.run_lock import RunLock
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
 COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
@@ -62,7 +65,7 @@ class RunDirectory:
             raise ValueError(f"condition_id: must be 64 hex digits, was {condition_id!r}")
         self.condition_id = condition_id
         self.path = Path(outputs) / "runs" / condition_id[:HASH_LENGTH]
-        self._lock = RunLock(self.path / ".lock")
+        self._lock = FileLock(self.path / ".lock", timeout=0)
 
     @property
     def hash12(self) -> str:
@@ -104,32 +107,22 @@ class RunDirectory:
         Raises:
             StoreError: The directory is damaged or belongs to another condition.
         """
-        create_all([(self, config_json, manifest, files or {})])
-
-    def _missing_files(
-        self, config_json: bytes, manifest: Mapping[str, Any], files: Mapping[str, bytes]
-    ) -> dict[Path, bytes]:
-        """Return the files that `create` writes, and make their directories.
-
-        The configuration comes behind the files that it refers to.
-        """
         if hashlib.sha256(config_json).hexdigest() != self.condition_id:
             raise ValueError(f"config_json: is not of condition {self.hash12}")
-        self.replicates.mkdir(parents=True, exist_ok=True)
-        missing = {}
-        for name, content in files.items():
-            if not (self.path / name).exists():
-                (self.path / name).parent.mkdir(exist_ok=True)
-                missing[self.path / name] = content
         if (self.path / CONFIG).exists():
             self.check()
-        else:
-            missing[self.path / CONFIG] = config_json
-        if not (self.path / MANIFEST).exists():
-            missing[self.path / MANIFEST] = (
-                json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
-            )
-        return missing
+        text = json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
+        # the configuration comes behind the files that it refers to
+        contents = {**(files or {}), CONFIG: config_json, MANIFEST: text}
+        missing = {
+            self.path / name: content
+            for name, content in contents.items()
+            if not (self.path / name).exists()
+        }
+        for folder in {self.replicates, *(path.parent for path in missing)}:
+            folder.mkdir(parents=True, exist_ok=True)
+        write_files(missing)
+        sync_directory(self.path.parent)
 
     def check(self) -> None:
         """Raise unless `config.json` is this very condition's.
@@ -220,6 +213,12 @@ class RunDirectory:
         """
         return read_plans(self.path / PLANS)
 
+    def num_planned(self, asked: int = 0) -> int:
+        """Return how many replicates were ever asked for, now included, or are there."""
+        with suppress(DamagedFile):
+            asked = max([asked, *(plan.num_replicates for plan in self.plans())])
+        return max([asked, *(1 + k for k in self.completed() | self.failed())])
+
     def note_plan(self, num_replicates: int) -> None:
         """Note that so many replicates are asked for, before any of them runs; more than ever."""
         plans = self.plans()
@@ -255,16 +254,11 @@ class RunDirectory:
         return failure
 
     def write_logs(self, contents: Mapping[int, bytes]) -> None:
-        """Keep finished logs: their replicates are completed from now on, whatever failed before.
-
-        Several at once are cheaper than one by one.
-        """
+        """Keep finished logs: their replicates are completed, whatever failed before."""
         self.replicates.mkdir(parents=True, exist_ok=True)
-        folder = os.fspath(self.replicates)  # joining Paths takes as long as a rename
-        write_files({f"{folder}/{_log_name(k)}": content for k, content in contents.items()})
+        write_files({self.log_path(k): content for k, content in contents.items()})
         for replicate in contents:
-            with suppress(FileNotFoundError):
-                os.unlink(f"{folder}/{_failure_name(replicate)}")
+            self.failure_path(replicate).unlink(missing_ok=True)
 
     def write_failure(self, replicate: int, reason: str, traceback: str) -> None:
         """Keep why a replicate failed: one line, and the traceback."""
@@ -283,13 +277,28 @@ class RunDirectory:
             Busy: Another process, or another object of this one, holds the run.
         """
         self.path.mkdir(parents=True, exist_ok=True)
-        if not self._lock.acquire():
-            raise Busy(f"run {self.hash12}: another process is writing it now ({self.path})")
+        try:
+            self._lock.acquire()
+        except Timeout:
+            text = f"run {self.hash12}: another process is writing it now ({self.path})"
+            raise Busy(text) from None
         try:
             remove_stale((self.path, self.replicates))
             yield
         finally:
             self._lock.release()
+
+    def is_being_written(self) -> bool:
+        """Return whether another process holds the lock of the run; it is free again at once."""
+        try:
+            if (self.path / ".lock").exists():
+                with FileLock(self.path / ".lock", timeout=0):
+                    return False
+        except Timeout:
+            return True
+        except OSError:  # outputs that may only be read
+            pass
+        return False
 
     def _matching(self, pattern: re.Pattern[str]) -> set[int]:
         try:
@@ -307,9 +316,8 @@ def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
         Busy: One of them is held; none is then held from here.
     """
     with ExitStack() as stack:
-        for _, run in sorted(
-            {run.path: run for run in runs}.items(), key=lambda item: item[1].condition_id
-        ):
+        distinct = {run.path: run for run in runs}.values()
+        for run in sorted(distinct, key=lambda run: run.condition_id):
             stack.enter_context(run.lock())
         yield
 
@@ -317,17 +325,9 @@ def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
 def create_all(
     runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapping[str, bytes]]],
 ) -> None:
-    """Create several runs as `RunDirectory.create` does, given its arguments, in one batch.
-
-    Raises:
-        StoreError: A directory is damaged or belongs to another condition; no file is then written.
-    """
-    missing: dict[Path, bytes] = {}
+    """Create several runs as `RunDirectory.create` does, given its arguments."""
     for run, config_json, manifest, files in runs:
-        missing |= run._missing_files(config_json, manifest, files)
-    write_files(missing)
-    for root in {path.parents[1] for path in missing if path.name == "config.json"}:
-        sync_directory(root)
+        run.create(config_json, manifest, files)
 
 
 def outputs_root() -> Path:

@@ -5,12 +5,10 @@ It notes size and time of every log behind it, and which ones are damaged and ha
 
 import contextlib
 import errno
-import functools
 import json
 import os
 import stat
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,12 +17,12 @@ import pyarrow.parquet as pq
 
 from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import ReplicateSummary, flatten
-from evoexp.store.container import check
-from evoexp.store.damage import checked_summary, listed, reason, set_aside, warn
-from evoexp.store.files import write_file
+from evoexp.store.files import listed, reason, set_aside, warn, write_file
+from evoexp.store.log_bounds import check
+from evoexp.store.log_reader import checked_summary
+from evoexp.store.messages import field_types
 from evoexp.store.run_context import run_context, with_context
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.summary_columns import BASE, schema_of, table_of
 
 Runs = RunDirectory | Iterable[RunDirectory]
 Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
@@ -49,11 +47,12 @@ class _Summary(NamedTuple):
         return [name for name in self.files if not (name in self.damaged and _is_log(name))]
 
 
-ROWS_AT_ONCE = 5000  # that a table is built from
 _VERSION = 6  # of the table's columns and notes; another one is rebuilt
 _KEY = b"evoexp"
-# tables that this process wrote or read
-_KNOWN: dict[Path, tuple[tuple[int, int, int], _Summary]] = {}
+_PLAIN = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+_ARROW: dict[Any, pa.DataType] = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
+# the columns of all tables; those of the terms follow
+BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSummary).items()]
 
 
 def write_summary(
@@ -78,11 +77,18 @@ def write_summary(
         One row per replicate, done or failed, in order; a failed one has condition, replicate,
         status and stop_reason, everything else is null. A damaged log has no row.
     """
+    known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
+    return _written(run, known, thorough).table
+
+
+def _written(
+    run: RunDirectory, written: Mapping[str, ReplicateSummary], thorough: bool
+) -> _Summary:
+    """Bring `summary.parquet` up to date, see `write_summary`; return what it then holds."""
     stored, stamps = _stored(run), _stamps(run)
     if stored is not None and _is_current(run, stored, stamps, thorough):
-        return stored.table
-    known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
-    summary = _build(run, stored, stamps, known, thorough)
+        return stored
+    summary = _build(run, stored, stamps, written, thorough)
     sink = pa.BufferOutputStream()
     context = run_context(run.path, run.condition_id, summary.table.column_names)
     table = with_context(summary.table, context)
@@ -90,8 +96,7 @@ def write_summary(
     if run.summary_path.is_dir():
         set_aside(run.summary_path)
     write_file(run.summary_path, sink.getvalue().to_pybytes())
-    _KNOWN[run.summary_path] = _stamp(run.summary_path), summary
-    return summary.table
+    return summary
 
 
 def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
@@ -112,7 +117,7 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
     summaries = [_current(run, thorough) for run in directories]
     for run, summary in zip(directories, summaries, strict=True):
         _tell_damage(run, summary)
-    tables = [table_of([], pa.schema(BASE)), *(summary.table for summary in summaries)]
+    tables = [pa.schema(BASE).empty_table(), *(summary.table for summary in summaries)]
     table = pa.concat_tables(tables, promote_options="default")
     names = [field.name for field in BASE]
     return table.select(
@@ -162,7 +167,7 @@ def table_damage(run: RunDirectory) -> str:
     if not os.path.lexists(path) or _stored(run) is not None:
         return ""
     try:
-        _stamp(path)
+        _refuse_no_file(path)
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             notes = json.loads(file.read().schema.metadata[_KEY])
         if notes["condition"] != run.condition_id:
@@ -185,16 +190,18 @@ def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -
     if stored is None:
         return []
     rows = dict(zip(stored.row_names, stored.table.to_pylist(), strict=True))
-    known = [name for name in summaries if name in rows and stored.files[name] == stamps.get(name)]
-    given = [flatten(summaries[name]) for name in known]
-    columns = {*stored.table.column_names}
-    wider = [name for name, row in zip(known, given, strict=True) if not row.keys() <= columns]
-    expected = table_of(given, stored.table.schema).to_pylist()
-    return wider + [
+    return [
         name
-        for name, row in zip(known, expected, strict=True)
-        if name not in wider and repr(row) != repr(rows[name])
+        for name, summary in summaries.items()
+        if name in rows
+        and stored.files[name] == stamps.get(name)
+        and _given(rows[name]) != _given(flatten(summary))
     ]
+
+
+def _given(row: Mapping[str, Any]) -> str:
+    """Return a row as text, so that NaN is equal to itself; without what it does not have."""
+    return repr(sorted((name, value) for name, value in row.items() if value is not None))
 
 
 def replicate_of(name: str) -> int:
@@ -211,17 +218,15 @@ def distinct(runs: Runs) -> list[RunDirectory]:
 def _current(run: RunDirectory, thorough: bool = False) -> _Summary:
     stored, stamps = _stored(run), _stamps(run)
     if not stamps:
-        notes = _notes(run, _Summary(_empty_table(), {}, {}))
-        return _Summary(_empty_table().replace_schema_metadata(notes), {}, {})
+        return _table_of(run, {}, {}, {})
     if stored is not None and _is_current(run, stored, stamps, thorough):
         return stored
     try:
         with run.lock():
-            write_summary(run, thorough=thorough)
-            return _KNOWN[run.summary_path][1]
+            return _written(run, {}, thorough)
     except (Busy, OSError):
         # another process writes the run, or it may only be read: the rows are the same
-        return _build(run, stored, stamps, thorough=thorough)
+        return _build(run, stored, stamps, {}, thorough)
 
 
 def _is_current(run: RunDirectory, stored: _Summary, stamps: Stamps, thorough: bool) -> bool:
@@ -275,15 +280,9 @@ def _status(entry: os.DirEntry[str]) -> os.stat_result:
 
 
 def _stored(run: RunDirectory) -> _Summary | None:
-    """Return the table as it was written, or None where there is no valid one of this version.
-
-    What this process has written or read is not read again, as long as the file is the same.
-    """
+    """Return the table as it was written, or None where there is no valid one of this version."""
     try:
-        stamp = _stamp(run.summary_path)
-        known = _KNOWN.get(run.summary_path)
-        if known is not None and known[0] == stamp:
-            return known[1]
+        _refuse_no_file(run.summary_path)
         with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
             table = file.read(use_threads=False)  # starting them takes longer than most tables
         notes = json.loads(table.schema.metadata[_KEY])
@@ -294,85 +293,63 @@ def _stored(run: RunDirectory) -> _Summary | None:
         valid = valid and len(summary.row_names) == table.num_rows
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
         return None
-    if not valid:
-        return None
-    _KNOWN[run.summary_path] = stamp, summary
-    return summary
+    return summary if valid else None
 
 
-def _stamp(path: Path) -> tuple[int, int, int]:
-    """Return the identity, size and time of a file, which change when it is written again.
-
-    Raises:
-        OSError: It is no file: a pipe would keep its reader for ever.
-    """
-    status = path.stat()
-    if not stat.S_ISREG(status.st_mode):
+def _refuse_no_file(path: Path) -> None:
+    """Raise an OSError unless a path is a regular file: a pipe would keep its reader for ever."""
+    if not stat.S_ISREG(path.stat().st_mode):
         raise OSError(errno.EINVAL, "not a regular file", str(path))
-    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _build(
     run: RunDirectory,
     stored: _Summary | None,
     stamps: Stamps,
-    written: Mapping[str, ReplicateSummary] | None = None,
-    thorough: bool = False,
+    written: Mapping[str, ReplicateSummary],
+    thorough: bool,
 ) -> _Summary:
-    """Build the table of a run, some thousand rows at a time."""
-    written, kept = written or {}, dict[str, int]()  # file → its row of the stored table
+    """Build the table of a run; rows of files that did not change are taken from the stored one."""
+    kept: dict[str, dict[str, Any]] = {}
     if stored is not None:
-        old, intact = stored.files, _intact(run, stored) if thorough else {}
+        intact = _intact(run, stored) if thorough else {}
         kept = {
-            name: k
-            for k, name in enumerate(stored.row_names)
-            if stamps.get(name) == old[name]
+            name: row
+            for name, row in zip(stored.row_names, stored.table.to_pylist(), strict=True)
+            if stamps.get(name) == stored.files[name]
             and name not in stored.damaged
-            and name not in written
             and intact.get(name, True)
         }
-    tables = [_rows(stored.table, list(kept.values()))] if stored is not None else []
-    names, damaged = list(kept), dict[str, str]()
-    new = (name for name in stamps if name not in kept)
-    while some := list(islice(new, ROWS_AT_ONCE)):
-        rows = []
-        for name in some:
-            row, why = (flatten(written[name]), "") if name in written else _row(run, name)
+    rows, damaged = dict[str, dict[str, Any]](), dict[str, str]()
+    for name in stamps:
+        if name in written:
+            rows[name] = flatten(written[name])
+        elif name in kept:
+            rows[name] = kept[name]
+        else:
+            row, why = _row(run, name)
             if row:
-                rows.append(row)
-                names.append(name)
+                rows[name] = row
             if why:
                 damaged[name] = why
-        tables.append(table_of(rows, schema_of({key for row in rows for key in row})))
-    table = pa.concat_tables([_empty_table(), *tables], promote_options="default")
-    places = dict(zip(names, range(len(names)), strict=True))
-    order = [places[name] for name in stamps if name in places]
-    table = _rows(table, order)
-    # A stored row has null for the terms that only its neighbours have.
-    schema = schema_of({key for key in table.column_names if table[key].null_count < len(table)})
-    damaged = {name: damaged[name] for name in stamps if name in damaged}
-    whole = _Summary(table.select(schema.names).combine_chunks(), stamps, damaged)
-    return whole._replace(table=whole.table.replace_schema_metadata(_notes(run, whole)))
+    return _table_of(run, rows, stamps, damaged)
 
 
-def _notes(run: RunDirectory, whole: _Summary) -> dict[bytes, bytes]:
-    """Return the notes of a table: its version, its columns, the files that it follows from."""
+def _table_of(
+    run: RunDirectory, rows: Mapping[str, dict[str, Any]], stamps: Stamps, damaged: dict[str, str]
+) -> _Summary:
+    """Return rows as a table with its notes: version, columns, the files that it follows from."""
+    known = {field.name for field in BASE}
+    # a stored row has null for the terms that only its neighbours have
+    terms = {
+        key for row in rows.values() for key, value in row.items() if value is not None
+    } - known
+    schema = pa.schema(BASE + [pa.field(name, pa.float64()) for name in sorted(terms)])
     notes = {"version": _VERSION, "condition": run.condition_id}
-    notes |= {"files": whole.files, "damaged": whole.damaged, "columns": whole.table.column_names}
-    return {_KEY: json.dumps(notes).encode()}
-
-
-@functools.cache
-def _empty_table() -> pa.Table:
-    """Return the table of a run without logs: a batch asks for it several times per run."""
-    return table_of([], schema_of(()))
-
-
-def _rows(table: pa.Table, which: list[int]) -> pa.Table:
-    """Return rows of a table; all of them without looking, which would load more of pyarrow."""
-    if which == list(range(len(table))):
-        return table
-    return table.take(pa.array(which, pa.int64()))
+    notes |= {"files": stamps, "damaged": damaged, "columns": schema.names}
+    table = pa.Table.from_pylist(list(rows.values()), schema)
+    table = table.replace_schema_metadata({_KEY: json.dumps(notes).encode()})
+    return _Summary(table, stamps, damaged)
 
 
 def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:

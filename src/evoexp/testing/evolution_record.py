@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.records import FloatArray, Generation
+from evoexp.records import FloatArray, Generation, generations
 from evoexp.store.log import Finished
 
 
@@ -69,7 +69,7 @@ def evolution(condition: Condition) -> EvolutionRecord:
     untouched = rng.bit_generator.state
     planner, problem = condition.prepare()
     watched, population = [], np.empty(0)
-    for generation in planner.evolve(problem, rng):
+    for generation in generations(planner.evolve(problem, rng)):
         population = generation.population
         copied = generation._replace(costs=generation.costs.copy(), population=population.copy())
         watched.append(Watched(copied, generation.best, np.array(generation.best)))

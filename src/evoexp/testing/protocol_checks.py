@@ -109,11 +109,11 @@ def randomness_comes_from_the_given_generator(condition: Condition) -> None:
     demand(drawn, condition, must, "a generator that nobody drew from")
     planner, problem = condition.prepare()
     rng = condition.rng(0)
-    generations = planner.evolve(problem, rng)
-    next(generations)
+    evolution_of_two = planner.evolve(problem, rng)
+    next(evolution_of_two)
     state = rng.bit_generator.state
     for call in (planner.motion, planner.evaluate):
         call(problem, np.array(evolution(condition).last.best))
     must = "motion and evaluate must not draw from a generator that evolve was given"
     demand(rng.bit_generator.state == state, condition, must, "another state of it")
-    generations.close()
+    evolution_of_two.close()

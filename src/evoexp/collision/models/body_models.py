@@ -20,7 +20,6 @@ from evoexp.collision.models.body_covers import (
 from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
 from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.models.kept_covers import kept_sphere_cover
-from evoexp.collision.models.kept_pairs import kept_body_pairs
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.records import FloatArray
@@ -45,13 +44,11 @@ class CollisionModel(Component):
         """Return the cover of a robot's body, for which spheres may be given."""
         return self.cover(item)
 
-    def bind(self, assembly: Assembly, made_from: bytes | None = None) -> "BodyModel":
+    def bind(self, assembly: Assembly) -> "BodyModel":
         """Return the model of a robot.
 
         Args:
             assembly: The robot.
-            made_from: All that robot and covers are made from: its pairs of bodies are kept on disk
-                under it; None: they are sorted here.
 
         Raises:
             UnsupportedShape: If a body cannot be covered.
@@ -63,10 +60,7 @@ class CollisionModel(Component):
         shapes = cover_shapes(
             covers, [item.parentJoint for item in assembly.geometry.geometryObjects]
         )
-        if made_from is None:
-            pairs = body_pairs(assembly, shapes)
-        else:
-            pairs = kept_body_pairs(assembly, shapes, made_from)
+        pairs = body_pairs(assembly, shapes)
         return BodyModel(assembly, tuple(covers), shapes, pairs, self.asked)
 
 

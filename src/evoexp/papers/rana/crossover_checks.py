@@ -6,7 +6,7 @@ import numpy as np
 
 from evoexp.papers.rana import motions
 from evoexp.planners.via_point_ga.planner import ViaPointGa
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, generations
 from evoexp.report.kit import Comparison, ConditionResults, Results, markdown
 
 GENERATIONS = (0, 10, 50)  # whose pairs of strings are looked at
@@ -63,7 +63,7 @@ def kept_apart(condition: ConditionResults) -> dict[int, float]:
     planner, problem = condition.planner, motions.problem(condition)
     draw = np.random.Generator(np.random.PCG64(0))
     found = {}
-    for generation in planner.evolve(problem, condition.condition.rng(0)):
+    for generation in generations(planner.evolve(problem, condition.condition.rng(0))):
         if generation.index in GENERATIONS:
             strings = generation.population[:, :, : planner.ga.population_size]
             found[generation.index] = _share_apart(

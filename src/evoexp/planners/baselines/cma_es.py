@@ -8,7 +8,7 @@ import numpy as np
 from evoexp.planners.baselines.real_vectors import check_real_coded, real_vectors
 from evoexp.planners.planner import COPIES, Keeper, Reproducibility, num_values
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.validation import Count, Positive
 
 SEEDS = 2**32  # of numpy's older generators
@@ -50,7 +50,7 @@ class CmaEs(WrappedPlanner):
         check_real_coded(self.planner, self.component)
         return super().prepare(robot, scenario)
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation after the other, of one distribution or of several in turn."""
         from cmaes import CMA
 

@@ -8,7 +8,7 @@ import numpy as np
 from evoexp.errors import SettingError
 from evoexp.planners.planner import Keeper
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.validation import Count
 
 
@@ -44,7 +44,7 @@ class MultiStart(WrappedPlanner):
             raise SettingError("control", must, self.component)
         return problem
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one start after the other: fresh samples, then their sweeps."""
         planner, keeper = self.planner, Keeper()
         population: FloatArray | None = None

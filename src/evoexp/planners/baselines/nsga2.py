@@ -10,7 +10,7 @@ from evoexp.errors import SettingError, nearest
 from evoexp.planners.baselines.real_vectors import check_real_coded, real_vectors
 from evoexp.planners.planner import COPIES, Judgement, Keeper, Reproducibility, num_values
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.validation import Component, Count
 
 SEEDS = 2**32  # of numpy's older generators
@@ -57,7 +57,7 @@ class Nsga2(WrappedPlanner, Component):
                 raise SettingError(f"control.objectives[{k}]", must, name, nearest(name, names))
         return problem
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation after the other."""
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.core.problem import Problem

@@ -16,7 +16,7 @@ from evoexp.planners.baselines.real_vectors import (
 )
 from evoexp.planners.planner import COPIES, Keeper, num_values
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.validation import Count, Positive, Rate
 
 
@@ -56,7 +56,7 @@ class Stomp(WrappedPlanner):
         check_real_coded(self.planner, self.component)
         return super().prepare(robot, scenario)
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation of noisy trajectories after the other, the middle one first."""
         planner, keeper = self.planner, Keeper()
         vectors = real_vectors(planner, problem, planner.sample(problem, rng, self.num_drawn))

@@ -7,7 +7,6 @@ from evoexp.evolution.crossover import num_single_point_uniforms
 from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.evolution.mutation import num_allele_uniforms
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.named_tuples import plain
 from evoexp.planners.coevolution.kernels import Breeding, breed, renew
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated
@@ -44,7 +43,6 @@ class Breeder:
             frozen=ga.hall_frozen,
             exclusive=moving if self.by_genome else np.ones_like(moving),
         )
-        self._rules, self._memory = plain(self.rules), plain(self.hall)
         self._nobody = np.full(len(moving), -1)
 
     def renew_hall(self, populations: FloatArray, found: Evaluated, best: BestTeam) -> None:
@@ -60,9 +58,9 @@ class Breeder:
                 found.collisions,
                 found.teamable,
                 best.individuals if self.by_genome else self._nobody,
-                self._memory,
+                self.hall,
                 self.num_teams,
-                self._rules,
+                self.rules,
                 self.by_genome,
             )
 
@@ -74,7 +72,7 @@ class Breeder:
         count = ga.population_size - ga.num_elites - self.num_teams
         teams = self.hall.teams[: self.num_teams]
         uniforms = rng.random((self.num_moving, num_uniforms(count)))
-        breed(uniforms, populations, costs, self._moving, teams, tuple(self.breeding(index)), bred)
+        breed(uniforms, populations, costs, self._moving, teams, self.breeding(index), bred)
         return bred
 
     def breeding(self, index: int) -> Breeding:

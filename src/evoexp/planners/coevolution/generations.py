@@ -9,21 +9,19 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from evoexp.evolution.best_team import BestTeam, CollisionCounts
-from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.named_tuples import named, plain
-from evoexp.numeric.random_stream import DrawnByNeed
+from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.coevolution.breeder import Breeder, num_uniforms
 from evoexp.planners.coevolution.kernels import NOT_FINITE, Breeding, breed, evaluate_lines, renew
 from evoexp.planners.coevolution.link_problem import Problem
-from evoexp.planners.coevolution.teams import Evaluated, Standing, survey
-from evoexp.planners.planner import Candidate, Keeper
-from evoexp.planners.stretches import Stretches, stretch_of
-from evoexp.records import BoolArray, FloatArray, Generation, IntArray
+from evoexp.planners.coevolution.teams import Evaluated, survey
+from evoexp.planners.planner import Candidate
+from evoexp.planners.table_search import TableSearch, generations_per_call
+from evoexp.records import BoolArray, FloatArray, IntArray
 
-STRETCH = 8  # generations that are computed in one call, at most
-CACHED = 1 << 18  # [B] collisions of a stretch: beyond that, fewer generations are
+PER_CALL = 8  # generations that are computed in one call, at most
+CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
 
 
 class Table(NamedTuple):
@@ -105,9 +103,9 @@ def evolve(
     uniforms: FloatArray,
     rates: FloatArray,
     first: int,
-    plain_task: tuple[Any, ...],
-    plain_heredity: tuple[Any, ...],
-    plain_table: tuple[Any, ...],
+    task: Task,
+    heredity: Heredity,
+    table: Table,
     num_teams: IntArray,
     summaries: FloatArray,
     taken: IntArray,
@@ -118,18 +116,17 @@ def evolve(
         uniforms: Numbers for all of them, in the order in which they are used.
         rates: (generations,) of mutation, on the way to each of them.
         first: The present generation; −1 if the initial one is to be judged.
-        plain_task: `Task`, made plain.
-        plain_heredity: `Heredity`, made plain.
-        plain_table: `Table`, made plain, written.
+        task: See `Task`.
+        heredity: See `Heredity`.
+        table: See `Table`, written.
         num_teams: (1,) teams that the hall holds, changed.
-        summaries: (places, 4) written: see `Stretches`.
+        summaries: (places, 4) written: see `TableSearch`.
         taken: (generations,) written: how many numbers each of them took.
 
     Returns:
         False if a coordinate is not finite.
     """
-    task, heredity = named(Task, plain_task), named(Heredity, plain_heredity)
-    table, (summaries, taken) = borrowed(named(Table, plain_table)), borrowed((summaries, taken))
+    table, summaries, taken = borrowed((table, summaries, taken))
     places, robots, _, count = table.populations.shape
     nobody, blocked = np.full(robots, -1), np.zeros((robots, count), dtype=np.int64)
     begin = 0
@@ -195,9 +192,9 @@ def follow(
             table.collisions[own],
             table.own[own],
             table.teams[own] if heredity.by_genome else nobody,
-            (hall.teams, hall.ages, hall.collisions, hall.costs),
+            hall,
             num_teams[0],
-            (rules.memory, rules.frozen, rules.exclusive),
+            rules,
             heredity.by_genome,
         )
     breeding, moving = heredity.breeding, 0
@@ -210,7 +207,7 @@ def follow(
         table.costs[own],
         heredity.moving,
         hall.teams[: num_teams[0]],
-        (
+        Breeding(
             breeding.num_elites,
             breeding.inverse,
             breeding.crossover_rate,
@@ -224,13 +221,13 @@ def follow(
     return int(moving * numbers)
 
 
-def stretch(robots: int, count: int) -> int:
+def per_call(robots: int, count: int) -> int:
     """Return how many generations of populations of `count` are best computed in one call."""
     collisions = robots * (robots - 1) * count * count  # [B] of one generation
-    return stretch_of(STRETCH, collisions, CACHED)
+    return generations_per_call(PER_CALL, collisions, CACHED)
 
 
-class TeamSearch(Stretches):
+class TeamSearch(TableSearch):
     """One run of robots that are lines, and memory for its generations."""
 
     def __init__(self, planner: Any, problem: Problem) -> None:
@@ -242,7 +239,7 @@ class TeamSearch(Stretches):
         """
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size
-        super().__init__(ga, stretch(robots, self._size))
+        super().__init__(ga, per_call(robots, self._size))
         genes, breeder = 2 * planner.num_configurations, Breeder(ga, problem.moving)
         numbers = np.array([num_uniforms(count) for count in range(self._size + 1)])
         self._most, self._rate = breeder.num_moving * int(numbers.max()), ga.mutation_rate_at
@@ -264,28 +261,20 @@ class TeamSearch(Stretches):
             breeder.by_genome,
             numbers,
         )
-        memory = plain(self._table), np.zeros(1, dtype=np.int64), self.summaries
-        self._arguments = (plain(task), plain(heredity), *memory)
+        num_teams = np.zeros(1, dtype=np.int64)
+        self._arguments = (task, heredity, self._table, num_teams, self.summaries)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial populations."""
         self._table.populations[0] = self._planner.sample(self._problem, rng, self._size)
         self._evolve(np.empty(0), -1, 0)
-        self.drawn = self._ahead = DrawnByNeed(rng, self._most)
+        self._ahead = DrawnAhead(rng, self._most)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations with numbers that are drawn ahead."""
-        self._ahead.took(self._evolve(self._ahead.draw(last - first), first, last))
-
-    def record(self, keeper: Keeper, place: int, evaluated: int, is_last: bool) -> Generation:
-        """Keep the best team of a generation, and return its record."""
-        best, mean, std, num_feasible = self.summaries[place].tolist()
-        statistics = CostStatistics(int(best), mean, std)
-        standing = Standing(self._best_team(place), statistics, int(num_feasible))
-        recorded: Generation = self._planner.recorded(
-            keeper, self._problem, self._table.populations[place], self._evaluated(place), standing
-        )
-        return recorded
+        taken = self._evolve(self._ahead.draw(last - first), first, last)
+        self.states = self._ahead.take(taken)
+        return last
 
     def lowest(self, places: IntArray) -> FloatArray:
         """Return the costs of the best teams."""
@@ -303,9 +292,9 @@ class TeamSearch(Stretches):
         evaluations = len(self._problem.start) * self._size
         return evaluations, self._planner.queries(self._problem, self._size)
 
-    def population(self, place: int, is_last: bool) -> FloatArray:
+    def population(self, index: int) -> FloatArray:
         """Return the populations."""
-        return np.asarray(self._table.populations[place])
+        return np.asarray(self._table.populations[index % self.num_places])
 
     def criteria(self, place: int) -> FloatArray | None:
         """Return the criteria of all individuals."""

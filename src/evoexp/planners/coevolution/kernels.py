@@ -1,6 +1,6 @@
 """Breeding and measuring co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from evoexp.evolution.selection import (
     spin_roulette,
 )
 from evoexp.numeric.compilation import kernel
-from evoexp.numeric.named_tuples import named
 from evoexp.objectives.motion_criteria import measure_motions
 from evoexp.records import BoolArray, FloatArray, IntArray
 
@@ -53,7 +52,7 @@ def breed(
     costs: FloatArray,
     moving: BoolArray,
     teams: IntArray,
-    plain_breeding: tuple[Any, ...],
+    breeding: Breeding,
     bred: FloatArray,
 ) -> None:
     """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
@@ -65,10 +64,9 @@ def breed(
         costs: (robots, individuals).
         moving: (robots,) false for robots that stand still: their populations are copied.
         teams: (teams, robots) members of the hall; written: their places in the next populations.
-        plain_breeding: `Breeding`, made plain.
+        breeding: See `Breeding`.
         bred: Like populations, written.
     """
-    breeding = named(Breeding, plain_breeding)
     size, num_elites = populations.shape[2], breeding.num_elites
     count = size - num_elites - len(teams)
     last = count + 2 * (count // 2)  # behind the numbers of cross-over
@@ -122,9 +120,9 @@ def renew(
     collisions: CollisionCounts,
     own: FloatArray,
     best: IntArray,
-    plain_hall: tuple[Any, ...],
+    hall: Hall,
     num_teams: int,
-    plain_rules: tuple[Any, ...],
+    rules: HallRules,
     by_genome: bool,
 ) -> int:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
@@ -135,16 +133,15 @@ def renew(
         collisions: See `best_team`.
         own: See `best_team`.
         best: (robots,) see `renew_hall`, as the rest.
-        plain_hall: `Hall`, made plain, with room for as many teams as it may hold.
+        hall: See `Hall`, with room for as many teams as it may hold.
         num_teams: Teams of the hall at present.
-        plain_rules: `HallRules`, made plain: which teams it takes.
+        rules: See `HallRules`: which teams it takes.
         by_genome: Whether copies count as one individual, and members of the hall are offered
             again; else members of the hall and their copies leave the fronts.
 
     Returns:
         Number of teams that the hall holds then.
     """
-    hall, rules = named(Hall, plain_hall), named(HallRules, plain_rules)
     count = populations.shape[2]
     fronts = np.empty((len(populations), count), dtype=np.bool_)
     for robot in range(len(populations)):

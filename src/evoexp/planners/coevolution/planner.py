@@ -35,7 +35,7 @@ from evoexp.planners.coevolution.teams import Evaluated, Judgement, Standing
 from evoexp.planners.departures import of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
@@ -109,14 +109,14 @@ class Coevolution(PlannerDefaults, Component):
         check_ends(problem)
         return problem
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
         at_once = problem.collision.is_lines and self.ga.restart_after is None
         if at_once and not self.answers_are_proven:
-            return TeamSearch(self, problem).run(rng)
+            return TeamSearch(self, problem).blocks(rng)
         return self._step_by_step(problem, rng)
 
-    def _step_by_step(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def _step_by_step(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Evolve as `evolve` does, kernel by kernel."""
         ga, keeper, breeder = self.ga, Keeper(), Breeder(self.ga, problem.moving)
         proven, waiting = ProvenTeams(self, problem) if self.answers_are_proven else None, 0
@@ -146,8 +146,8 @@ class Coevolution(PlannerDefaults, Component):
         populations: FloatArray,
         found: Evaluated,
         standing: Standing,
-    ) -> Generation:
-        """Keep the best team if it is better, and return the generation's record.
+    ) -> Block:
+        """Keep the best team if it is better, and return a block of the generation.
 
         Args:
             keeper: Of the run.

@@ -6,23 +6,26 @@ add to this operator.
 """
 
 import functools
-from functools import partial
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
 
 from evoexp.errors import SettingError
+from evoexp.numeric.random_stream import Draws
 from evoexp.paths.grids import NodeArray
-from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_generations
 from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population, candidate_of
 from evoexp.planners.grid_path_ga.path_operators import Scratch
-from evoexp.planners.grid_path_ga.planner import BLOCK, STRETCH, GridPathGa, Problem, trimmed
+from evoexp.planners.grid_path_ga.planner import BLOCK, GridPathGa, Problem, trimmed
 from evoexp.planners.planner import Candidate
-from evoexp.planners.stretches import BlockStretches, run_of
+from evoexp.planners.table_search import TableSearch
 from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.records import Block
 from evoexp.validation import Count
+
+PER_CALL = 64  # generations that are computed in one call, at most
 
 
 class PathClimbing(WrappedPlanner):
@@ -54,19 +57,24 @@ class PathClimbing(WrappedPlanner):
             raise SettingError("control.num_paths", must, self.num_paths)
         return super().prepare(robot, scenario)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the random walks, then the climbing paths after every generation's trials."""
         assert isinstance(self.planner, GridPathGa), "prepare refuses other planners"
         by_pieces = not self.planner.revisits and Ledger.is_fit(problem.world)
-        search = partial(_ByPieces if by_pieces else _Climbing, self.planner, problem)
-        return run_of(partial(search, self.num_paths), rng, 1, STRETCH)
+        kind = _ByPieces if by_pieces else _Climbing
+        return kind(self.planner, problem, self.num_paths).blocks(rng)
 
 
-class _Climbing(BlockStretches):
-    """One run, and memory for its kernels; whole paths are measured."""
+class _Climbing(TableSearch):
+    """One run, and memory for its kernels; whole paths are measured.
 
-    def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int, stretch: int) -> None:
-        super().__init__(planner.ga, stretch, 1, BLOCK)
+    A block ends with the last generation for which the numbers drawn before it suffice: each
+    generation is recorded with the generator as it is behind that generation.
+    """
+
+    def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int) -> None:
+        super().__init__(planner.ga, PER_CALL)
+        self._draws, self._is_used_up = Draws(BLOCK), True
         self._planner, self._problem, self._num_paths = planner, problem, num_paths
         width, self._trial = problem.fields.grid.num_nodes + 1, 0
         self._found = Population(
@@ -86,18 +94,27 @@ class _Climbing(BlockStretches):
         self._paths = Population(paths, np.ascontiguousarray(results[:, best]))
         self._note(0)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
-        """Make the trials of generations; draw more numbers whenever they do not suffice."""
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Make the trials of generations, of one at least; draw more numbers only for that one."""
+        while True:
+            if self._is_used_up:
+                self._draws.extend(rng)
+            reached = self._climb(first, last)
+            self._is_used_up = reached < last
+            if reached > first:
+                return reached
+
+    def _climb(self, first: int, last: int) -> int:
+        """Make trials as far as the numbers suffice; return the last generation that is done."""
         task = self._problem.world, self._planner.objective.weights, not self._planner.revisits
         arguments = *task, self._paths, *self._scratch
         for generation in range(first + 1, last + 1):
             until = generation * self._ga.num_offspring
-            while True:
-                self._trial = kernels.climb(self._draws.block, self._trial, until, *arguments)
-                if self._trial == until:
-                    break
-                self.draw_for(rng, generation - 1)
+            self._trial = kernels.climb(self._draws.block, self._trial, until, *arguments)
+            if self._trial < until:
+                return generation - 1
             self._note(generation % self.num_places)
+        return last
 
     @functools.cached_property
     def _scratch(self) -> tuple[Population, Scratch]:
@@ -114,9 +131,11 @@ class _Climbing(BlockStretches):
         results = self._found.results[place, :, individual]
         return candidate_of(self._found.paths[place], self._problem.world, results)
 
-    def population(self, place: int, is_last: bool) -> NodeArray:
-        """Return the paths as they are now; those of the last generation without rests of rows."""
-        return trimmed(self._paths.paths) if is_last else self._paths.paths
+    def population(self, index: int) -> NodeArray:
+        """Return the paths of the generation computed last without rests of rows."""
+        paths = self._paths.paths
+        is_there = index == self.reached and self._trial == index * self._ga.num_offspring
+        return trimmed(paths) if is_there else paths[:0]
 
 
 class _ByPieces(_Climbing):
@@ -127,23 +146,19 @@ class _ByPieces(_Climbing):
         super().begin(rng)
         self._ledger = Ledger.of(self._paths.paths, self._problem.world)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
-        """Make the trials of generations; draw more numbers whenever they do not suffice."""
+    def _climb(self, first: int, last: int) -> int:
+        """Make trials as far as the numbers suffice; return the last generation that is done."""
         trials = self._ga.num_offspring
-        while True:
-            self._trial = climb_generations(
-                self._draws.block,
-                self._trial,
-                (first, last),
-                trials,
-                self._problem.world,
-                self._planner.objective.weights,
-                self._paths,
-                self._ledger,
-                self._found,
-                self.summaries,
-            )
-            if self._trial == last * trials:
-                return
-            first = self._trial // trials
-            self.draw_for(rng, first)
+        self._trial = climb_generations(
+            self._draws.block,
+            self._trial,
+            (first, last),
+            trials,
+            self._problem.world,
+            self._planner.objective.weights,
+            self._paths,
+            self._ledger,
+            self._found,
+            self.summaries,
+        )
+        return self._trial // trials if self._trial < last * trials else last

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.generator_memory import STATE_SIZE, state_reader
+from evoexp.numeric.generator_state import STATE_SIZE, state_bytes
 from evoexp.numeric.pcg64 import Twin, Words
 from evoexp.paths.erased_walks import Exits, Sums, follow_all, room_for_exits, walk_all
 from evoexp.paths.grid_choices import Choices
@@ -23,13 +23,14 @@ from evoexp.planners.grid_path_ga.kernels import (
     note,
 )
 from evoexp.planners.planner import Candidate
-from evoexp.planners.stretches import IndividualStretches
+from evoexp.planners.table_search import TableSearch
 from evoexp.records import FloatArray
 
 if TYPE_CHECKING:
     from evoexp.planners.grid_path_ga.planner import GridPathGa, Problem
 
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
+PER_CALL = 64  # generations of random paths that are drawn in one call, at most
 FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 
 
@@ -129,26 +130,23 @@ class PathSampling:
         task = problem.choices, problem.ends, blocks, problem.world.tolls
         drawing = Drawing(*task, self._exits, self._sums, paths)
         longest = kernel(self._twin.words, drawing, *arguments)
-        self._twin.follow(self._twin.words)
+        self._twin.follow(self._twin.words[:2])
         return paths[:, : longest + 1]
 
 
-class RandomPaths(IndividualStretches):
+class RandomPaths(TableSearch):
     """Generations of random paths, each drawn anew: the random search of a path search."""
 
-    def __init__(
-        self, planner: "GridPathGa", problem: "Problem", rng: np.random.Generator, stretch: int
-    ) -> None:
+    def __init__(self, planner: "GridPathGa", problem: "Problem", rng: np.random.Generator) -> None:
         """Begin a run.
 
         Args:
             planner: Whose sampling, cost and budget are used.
             problem: For which `PathSampling.is_fit` holds.
             rng: The generator.
-            stretch: Generations drawn per call; only the paths of the last one of them are kept.
         """
         ga = planner.ga
-        super().__init__(ga, stretch)
+        super().__init__(ga, PER_CALL)
         self._weights, self._world = planner.objective.weights, problem.world
         self._sampling = PathSampling(problem, rng, ga.population_size)
         self._best = np.empty((self.num_places, problem.fields.grid.num_nodes + 1), dtype=np.int32)
@@ -158,9 +156,13 @@ class RandomPaths(IndividualStretches):
         """Draw the initial population."""
         self._draw(self._ga.population_size, 0, 0)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
-        """Draw generations."""
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Draw generations; only the paths of the last one of them are kept."""
         self._draw(self._ga.num_offspring, first + 1, last)
+        rest = state_bytes(rng.bit_generator)[STATE_SIZE:]
+        places = np.arange(first + 1, last + 1) % self.num_places
+        self.states = [state.tobytes() + rest for state in self._states[places, ::-1]]
+        return last
 
     def _draw(self, count: int, first: int, last: int) -> None:
         if first < 2:  # more paths are drawn at first than later
@@ -175,19 +177,13 @@ class RandomPaths(IndividualStretches):
             self._states,
         )
 
-    def follow(self, rng: np.random.Generator, first: int, last: int) -> list[bytes]:
-        """Return the generator's states; it followed at once. See `IndividualStretches`."""
-        rest = state_reader(rng.bit_generator)()[STATE_SIZE:]
-        places = np.arange(first + 1, last + 1) % self.num_places
-        return [state.tobytes() + rest for state in self._states[places, ::-1]]
-
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return the best path of a generation, and its terms."""
         return candidate_of(self._best[place], self._world, self._results[place, :, individual])
 
-    def population(self, place: int, is_last: bool) -> NodeArray:
-        """Return the paths of the last generation that was drawn."""
-        return self._paths
+    def population(self, index: int) -> NodeArray:
+        """Return the paths of the last generation that was drawn, nothing of those before it."""
+        return self._paths if index == self.reached else self._paths[:0]
 
 
 def first_words(count: int, fewest: int) -> int:

@@ -11,7 +11,7 @@ coordinates of its nodes, x, y[, z] of one after the other, as many as there are
 """
 
 import functools
-from functools import partial
+from collections.abc import Iterator
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -20,7 +20,6 @@ from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.pcg64 import draw_words
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choices_of
@@ -29,7 +28,6 @@ from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import Walkers, choice_table
-from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
@@ -51,8 +49,8 @@ from evoexp.planners.grid_path_ga.path_sampling import (
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import ScaledStretches, run_of
-from evoexp.records import BoolArray, FloatArray
+from evoexp.planners.table_search import ScaledSearch
+from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
@@ -61,8 +59,8 @@ FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out 
 FEWER_NODES = 1200  # and the choices of walks between them: at most 6 MB
 MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
-ROUND = 8  # generations; see `BlockStretches`: another number needs another revision
-STRETCH = 64  # generations that are computed in one call where they are recorded together: rounds
+KEPT = 2  # generations whose paths are in memory
+PER_CALL = 8  # generations; see `ScaledSearch`: another number needs another revision
 BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
@@ -153,9 +151,9 @@ class GridPathGa(PlannerDefaults, Component):
         grid = problem.fields.grid
         return int(grid.inner(grid.free).size)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the population of random paths, then every generation."""
-        return run_of(partial(_Search, self, problem), rng, ROUND, STRETCH)
+        return _Search(self, problem).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
@@ -168,18 +166,18 @@ class GridPathGa(PlannerDefaults, Component):
             self._fill_one_by_one(problem, rng, paths)
         return trimmed(paths)
 
-    def random_run(self, problem: Problem, rng: np.random.Generator) -> Run | None:
+    def random_run(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block] | None:
         """Return generations of random paths, see `PlannerDefaults`."""
         if self.revisits or not PathSampling.is_fit(problem, rng) or not self.ga.num_offspring:
             return None
-        return run_of(partial(RandomPaths, self, problem, rng), rng, 1, STRETCH)
+        return RandomPaths(self, problem, rng).blocks(rng)
 
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths."""
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
         num_words = first_words(len(paths), int(problem.moves.steps[problem.ends[0]]))
         while walkers.complete < len(paths):
-            walkers.go(draw_words(rng, num_words))
+            walkers.go(rng.bit_generator.random_raw(num_words))
             num_words = FEW_WORDS
 
     def _fill_one_by_one(
@@ -257,9 +255,9 @@ class GridPathGa(PlannerDefaults, Component):
         ]
 
     def memory(self, problem: Problem) -> int:
-        """Return the memory of the paths of a round, each as long as there are nodes."""
+        """Return the memory of the paths of a call, each as long as there are nodes."""
         width = 4 * (problem.fields.grid.num_nodes + 1)
-        return (ROUND + 2) * width * self.ga.population_size
+        return (KEPT + 2) * width * self.ga.population_size
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of nodes, each its coordinates."""
@@ -269,22 +267,20 @@ class GridPathGa(PlannerDefaults, Component):
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
 
 
-class _Search(ScaledStretches):
+class _Search(ScaledSearch):
     """One run, and memory for its kernels."""
 
-    def __init__(self, planner: GridPathGa, problem: Problem, stretch: int) -> None:
+    def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
-        super().__init__(ga, kernels.evolve, stretch, ROUND, BLOCK)
+        super().__init__(ga, kernels.evolve, PER_CALL, BLOCK)
         self._planner, self._problem = planner, problem
         self._found = Population(
             np.empty((self.num_places, nodes + 1), dtype=np.int32),
             np.empty((self.num_places, RESULTS, size)),
         )
         self.costs = self._found.results[:, COST]
-        # where generations are yielded one by one, a round of whole populations is kept
-        kept = self.num_places if stretch == ROUND else 2
         self._table = Population(
-            np.empty((kept, size, nodes + 1), dtype=np.int32), np.empty((kept, RESULTS, size))
+            np.empty((KEPT, size, nodes + 1), dtype=np.int32), np.empty((KEPT, RESULTS, size))
         )
         breeding = Breeding(
             not planner.revisits,
@@ -310,11 +306,11 @@ class _Search(ScaledStretches):
         results = self._found.results[place, :, individual]
         return candidate_of(self._found.paths[place], self._problem.world, results)
 
-    def population(self, place: int, is_last: bool) -> NodeArray:
-        """Return the paths; of the last generation without the rest of each row."""
-        last, kept = self._ga.num_generations, len(self._table.paths)
-        paths: NodeArray = self._table.paths[last % kept if is_last else place]
-        return trimmed(paths) if is_last else paths
+    def population(self, index: int) -> NodeArray:
+        """Return the paths of one of the generations computed last, without rests of rows."""
+        kept = len(self._table.paths)
+        paths: NodeArray = self._table.paths[index % kept]
+        return trimmed(paths) if index > self.reached - kept else paths[:0]
 
 
 def trimmed(paths: NodeArray) -> NodeArray:

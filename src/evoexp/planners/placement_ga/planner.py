@@ -8,7 +8,8 @@ A population is an array (2, individuals) of strings of bits, a number per angle
 flat: θ1, θ2 [deg].
 """
 
-from functools import lru_cache, partial
+from collections.abc import Iterator
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -23,13 +24,12 @@ from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import of_limits
-from evoexp.planners.gathering import Run
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import IndividualStretches, ScaledStretches, run_of, stretch_of
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.planners.table_search import ScaledSearch, TableSearch, generations_per_call
+from evoexp.records import Block, BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
@@ -38,9 +38,9 @@ from evoexp.validation import Component
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
-ROUND = 16  # generations; see `BlockStretches`: another number needs another revision
-STRETCH = 64  # generations that are computed in one call of a kernel, at most,
-MEMORY = 1 << 21  # [B] or as many as take so much memory, but a round
+PER_CALL = 16  # generations; see `ScaledSearch`: another number needs another revision
+DRAWN_PER_CALL = 64  # generations of random strings that are computed in one call, at most,
+MEMORY = 1 << 21  # [B] or as many as take so much memory
 BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
@@ -133,14 +133,13 @@ class PlacementGa(PlannerDefaults, Component):
         assembly, bodies = _built(robot, scenario)
         return Problem(assembly, model, limits, bodies, scenario.security_margin)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then every generation."""
-        rounds = stretch_of(STRETCH // ROUND, ROUND * self._table_size, MEMORY)
-        return run_of(partial(_Search, self, problem), rng, ROUND, ROUND * rounds)
+        return _Search(self, problem).blocks(rng)
 
-    def random_run(self, problem: Problem, rng: np.random.Generator) -> Run | None:
+    def random_run(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block] | None:
         """Return generations of random strings, see `PlannerDefaults`."""
-        return _RandomStrings(self, problem).run(rng) if self.ga.num_offspring else None
+        return _RandomStrings(self, problem).blocks(rng) if self.ga.num_offspring else None
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random strings, (2, count)."""
@@ -206,8 +205,8 @@ class PlacementGa(PlannerDefaults, Component):
         return beyond + ([] if is_feasible else ["no θ3 reaches the target within all limits"])
 
     def memory(self, problem: Problem) -> int:
-        """Return the memory of the tables of a round."""
-        return (ROUND + 2) * self._table_size
+        """Return the memory of the tables of the generations of a call."""
+        return (PER_CALL + 2) * self._table_size
 
     @property
     def _table_size(self) -> int:
@@ -219,7 +218,7 @@ class PlacementGa(PlannerDefaults, Component):
         return ((),) * GENES
 
 
-class _Strings(IndividualStretches):
+class _Strings(TableSearch):
     """Generations of strings in a table."""
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
@@ -247,17 +246,17 @@ class _Strings(IndividualStretches):
         _, *criteria, branch = self._table.rows[place, FIRST_CRITERION:, individual].tolist()
         return Candidate(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
 
-    def population(self, place: int, is_last: bool) -> IntArray:
+    def population(self, index: int) -> IntArray:
         """Return the strings."""
-        return np.asarray(self._table.strings[place])
+        return np.asarray(self._table.strings[index % self.num_places])
 
 
-class _Search(_Strings, ScaledStretches):
+class _Search(_Strings, ScaledSearch):
     """One run, and memory for its kernels."""
 
-    def __init__(self, planner: PlacementGa, problem: Problem, stretch: int) -> None:
+    def __init__(self, planner: PlacementGa, problem: Problem) -> None:
         ga = planner.ga
-        ScaledStretches.__init__(self, ga, kernels.evolve, stretch, ROUND, BLOCK)
+        ScaledSearch.__init__(self, ga, kernels.evolve, PER_CALL, BLOCK)
         _Strings.__init__(self, planner, problem)
         self._take(ga.population_size)
         breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
@@ -268,22 +267,25 @@ class _RandomStrings(_Strings):
     """Generations of random strings: the random search of a placement search."""
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
-        stretch = stretch_of(STRETCH, planner._table_size, MEMORY)
-        IndividualStretches.__init__(self, planner.ga, stretch)
+        per_call = generations_per_call(DRAWN_PER_CALL, planner._table_size, MEMORY)
+        TableSearch.__init__(self, planner.ga, per_call)
         _Strings.__init__(self, planner, problem)
         self._take(planner.ga.population_size)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
         super().begin(rng)
-        self.drawn = self._ahead = DrawnAhead(rng, GENES * self._ga.num_offspring)
+        self._ahead = DrawnAhead(rng, GENES * self._ga.num_offspring)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Draw and judge generations."""
         if first == 0:  # more strings are drawn at first than later
             self._take(self._ga.num_offspring)
-        uniforms = self._ahead.draw(last - first)
+        count, each = last - first, GENES * self._ga.num_offspring
+        uniforms = self._ahead.draw(count).reshape(count, each)
         kernels.draw_generations(uniforms, first, *self._judging, self._table, self.summaries)
+        self.states = self._ahead.take([each] * count)
+        return last
 
 
 @lru_cache(maxsize=32)

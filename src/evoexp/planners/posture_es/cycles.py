@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.numeric.named_tuples import plain
 from evoexp.numeric.pcg64 import Twin, fill_normals, fill_uniforms
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import (
@@ -27,7 +26,7 @@ from evoexp.planners.posture_es.phase_kernels import (
     Scratch,
     line_of,
     run_cycles,
-    settle_one,
+    settle,
 )
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.records import FloatArray, IntArray
@@ -121,7 +120,6 @@ class Search:
             ga.selection == "plus",
             edge_check,
         )
-        self._plain = plain(self._strategy), plain(self._judging)
         self._parents = Parents(
             np.empty((nq, room)),
             np.empty(room),
@@ -178,7 +176,7 @@ class Search:
             return last
         arrays = self._parents, self.ancestry.nodes, self._done, self._scratch
         limits, words = (first, last, bred, ga.patience), self._twin.words
-        return run_cycles(words, *limits, *self._plain, *(tuple(each) for each in arrays))
+        return run_cycles(words, *limits, self._strategy, self._judging, *arrays)
 
     def _enter(self, bred: int, num_places: int) -> None:
         """Take memory for cycles of another size, and the present cycle's records along."""
@@ -211,7 +209,7 @@ class Search:
         )
         chosen, winner = self._accepted(chosen, int(winner), members, memory, accepts)
         arrays = self._parents, self.ancestry.nodes, done
-        settle_one(chosen, winner, self.cycles, memory, *(tuple(each) for each in arrays))
+        settle(chosen, winner, self.cycles, memory, *arrays)
         done.states[place] = words[:2]
 
     def _accepted(

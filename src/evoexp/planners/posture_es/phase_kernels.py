@@ -4,13 +4,12 @@ A cycle's individuals are in `kernels.Memory`; here several of them follow each 
 the arrays for each. Postures that become parents, or the best, are nodes of the ancestry.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.named_tuples import named
 from evoexp.numeric.pcg64 import Words, fill_normals, fill_uniforms
 from evoexp.planners.posture_es.kernels import (
     COST,
@@ -117,12 +116,12 @@ def run_cycles(
     last: int,
     num_bred: int,
     patience: int,
-    plain_strategy: tuple[Any, ...],
-    plain_judging: tuple[Any, ...],
-    plain_parents: tuple[Any, ...],
-    plain_nodes: tuple[Any, ...],
-    plain_cycles: tuple[Any, ...],
-    plain_scratch: tuple[Any, ...],
+    strategy: Strategy,
+    judging: Judging,
+    parents: Parents,
+    nodes: Nodes,
+    cycles: Cycles,
+    scratch: Scratch,
 ) -> int:
     """Do the cycles behind one up to another, or up to the one with which the phase ends.
 
@@ -132,19 +131,16 @@ def run_cycles(
         last: The last one.
         num_bred: Children of parents; the rest of the offspring are immigrants.
         patience: Cycles without improvement that end a phase.
-        plain_strategy: `Strategy`, made plain.
-        plain_judging: `Judging`, made plain.
-        plain_parents: `Parents`, made plain; changed.
-        plain_nodes: `Nodes`, made plain; changed.
-        plain_cycles: `Cycles`, made plain; written.
-        plain_scratch: `Scratch`, made plain; written.
+        strategy: See `Strategy`.
+        judging: See `Judging`.
+        parents: See `Parents`; changed.
+        nodes: See `Nodes`; changed.
+        cycles: See `Cycles`; written.
+        scratch: See `Scratch`; written.
 
     Returns:
         The last cycle that was done.
     """
-    strategy, judging = named(Strategy, plain_strategy), named(Judging, plain_judging)
-    parents, nodes = named(Parents, plain_parents), named(Nodes, plain_nodes)
-    cycles, scratch = named(Cycles, plain_cycles), named(Scratch, plain_scratch)
     places = len(cycles.counts)
     for cycle in range(first, last):
         place = (cycle + 1) % places
@@ -166,21 +162,6 @@ def run_cycles(
         if cycles.counts[place, WON] or cycles.counts[place, IDLE] >= patience:
             return cycle + 1
     return last
-
-
-@kernel
-def settle_one(
-    chosen: IntArray,
-    winner: int,
-    cycle: int,
-    memory: Memory,
-    plain_parents: tuple[Any, ...],
-    plain_nodes: tuple[Any, ...],
-    plain_cycles: tuple[Any, ...],
-) -> None:
-    """Settle one cycle behind `cycle` whose selection was made elsewhere; see `settle`."""
-    parents, nodes = named(Parents, plain_parents), named(Nodes, plain_nodes)
-    settle(chosen, winner, cycle, memory, parents, nodes, named(Cycles, plain_cycles))
 
 
 @kernel

@@ -42,7 +42,7 @@ from evoexp.planners.posture_es.phase_kernels import rate_steps
 from evoexp.planners.posture_es.phases import Problem, Span, Stage
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.planners.proofs import Acceptance, Proofs
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.scenarios.posture_task import PostureTask
@@ -105,7 +105,7 @@ class PostureEs(PlannerDefaults, Component):
         """
         return posture_problem.prepare(robot, scenario, self.scope, self.objective, self.collision)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
         paths = _Paths(self, problem)
         ancestry, twin, node = Ancestry(problem.start), Twin(rng), 0
@@ -267,7 +267,7 @@ class _Paths:
         self._node, self._path, self._cycles = -1, {"": 0.0}, 0
         self._chosen = planner.chosen
 
-    def record(self, search: Search, phase: int, stop_reason: str) -> Generation:
+    def record(self, search: Search, phase: int, stop_reason: str) -> Block:
         """Return the record of the last cycle, or of the posture that a phase begins with."""
         problem, planner, keeper = self._problem, self._planner, self._keeper
         last, several = phase == len(problem.phases) - 1, len(problem.phases) > 1

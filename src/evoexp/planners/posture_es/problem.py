@@ -1,7 +1,6 @@
 """The problem of a posture search: robot, task and objective, checked against each other."""
 
 import functools
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -140,9 +139,7 @@ def _bodies(
     robot: Robot, collision: CollisionModel, disabled: frozenset[frozenset[str]]
 ) -> BodyModel:
     """Return a robot's bodies; kept, since finding pairs that never touch takes longest."""
-    pairs = sorted(map(sorted, disabled))
-    made_from = json.dumps([robot.canonical(), collision.canonical(), pairs], sort_keys=True)
-    return collision.bind(_built(robot)._replace(disabled=disabled), made_from.encode())
+    return collision.bind(_built(robot)._replace(disabled=disabled))
 
 
 def notes(problem: Problem) -> tuple[str, ...]:

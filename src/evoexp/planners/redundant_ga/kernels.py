@@ -5,7 +5,7 @@ genes themselves in real coding and follow them in binary coding; then cost, pos
 joint displacement. Generations are computed several per call, one table for each of them.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.mutation import GAUSSIAN, NON_UNIFORM, decode_bits, non_uniform_spread
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.named_tuples import named
 from evoexp.numeric.pcg64 import Words, fill_normals, fill_uniforms
 from evoexp.planners.redundant_ga.breeding import Breeding, Draws, breed
 from evoexp.planners.redundant_ga.sub_path_costs import (
@@ -74,11 +73,11 @@ def evolve(
     last: int,
     stop_cost: float,
     evolving: bool,
-    plain_breeding: tuple[Any, ...],
-    plain_judging: tuple[Any, ...],
+    breeding: Breeding,
+    judging: Judging,
     starts: FloatArray,
-    plain_generations: tuple[Any, ...],
-    plain_memory: tuple[Any, ...],
+    generations: Generations,
+    memory: Memory,
 ) -> int:
     """Compute the generations behind one up to another, or up to the first that is good enough.
 
@@ -89,17 +88,15 @@ def evolve(
         stop_cost: The first generation whose best costs less ends the search.
         evolving: Whether generations are bred; if not, each is drawn as the initial one is, as many
             individuals as would be bred.
-        plain_breeding: `Breeding`, made plain.
-        plain_judging: `Judging`, made plain.
+        breeding: See `Breeding`.
+        judging: See `Judging`.
         starts: (joints, ≥ individuals) start of the sub-path, the same for all [rad].
-        plain_generations: `Generations`, made plain.
-        plain_memory: `Memory`, made plain.
+        generations: See `Generations`.
+        memory: See `Memory`.
 
     Returns:
         The last generation that was computed.
     """
-    breeding, judging = named(Breeding, plain_breeding), named(Judging, plain_judging)
-    generations, memory = named(Generations, plain_generations), named(Memory, plain_memory)
     words, starts, breeding, judging, generations, memory = borrowed(
         (words, starts, breeding, judging, generations, memory)
     )
@@ -127,15 +124,13 @@ def evolve(
 @kernel
 def begin(
     words: Words,
-    plain_breeding: tuple[Any, ...],
-    plain_judging: tuple[Any, ...],
+    breeding: Breeding,
+    judging: Judging,
     starts: FloatArray,
-    plain_generations: tuple[Any, ...],
-    plain_memory: tuple[Any, ...],
+    generations: Generations,
+    memory: Memory,
 ) -> None:
     """Draw and judge the initial population, at place 0; see `evolve`."""
-    breeding, judging = named(Breeding, plain_breeding), named(Judging, plain_judging)
-    generations, memory = named(Generations, plain_generations), named(Memory, plain_memory)
     (tables, states, summaries), size = generations, len(memory.hit)
     checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
     draw(words, size, breeding, judging, starts, tables[0], memory, checks)

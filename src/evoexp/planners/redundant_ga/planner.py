@@ -22,7 +22,6 @@ import numpy as np
 
 from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
-from evoexp.numeric.named_tuples import plain
 from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
@@ -33,7 +32,7 @@ from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.planners.redundant_ga.sub_path import BestEnd, RunMemory, Search
 from evoexp.planners.redundant_ga.sub_path_costs import RESULTS, Judging, judge_paths
-from evoexp.records import BoolArray, FloatArray, Generation
+from evoexp.records import Block, BoolArray, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
@@ -112,13 +111,13 @@ class RedundantGa(PlannerDefaults, Component):
             raise SettingError("ga", "a real_genetic or a binary_genetic", self.ga.component)
         return reaching_problem(robot, scenario, self.collision)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the generations of all searches; their indices go on counting."""
         return self.search_in_turn(problem, rng, Search)
 
     def search_in_turn(
         self, problem: Problem, rng: np.random.Generator, kind: type[Search]
-    ) -> Iterator[Generation]:
+    ) -> Iterator[Block]:
         """Yield the generations of SP1 and SP2 in turn, until both are successful.
 
         Args:
@@ -126,7 +125,7 @@ class RedundantGa(PlannerDefaults, Component):
             rng: Source of all random numbers.
             kind: What searches a sub-path: the genetic algorithm, or a control in its place.
         """
-        judgings = tuple(plain(self._judging(problem, path)) for path in range(2))
+        judgings = tuple(self._judging(problem, path) for path in range(2))
         plans, proofs = _Plans(self, problem, judgings), None
         memory = RunMemory(self.ga, problem.joint_limits, rng)
         if self.answers_are_proven:
@@ -155,7 +154,7 @@ class RedundantGa(PlannerDefaults, Component):
 
     def _search(
         self, search: Search, plans: "_Plans", path: int
-    ) -> Generator[Generation, None, BestEnd]:
+    ) -> Generator[Block, None, BestEnd]:
         """Search the end of one sub-path (0: SP1, 1: SP2); yield generations, return the best."""
         search.begin()
         plans.begin(path)
@@ -203,7 +202,7 @@ class RedundantGa(PlannerDefaults, Component):
         self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray
     ) -> FloatArray:
         """Return cost, position error and joint displacement of sub-paths, (3, individuals)."""
-        return _judge(plain(self._judging(problem, path)), starts, ends)
+        return _judge(self._judging(problem, path), starts, ends)
 
     def _judging(self, problem: Problem, path: int) -> Judging:
         """Return collision model and objective of a sub-path."""
@@ -303,7 +302,7 @@ class _Plans:
     def _counts(self) -> dict[str, float]:
         return {"attempts": float(self._attempts), "sub_path": self._path + 1.0}
 
-    def record(self, search: Search, count: int) -> Generation:
+    def record(self, search: Search, count: int) -> Block:
         """Improve the best plan by a population of which `count` are new; return its record."""
         keeper, path, costs = self._keeper, self._path, search.costs
         if path == 0:
@@ -341,11 +340,11 @@ class _Plans:
         self._keeper.keep(cost, Candidate(plan, terms | self._counts, solved))
 
 
-def _judge(judging: tuple[Any, ...], starts: FloatArray, ends: FloatArray) -> FloatArray:
+def _judge(judging: Judging, starts: FloatArray, ends: FloatArray) -> FloatArray:
     """Return cost, position error and joint displacement of sub-paths, (3, individuals).
 
     Args:
-        judging: `Judging`, made plain.
+        judging: Collision model and objective.
         starts: (joints, individuals) [rad].
         ends: (joints, individuals) [rad].
     """

@@ -11,7 +11,7 @@ from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.planners.redundant_ga.sub_path import DrawnSearch
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import Generation
+from evoexp.records import Block
 from evoexp.validation import Component
 
 
@@ -39,6 +39,6 @@ class SequentialSearch(WrappedPlanner):
             raise SettingError("planner", must, planner.component)
         return planner
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the generations of all draws; their indices go on counting."""
         return self.planner.search_in_turn(problem, rng, DrawnSearch)

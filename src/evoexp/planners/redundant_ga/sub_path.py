@@ -1,7 +1,7 @@
 """One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001)."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,14 +20,13 @@ from evoexp.evolution.mutation import (
     SCOPES,
     num_mutation_uniforms,
 )
-from evoexp.numeric.named_tuples import plain
 from evoexp.numeric.pcg64 import Twin
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.breeding import Breeding
 from evoexp.planners.redundant_ga.kernels import SUMMARY, Generations, Memory
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
-from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
+from evoexp.planners.redundant_ga.sub_path_costs import RESULTS, Judging
 from evoexp.records import FloatArray
 
 SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
@@ -55,10 +54,10 @@ class RunMemory:
     Attributes:
         ga: Settings.
         twin: Of the run's generator.
-        breeding: The operators as the kernels take them, made plain.
+        breeding: The operators, as kernels take them.
         num_places: Generations in memory.
         generations: See `kernels.Generations`.
-        plain: `Generations` and `Memory`, made plain.
+        memory: See `kernels.Memory`.
         costs: Of every place (individuals,), a view.
         angles: Of every place (joints, individuals), a view [rad].
         genomes: Of every place (genes, individuals), a view.
@@ -73,7 +72,7 @@ class RunMemory:
             rng: Source of all random numbers.
         """
         breeding, size, count = _breeding(ga, limits), ga.population_size, ga.num_offspring
-        self.ga, self.twin, self.breeding = ga, Twin(rng), plain(breeding)
+        self.ga, self.twin, self.breeding = ga, Twin(rng), breeding
         first = breeding.num_genes if breeding.binary else 0
         rows, filled = first + len(limits) + RESULTS, -(-size // LANES) * LANES
         stretch = max(1, min(STRETCH, MEMORY // (8 * rows * filled)))
@@ -95,7 +94,7 @@ class RunMemory:
             choosing,
             crossing,
         )
-        self.plain = plain(self.generations), plain(memory)
+        self.memory = memory
         tables = self.generations.tables[:, :, :size]
         self.costs, self.angles = list(tables[:, -RESULTS]), list(tables[:, first:-RESULTS])
         self.genomes = list(tables[:, : breeding.num_genes])
@@ -124,7 +123,7 @@ class Search:
     def __init__(
         self,
         memory: RunMemory,
-        judging: tuple[Any, ...],
+        judging: Judging,
         start: FloatArray,
         stop_cost: float,
         accepts: Callable[[FloatArray], bool] | None = None,
@@ -133,7 +132,7 @@ class Search:
 
         Args:
             memory: Of the run, for one search after the other.
-            judging: `Judging` of the sub-path, made plain.
+            judging: Collision model and objective of the sub-path.
             start: (joints,) where the sub-path begins [rad].
             stop_cost: The search ends where the best costs less.
             accepts: Whether a posture (joints,) may be the best one; None: any of finite cost.
@@ -147,7 +146,9 @@ class Search:
         """Draw the initial population, uniform within the limits, and judge it."""
         run = self._memory
         run.twin.meet()
-        kernels.begin(run.twin.words, run.breeding, self._judging, self._starts, *run.plain)
+        kernels.begin(
+            run.twin.words, run.breeding, self._judging, self._starts, run.generations, run.memory
+        )
         self._show(0)
 
     def advance(self, index: int) -> None:
@@ -165,7 +166,8 @@ class Search:
                 run.breeding,
                 self._judging,
                 self._starts,
-                *run.plain,
+                run.generations,
+                run.memory,
             )
         self._show(index + 1)
 

@@ -1,6 +1,6 @@
 """Costs of the ends of a sub-path, compiled: Eq. 4, and which sub-paths collide."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from evoexp.collision.models.ellipse_kernels import (
     paths_collide,
 )
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.named_tuples import named
 from evoexp.objectives.reaching import measure_reach, measure_reach_from
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.planar_ends import PlanarArm
@@ -87,7 +86,7 @@ def judge_paths(
     ends: FloatArray,
     lanes: IntArray,
     count: int,
-    plain_judging: tuple[Any, ...],
+    judging: Judging,
     results: FloatArray,
     hit: BoolArray,
 ) -> None:
@@ -100,11 +99,10 @@ def judge_paths(
         ends: (joints, individuals) [rad].
         lanes: (≥ count + LANES) indices of individuals, changed.
         count: Number of individuals.
-        plain_judging: `Judging`, made plain.
+        judging: See `Judging`.
         results: (3, individuals) written: cost, position error, joint displacement.
         hit: (individuals,) scratch.
     """
-    judging = named(Judging, plain_judging)
     starts, ends, lanes, judging, results, hit = borrowed(
         (starts, ends, lanes, judging, results, hit)
     )

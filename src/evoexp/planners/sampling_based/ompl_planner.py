@@ -26,7 +26,7 @@ from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
 from evoexp.planners.sampling_based.settings import OmplSettings
 from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import EdgeTest
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
 
@@ -63,7 +63,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
                 raise SettingError(f"planner.{name}", must, getattr(self, name))
         return super().prepare(robot, scenario)
 
-    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per chunk of the search, then of the shortcuts, until it is done."""
         search, keeper = _Search(self, problem, int(rng.integers(1, SEEDS))), Keeper()
         for index in range(self.num_generations + 1):

@@ -22,7 +22,7 @@ from evoexp.planners.sampling_based.node_paths import NodePaths
 from evoexp.planners.sampling_based.settings import RrtSettings
 from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import TreePair
-from evoexp.records import Generation
+from evoexp.records import Block
 from evoexp.validation import Component
 
 NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
@@ -33,7 +33,7 @@ class RrtConnect(NodePaths, RrtSettings, Component):
 
     component: ClassVar[str] = "rrt_connect"
 
-    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last path is shortened or given up."""
         search, keeper = _Search(self, problem), Keeper()
         for index in range(self.num_generations + 1):

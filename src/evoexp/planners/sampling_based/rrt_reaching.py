@@ -30,7 +30,7 @@ from evoexp.planners.sampling_based.node_paths import path_length
 from evoexp.planners.sampling_based.settings import ReachingSettings
 from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_postures import bring_tip_to, tip
 from evoexp.scenarios.pick_and_place import PickAndPlace
@@ -60,7 +60,7 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
             raise SettingError("scenario.goal_point", must, [float(x), float(y)])
         return problem
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last plan is complete or given up."""
         search, keeper = _Search(self, problem), Keeper()
         steps = search.steps(rng)

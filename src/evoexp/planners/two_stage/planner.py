@@ -9,26 +9,22 @@ A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. It
 C (Eq. 1). In the first stage there is no path: the cost of the plan is inf, the individuals cost E.
 """
 
-from collections.abc import Callable, Generator, Iterator
-from functools import partial
+from collections.abc import Generator, Iterator
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
-from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
+from evoexp.planners.planner import Judgement, PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
-from evoexp.records import FloatArray, Standing, Stretch
-from evoexp.records import Generation as Record
+from evoexp.records import Best, Block, FloatArray
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
 from evoexp.scenarios.mission import Mission
 from evoexp.validation import Component
@@ -90,90 +86,61 @@ class TwoStage(PlannerDefaults, Component):
         bodies = scene(robot.build(), scenario.grid.bodies(), self_pairs=True)
         return Problem(robot, scenario, placement, path, bodies, scenario.grid.security_margin)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Record]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the generations of both stages; their indices go on counting."""
-        if self.answers_are_proven:
-            return self._generations(problem, rng)
-        return Run(partial(self._generations, problem, rng), partial(self._stretches, problem, rng))
+        docked = yield from self._place(problem, rng)
+        yield from self._drive(problem, rng, docked)
 
-    def _generations(self, problem: Problem, rng: np.random.Generator) -> Iterator[Record]:
-        keeper = Keeper()
-        docked = yield from self._place(problem, rng, keeper)
-        yield from self._drive(problem, rng, keeper, docked)
-
-    def _stretches(
-        self, problem: Problem, rng: np.random.Generator, read_clock: Callable[[], float]
-    ) -> Iterator[Stretch]:
-        """Yield the same generations, many at a time."""
-        no_path, docked = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, None
-        start = problem.scenario.grid.start
-        for stretch in self.placement.evolve(problem.placement, rng).stretches(read_clock):
-            standings = [
-                Standing(
+    def _place(self, problem: Problem, rng: np.random.Generator) -> Generator[Block, None, Block]:
+        """Search the docking posture; return the placement search's last block."""
+        no_path, start = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, problem.scenario.grid.start
+        for block in self.placement.evolve(problem.placement, rng):
+            bests = [
+                Best(
                     place,
                     np.concatenate([angles, start]),
                     np.inf,
                     self._posture_terms(problem, angles) | no_path,
                     False,
                 )
-                for place, angles, *_ in stretch.standings
+                for place, angles, *_ in block.bests
             ]
-            docked, evaluations = stretch.standings[-1], stretch.evaluations[-1]
-            first = stretch.first + len(stretch.lowest)
-            lowest = [np.inf] * len(stretch.lowest)
-            yield stretch._replace(standings=standings, lowest=lowest, population=None)
-        assert docked is not None, "a search has an initial population"
-        posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
-        path_problem = self._path_problem(problem, docked.best)
-        for stretch in self.path.evolve(path_problem, rng).stretches(read_clock):
-            standings = [
-                Standing(
-                    place,
-                    np.concatenate([docked.best, nodes]),
-                    docked.cost + cost,
-                    posture | {name: terms[name] for name in PATH},
-                    docked.solved and solved,
-                )
-                for place, nodes, cost, terms, solved in stretch.standings
-            ]
-            yield stretch._replace(
-                first=first + stretch.first,
-                standings=standings,
-                lowest=[docked.cost + cost for cost in stretch.lowest],
-                evaluations=[evaluations + count for count in stretch.evaluations],
-            )
+            lowest = [np.inf] * block.num_generations
+            yield block._replace(bests=bests, lowest=lowest, costs=block.costs[:, None])
+        return block
 
-    def _place(
-        self, problem: Problem, rng: np.random.Generator, keeper: Keeper
-    ) -> Generator[Record, None, Record]:
-        """Search the docking posture; return the placement search's last generation."""
-        no_path, angles = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, np.empty(0)
-        for last in self.placement.evolve(problem.placement, rng):
-            if last.best is not angles:
-                angles, terms = last.best, self._posture_terms(problem, last.best) | no_path
-                plan = np.concatenate([angles, problem.scenario.grid.start])
-                keeper.keep(np.inf, Candidate(plan, terms, False))
-            yield _recorded(keeper, last, self.placement.num_evaluations(last.index), np.inf)
-        return last
-
-    def _drive(
-        self, problem: Problem, rng: np.random.Generator, keeper: Keeper, docked: Record
-    ) -> Iterator[Record]:
+    def _drive(self, problem: Problem, rng: np.random.Generator, placed: Block) -> Iterator[Block]:
         """Search the path to the docking place that was found."""
-        posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
-        path_problem, nodes = self._path_problem(problem, docked.best), np.empty(0)
+        docked = placed.bests[-1]
+        posture = self._posture_terms(problem, docked.solution) | {"sub_path": 2.0}
+        path_problem = self._path_problem(problem, docked.solution)
         proofs = Proofs(self, problem) if self.answers_are_proven else None
-        for found in self._driving.evolve(path_problem, rng):
-            if found.best is not nodes:
-                nodes, terms = found.best, posture | {name: found.terms[name] for name in PATH}
-                plan = np.concatenate([docked.best, nodes])
-                cost, solved = docked.best_cost + found.best_cost, docked.solved and found.solved
+        best: Best | None = None
+        nodes = np.empty(0)
+        for block in self._driving.evolve(path_problem, rng):
+            bests = dict[int, Best]() if best is None else {0: best}
+            for path in block.bests:
+                if path.solution is nodes:
+                    continue
+                nodes, cost = path.solution, docked.cost + path.cost
+                plan, solved = (
+                    np.concatenate([docked.solution, nodes]),
+                    docked.solved and path.solved,
+                )
                 if proofs is not None and not (solved and proofs.is_proven(plan)):
                     cost, solved = np.inf, False
-                if proofs is None or solved or not keeper.best.solved:
-                    keeper.keep(cost, Candidate(plan, terms, solved))
-            lowest = docked.best_cost + found.best_cost_in_generation
-            yield _recorded(keeper, found, self.path.num_evaluations(found.index), lowest)
+                if proofs is None or best is None or solved or not best.solved:
+                    terms = posture | {name: path.terms[name] for name in PATH}
+                    best = bests[path.place] = Best(path.place, plan, cost, terms, solved)
+            assert best is not None, "a block begins with a best path"
+            best = best._replace(place=0)
+            yield block._replace(
+                first=placed.first + placed.num_generations + block.first,
+                bests=[*bests.values()],
+                lowest=[docked.cost + cost for cost in block.lowest],
+                evaluations=[placed.evaluations[-1] + count for count in block.evaluations],
+                costs=block.costs[:, None],
+            )
 
     def _path_problem(self, problem: Problem, angles: FloatArray) -> PathProblem:
         """Return the second stage's problem, its goal the node nearest to the docking place."""
@@ -282,16 +249,3 @@ class TwoStage(PlannerDefaults, Component):
 
 def _no_population() -> SettingError:
     return SettingError("planner", "one with a single population", TwoStage.component)
-
-
-def _recorded(keeper: Keeper, found: Record, evaluations: int, lowest: float) -> Record:
-    """Return the mission's record of a stage's generation, whose best plan costs `lowest`."""
-    return keeper.record(
-        CostStatistics(0, found.mean_cost, found.std_cost),
-        found.costs[None, :],
-        found.population,
-        lowest=lowest,
-        num_feasible=found.num_feasible,
-        evaluations=evaluations,
-        collision_queries=0,
-    )

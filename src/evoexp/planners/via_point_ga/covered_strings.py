@@ -24,7 +24,7 @@ from evoexp.records import FloatArray
 class CoveredStrings(Strings):
     """The population-wide steps of one planner on one problem with covered bodies."""
 
-    stretch = 1
+    generations_per_call = 1
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         super().__init__(planner, problem)

@@ -14,7 +14,6 @@ from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
 from evoexp.evolution.succession import follow_rows
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.named_tuples import named
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, fill_wheel, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.lengths import measure_paths
@@ -147,9 +146,9 @@ def evolve(
     uniforms: FloatArray,
     first: int,
     arm_slices: IntArray,
-    plain_settings: tuple[Any, ...],
-    plain_table: tuple[Any, ...],
-    plain_scratch: tuple[Any, ...],
+    settings: Settings,
+    table: Population,
+    scratch: Scratch,
     summaries: FloatArray,
 ) -> None:
     """Go on from one generation to others.
@@ -159,15 +158,13 @@ def evolve(
             used.
         first: The present generation.
         arm_slices: (arms, 2) rows of each arm.
-        plain_settings: `Settings`, made plain.
-        plain_table: `Population`, made plain: some generations; number g is at place g modulo the
+        settings: See `Settings`.
+        table: See `Population`: some generations; number g is at place g modulo the
             number of places.
-        plain_scratch: `Scratch`, made plain.
+        scratch: See `Scratch`.
         summaries: (places, 4) written, see `summarise_strings`.
     """
-    settings = borrowed(named(Settings, plain_settings))
-    table = borrowed(named(Population, plain_table))
-    scratch, summaries = borrowed((named(Scratch, plain_scratch), summaries))
+    settings, table, scratch, summaries = borrowed((settings, table, scratch, summaries))
     strings, costs, collisions = table
     for step in range(len(uniforms)):
         own, other = (first + step) % len(costs), (first + step + 1) % len(costs)

@@ -36,7 +36,7 @@ from evoexp.planners.via_point_ga.search import ProvenSearch, Search
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
 
@@ -69,11 +69,10 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         bodies = found.assembly, found.collision
         return Problem(*bodies, *ends, spline, found.scene, *margins, found.length_unit)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
-        if self.answers_are_proven:
-            return ProvenSearch(self, problem, self._strings(problem)).generations(rng)
-        return Search(self, problem, self._strings(problem)).run(rng)
+        kind = ProvenSearch if self.answers_are_proven else Search
+        return kind(self, problem, self._strings(problem)).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""

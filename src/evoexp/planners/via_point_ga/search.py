@@ -5,19 +5,19 @@ from typing import Any
 import numpy as np
 
 from evoexp.numeric.random_stream import DrawnAhead
-from evoexp.planners.planner import Candidate, Keeper
-from evoexp.planners.stretches import IndividualStretches
+from evoexp.planners.planner import Candidate
+from evoexp.planners.table_search import TableSearch
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.planners.via_point_ga.strings import Problem, Strings
-from evoexp.records import FloatArray
+from evoexp.records import Best, FloatArray, IntArray
 
 
-class Search(IndividualStretches):
+class Search(TableSearch):
     """One run, and memory for its generations."""
 
     def __init__(
-        self, planner: Any, problem: Problem, strings: Strings, stretch: int | None = None
+        self, planner: Any, problem: Problem, strings: Strings, per_call: int | None = None
     ) -> None:
         """Begin a run.
 
@@ -25,9 +25,9 @@ class Search(IndividualStretches):
             planner: A `ViaPointGa`.
             problem: Its problem.
             strings: Its steps on this problem.
-            stretch: Generations computed at once; None: as many as is best.
+            per_call: Generations computed at once; None: as many as is best.
         """
-        super().__init__(planner.ga, stretch or strings.stretch)
+        super().__init__(planner.ga, per_call or strings.generations_per_call)
         self._planner, self._problem, self._strings = planner, problem, strings
         self._table = strings.table(self.num_places)
         self._evolve = strings.evolver(self._table, self.summaries)
@@ -41,11 +41,14 @@ class Search(IndividualStretches):
         _, terms, _ = strings.judge(self._table.strings[0], size)
         self.costs[0], self._table.collisions[0] = terms.cost, terms.collisions[:size]
         self._summarise(0)
-        self.drawn = self._ahead = DrawnAhead(rng, strings.num_drawn)
+        self._ahead = DrawnAhead(rng, strings.num_drawn)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations with numbers that are drawn ahead."""
-        self._evolve(self._ahead.draw(last - first), first)
+        count, each = last - first, self._strings.num_drawn
+        self._evolve(self._ahead.draw(count).reshape(count, each), first)
+        self.states = self._ahead.take([each] * count)
+        return last
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return a string and its terms, judged once more by itself."""
@@ -54,12 +57,12 @@ class Search(IndividualStretches):
         solution = self._planner.solution(self._problem, own, 0)
         return Candidate(solution, terms, terms["collisions"] == 0.0)
 
-    def population(self, place: int, is_last: bool) -> FloatArray:
+    def population(self, index: int) -> FloatArray:
         """Return the strings, padded, in the same array for all generations.
 
         So the digest of a run that its budget ends is that of the first generation beyond it.
         """
-        np.copyto(self._shown, self._table.strings[place])
+        np.copyto(self._shown, self._table.strings[index % self.num_places])
         return self._shown
 
     def _summarise(self, place: int) -> None:
@@ -72,16 +75,15 @@ class ProvenSearch(Search):
 
     def __init__(self, planner: Any, problem: Problem, strings: Strings) -> None:
         """Begin a run, see `Search`, without any verdict."""
-        super().__init__(planner, problem, strings, stretch=1)
+        super().__init__(planner, problem, strings, per_call=1)
         self._prover = Prover(planner, problem)
 
-    def keep(self, keeper: Keeper, place: int) -> None:
+    def improve(self, places: IntArray) -> list[Best]:
         """Keep a proven string that costs less than the one kept, if the generation has one."""
+        (place,), keeper = places.tolist(), self.keeper
         strings, costs, hits = (array[place] for array in self._table)
-        k, proven = (
-            self._prover.settle(strings, costs, hits, keeper.cost),
-            np.zeros(len(costs), bool),
-        )
+        k = self._prover.settle(strings, costs, hits, keeper.cost)
+        proven = np.zeros(len(costs), bool)
         if k is not None:
             proven[k] = True
 
@@ -92,3 +94,4 @@ class ProvenSearch(Search):
 
         keeper.keep_proven(costs, proven, candidate)
         self._summarise(place)
+        return [keeper.standing]

@@ -11,19 +11,18 @@ from evoexp.collision.models.touching_spheres import SphereCollision
 from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.named_tuples import plain
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution
 from evoexp.planners.arm_tasks import margins
-from evoexp.planners.stretches import stretch_of
+from evoexp.planners.table_search import generations_per_call
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 
 LANES = 8  # individuals are padded to whole vectors
-STRETCH = 16  # generations that are computed in one call of a kernel, at most,
+PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
 CACHED = 1 << 19  # [B] and as many as take so much memory
 
 
@@ -173,9 +172,11 @@ class Strings:
         )
 
     @property
-    def stretch(self) -> int:
+    def generations_per_call(self) -> int:
         """Generations that are best computed at once."""
-        return stretch_of(STRETCH, self.empty(self.planner.ga.population_size).nbytes, CACHED)
+        return generations_per_call(
+            PER_CALL, self.empty(self.planner.ga.population_size).nbytes, CACHED
+        )
 
     @property
     def num_drawn(self) -> int:
@@ -244,10 +245,10 @@ class Strings:
         Returns:
             It takes the numbers (generations, `num_drawn`) and the present generation.
         """
-        settings = plain(kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging))
-        memory, slices = (plain(table), plain(self.scratch())), self.problem.arm_slices
+        settings = kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging)
+        scratch, slices = self.scratch(), self.problem.arm_slices
         return lambda uniforms, first: kernels.evolve(
-            uniforms, first, slices, settings, *memory, summaries
+            uniforms, first, slices, settings, table, scratch, summaries
         )
 
     def unjudged(self, strings: FloatArray, count: int) -> Judgement:

@@ -20,7 +20,7 @@ from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.planners.arm_tasks import ArmProblem, ArmTask, arm_problem
 from evoexp.planners.planner import JudgementArrays, Keeper, PlannerDefaults, Shape
-from evoexp.records import FloatArray, Generation
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component, Count, NonNegative, Positive
 
@@ -64,7 +64,7 @@ class MyPlanner(PlannerDefaults, Component):
         """Build robot and scene, and check that start and goal are free of collision."""
         return arm_problem(robot, scenario, self.collision)
 
-    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then λ displaced paths per generation."""
         keeper = Keeper()
         population = self.sample(problem, rng, self.ga.population_size)

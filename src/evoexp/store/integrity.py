@@ -1,13 +1,20 @@
-"""Re-checks stored runs: every log as a whole and in its place, and the files beside the logs.
+"""The integrity of stored runs: damaged files are found, set aside, and written or run again.
 
-Reads only. A link of a log's chain cannot be computed again from the log, which does not hold what
-entered it: `reproduce` does that by running the replicate again. Solutions can be evaluated again:
-by whoever knows planners, see `check_logs`.
+A log is checked against its place when it is first seen: its checksums, its condition, its
+replicate. `summary.parquet` then notes its size and time, and it is not decoded again as long as
+both are the same. `run`, and whoever reads the logs anyway, compares all checksums besides; `list`
+and `show` do not. `verify` re-checks every log as a whole and in its place, and the files beside
+the logs; it reads only. Mending is for who holds the lock; no reading command renames anything.
+
+A link of a log's chain cannot be computed again from the log, which does not hold what entered it:
+`reproduce` does that by running the replicate again. Solutions can be evaluated again: by whoever
+knows planners, see `check_logs`.
 """
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator
+import os
+from collections.abc import Callable, Collection, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -15,20 +22,39 @@ from typing import NamedTuple
 import pyarrow.parquet as pq
 
 from evoexp.attachments import PREFIX
-from evoexp.errors import CorruptLog, EvoexpError, StoreError
+from evoexp.errors import CorruptLog, EvoexpError, OtherVersion, StoreError
 from evoexp.records import ReplicateSummary
-from evoexp.store.busy_runs import is_being_written
-from evoexp.store.damage import MAX_NAMED, checked_summary, is_set_aside, reason
-from evoexp.store.files import is_temporary
-from evoexp.store.identity import CONFIG, MANIFEST, REPLICATES
-from evoexp.store.log_reader import LogContents, read_log
-from evoexp.store.mending import damaged_files
+from evoexp.store.files import (
+    MAX_NAMED,
+    is_set_aside,
+    is_temporary,
+    listed,
+    reason,
+    set_aside,
+    warn,
+)
+from evoexp.store.identity import (
+    CONFIG,
+    MANIFEST,
+    PLANS,
+    REPLICATES,
+    DamagedFile,
+    checked_manifest,
+    lost_files,
+    read,
+)
+from evoexp.store.log_reader import LogContents, checked_summary, read_log, read_summary
 from evoexp.store.messages import TERM
-from evoexp.store.plans import PLANS
 from evoexp.store.run_context import ORIGIN, run_context
-from evoexp.store.run_directory import RunDirectory, open_run
-from evoexp.store.summaries import altered_rows, table_damage
-from evoexp.store.summary_columns import BASE
+from evoexp.store.run_directory import RunDirectory, is_stored, open_run
+from evoexp.store.summaries import (
+    BASE,
+    altered_rows,
+    damaged_logs,
+    replicate_of,
+    table_damage,
+    whole_logs,
+)
 
 _KNOWN = {CONFIG, MANIFEST, PLANS, REPLICATES, PREFIX.strip("/"), "summary.parquet", ".lock"}
 DELETE = "; delete it, then run again"
@@ -95,7 +121,7 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
         problems = damaged_files(run)
     except StoreError as error:
         return RunCheck(name, None, {CONFIG: reason(path / CONFIG, error)}, leftovers)
-    if (lost := _lost(run)) and not is_being_written(run):
+    if (lost := _lost(run)) and not run.is_being_written():
         problems[REPLICATES] = lost
     if damage := table_damage(run):
         problems["summary.parquet"] = damage
@@ -254,3 +280,105 @@ def _named(name: str) -> str:
     if is_set_aside(name):
         return f"{name} (set aside earlier)"
     return f"{name} ({'temporary' if is_temporary(name) else 'unknown'})"
+
+
+def damaged_files(run: RunDirectory, config_json: bytes | None = None) -> dict[str, str]:
+    """Return name → what is wrong with it, of the files of a run beside its logs.
+
+    Args:
+        run: Whose.
+        config_json: The canonical form of its condition; None: as it is stored.
+
+    Raises:
+        StoreError: The directory holds another condition, which shares the first twelve digits.
+    """
+    if not is_stored(run.path):
+        return {}
+    found: dict[str, str] = {}
+    if run.replicates.exists() and not run.replicates.is_dir():
+        found[REPLICATES] = "damaged: not a directory"
+    try:
+        run.check()
+        config_json = config_json or read(run.path / CONFIG)
+    except DamagedFile as error:
+        found[CONFIG] = reason(run.path / CONFIG, error)
+        config_json = config_json or b""
+    found |= {
+        str(path.relative_to(run.path)): why for path, why in lost_files(run.path, config_json)
+    }
+    try:
+        checked_manifest(run.path, run.condition_id)
+    except DamagedFile as error:
+        if os.path.lexists(run.path / MANIFEST) or run.completed():
+            found[MANIFEST] = reason(run.path / MANIFEST, error)
+    try:
+        run.plans()
+    except DamagedFile as error:
+        found[PLANS] = reason(run.path / PLANS, error)
+    return found
+
+
+def needs_mending(run: RunDirectory, config_json: bytes) -> bool:
+    """Return whether anything of a run is damaged, as far as `damaged_logs` looks."""
+    return bool(damaged_files(run, config_json) or damaged_logs(run))
+
+
+def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
+    """Set aside every damaged file of a run, and say so in a line.
+
+    The caller holds the run's lock, and writes configuration and manifest again.
+
+    Args:
+        run: Whose.
+        config_json: The canonical form of its condition.
+        again: Replicates that run again if their log is damaged.
+
+    Raises:
+        StoreError: A log is of another version of evoexp, and not damaged.
+    """
+    if files := damaged_files(run, config_json):
+        _set_aside(run, files, "written again")
+    if logs := damaged_logs(run):
+        for name in logs:
+            if _is_of_another_version(run.replicates / name):
+                raise StoreError(f"run {run.hash12}: {run.replicates / name}: {logs[name]}")
+        prefix = f"{run.replicates.name}/"
+        for then, is_again in (("run again", True), ("set aside: never asked for", False)):
+            some = {name for name in logs if (replicate_of(name) in again) is is_again}
+            if some:
+                _set_aside(run, {prefix + n: why for n, why in logs.items() if n in some}, then)
+
+
+def lost_replicates(run: RunDirectory) -> set[int]:
+    """Return the replicates that were asked for once and whose log is damaged.
+
+    Others, which somebody put there, are set aside and not run again.
+    """
+    try:
+        asked = max((plan.num_replicates for plan in run.plans()), default=0)
+    except DamagedFile:
+        asked = 0
+    whole = whole_logs(run)
+    return {replicate for replicate in run.completed() - whole if replicate < asked}
+
+
+def _set_aside(run: RunDirectory, files: dict[str, str], then: str) -> None:
+    names = [set_aside(path).name for path in _present(run.path, files)]
+    kept = f"; kept as {', '.join(names[:2])}{', …' if len(names) > 2 else ''}" if names else ""
+    shown = {Path(name).name: why for name, why in files.items()}
+    warn(f"run {run.hash12}: damaged, and {then}: {listed(shown)}{kept}")
+
+
+def _present(folder: Path, names: dict[str, str]) -> list[Path]:
+    return [folder / name for name in names if os.path.lexists(folder / name)]
+
+
+def _is_of_another_version(path: Path) -> bool:
+    """Return whether a log cannot be read because another version of evoexp wrote it."""
+    try:
+        read_summary(path)
+    except OtherVersion:
+        return True
+    except CorruptLog:
+        return False
+    return False

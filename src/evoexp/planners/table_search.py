@@ -1,0 +1,199 @@
+"""Searches whose kernels compute several generations per call: each call gives a block of them.
+
+With kernels that take some ten microseconds per generation, a call for each would be a third of the
+time, and a record of each another third.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.scaled_selection import SelectionMemory
+from evoexp.numeric.random_stream import Draws
+from evoexp.planners.planner import Candidate, Keeper
+from evoexp.records import Best, Block, FloatArray, IntArray
+
+SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
+
+
+class Sizes(Protocol):
+    """How many individuals, and how often."""
+
+    @property
+    def population_size(self) -> int:
+        """Individuals that are evaluated at first."""
+
+    @property
+    def num_offspring(self) -> int:
+        """Individuals that are evaluated in every other generation."""
+
+    @property
+    def num_generations(self) -> int:
+        """Generations after the initial one."""
+
+
+def generations_per_call(most: int, size: int, cached: int) -> int:
+    """Return how many generations are best computed in one call of a kernel.
+
+    Args:
+        most: Behind so many, the call itself takes no time any more.
+        size: Memory of a generation [B].
+        cached: Memory beyond which generations would push each other out of the caches [B].
+    """
+    return max(1, min(most, cached // max(1, size)))
+
+
+class TableSearch(ABC):
+    """One run, whose generations are rows of tables: number g is at place g modulo `num_places`.
+
+    The best of a generation is one individual, unless a subclass says otherwise.
+
+    Attributes:
+        num_places: Generations computed per call, and the one before them.
+        summaries: (places, SUMMARY).
+        costs: (places, …, individuals).
+        states: Of the generator behind each generation computed last, where it is ahead of them.
+        queries_each: Configurations that judging an individual asks for.
+        keeper: Of the best so far.
+        reached: Index of the generation computed last.
+    """
+
+    costs: FloatArray
+    states: list[bytes] | None = None
+    queries_each = 0
+
+    def __init__(self, ga: Sizes, per_call: int) -> None:
+        """Begin a run.
+
+        Args:
+            ga: Its settings.
+            per_call: Generations computed per call, at most.
+        """
+        self.num_places = min(per_call, ga.num_generations) + 1
+        self.summaries = np.empty((self.num_places, SUMMARY))
+        self.keeper, self.reached, self._ga = Keeper(), 0, ga
+
+    def blocks(self, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield the initial population, then every other generation, one block per call."""
+        self.begin(rng)
+        yield self._block(0, 0)
+        last = self._ga.num_generations
+        while self.reached < last:
+            first = self.reached
+            self.reached = self.go_on(rng, first, min(first + self.num_places - 1, last))
+            yield self._block(first + 1, self.reached)
+
+    def _block(self, first: int, last: int) -> Block:
+        """Count the generations from one to another, and return their block."""
+        keeper, places = self.keeper, np.arange(first, last + 1) % self.num_places
+        bests = self.improve(places)
+        _, means, deviations, num_feasible = self.summaries[places].T.tolist()
+        ends, steps = last == self._ga.num_generations, range(1, len(places) + 1)
+        evaluations, queries = self.counts(first)
+        block = Block(
+            first,
+            bests,
+            self.lowest(places).tolist(),
+            means,
+            deviations,
+            [*map(int, num_feasible)],
+            [keeper.evaluations + evaluations * k for k in steps],
+            [keeper.collision_queries + queries * k for k in steps],
+            self.costs[places],
+            lambda k: self.population(first + k),
+            self.states if first else None,
+            self.criteria(places.item(-1)) if ends else None,
+        )
+        keeper.index, keeper.evaluations = last, block.evaluations[-1]
+        keeper.collision_queries = block.collision_queries[-1]
+        return block
+
+    def improve(self, places: IntArray) -> list[Best]:
+        """Keep the best of the generations at some places; return the bests of their block."""
+        keeper, bests = self.keeper, {0: self.keeper.standing}
+        for k, cost in enumerate(self.lowest(places).tolist()):
+            if keeper.improves(cost):
+                keeper.keep(cost, self.best(places.item(k)))
+                bests[k] = keeper.standing._replace(place=k)
+        return [*bests.values()]
+
+    def lowest(self, places: IntArray) -> FloatArray:
+        """Return the lowest cost of each of the generations at some places."""
+        individuals = self.summaries[places, 0].astype(np.int64)
+        return np.asarray(self.costs[places, individuals])
+
+    def best(self, place: int) -> Candidate:
+        """Return the solution that has the lowest cost of a generation."""
+        return self.candidate(place, int(self.summaries[place, 0]))
+
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return an individual as it is recorded."""
+        raise NotImplementedError
+
+    def counts(self, index: int) -> tuple[int, int]:
+        """Return evaluations and configurations asked for of a generation, 0 the initial one."""
+        count = self._ga.num_offspring if index else self._ga.population_size
+        return count, count * self.queries_each
+
+    def criteria(self, place: int) -> FloatArray | None:
+        """Return the criteria of the last generation, if its front is recorded."""
+        return None
+
+    @abstractmethod
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and judge the initial population, at place 0."""
+
+    @abstractmethod
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Compute generations behind one, up to another; return the last one computed.
+
+        Without `states`, the generator is behind it as all these generations are recorded with it.
+        """
+
+    @abstractmethod
+    def population(self, index: int) -> NDArray[Any]:
+        """Return the population of a generation of the last call.
+
+        That of the run's last generation is hashed. It is empty where it is there no longer.
+        """
+
+
+class ScaledSearch(TableSearch):
+    """A run whose parents are chosen as in `scaled_selection`, by blocks of uniform numbers.
+
+    Numbers are drawn when the last ones are used up. All generations of a call are recorded with
+    the generator as it is behind the last of them: the number of generations per call enters the
+    digest.
+
+    Attributes:
+        chosen: Memory of the selection.
+        arguments: All that `evolve` takes behind the draws and the first and the last generation.
+    """
+
+    arguments: tuple[Any, ...]
+
+    def __init__(
+        self, ga: ScaledGenetic, evolve: Callable[..., int], per_call: int, num_drawn: int
+    ) -> None:
+        """Begin a run.
+
+        Args:
+            ga: Its settings.
+            evolve: Kernel that computes the generations after one up to another, as far as the
+                draws suffice, and returns the last generation that was computed.
+            per_call: Generations computed per call, at most.
+            num_drawn: Uniform numbers drawn at once, at least.
+        """
+        super().__init__(ga, per_call)
+        self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
+        self._evolve, self._draws = evolve, Draws(num_drawn)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Compute generations; draw more numbers whenever they do not suffice."""
+        while (first := self._evolve(self._draws.block, first, last, *self.arguments)) < last:
+            self._draws.extend(rng)
+        return last

@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.registry import COMPONENTS, Registration, registrations
 from evoexp.version import version_of
 

@@ -10,7 +10,6 @@ from typing import Any, Protocol, TypeVar, cast
 
 import numba
 from numba.core import cgutils, types
-from numba.extending import intrinsic
 
 from evoexp.numeric.kernel_folders import CHECKSUMS, kept_kernels
 
@@ -43,6 +42,11 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
                 CHECKSUMS.check(Path(compiled.stats.cache_path))
                 return cast(Function, compiled)
     return cast(Function, numba.njit(**options)(function))
+
+
+def intrinsic(function: Callable[..., Any]) -> Any:
+    """Return numba's intrinsic; kernels call it without the typing context that it begins with."""
+    return numba.extending.intrinsic(function)
 
 
 def _borrow(typing_context: Any, value: Any) -> Any:
@@ -150,7 +154,7 @@ class _Borrowing(Protocol):
     def __call__(self, value: Value, /) -> Value: ...
 
 
-borrowed: _Borrowing = cast(Any, intrinsic(_borrow))
+borrowed: _Borrowing = intrinsic(_borrow)
 """Return arrays, generators, or tuples of them to any depth, as views that own nothing.
 
 numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and

@@ -92,6 +92,29 @@ def test_a_kernel_is_compiled_again_when_what_it_calls_changes(place: Place) -> 
             assert found == (f"{1.0 + added}\n", "")
 
 
+EDITED = """
+import pathlib
+from guest import constants, kernels  # their code is loaded, nothing is compiled
+path = pathlib.Path(constants.__file__)
+path.write_text(path.read_text().replace("1.0", "5.0"))
+print(kernels.f(1.0))
+"""
+
+
+def test_code_that_is_edited_while_it_runs_leaves_no_stale_kernel(place: Place) -> None:
+    """The kernel of the loaded code is under the key of the edited one, or the reverse."""
+    constants, call = "ADDED = 1.0\n", CALL.replace("guest", "guest.kernels")
+    code = GUEST.replace("1.0", "ADDED").replace("\n@", "\nfrom guest.constants import ADDED\n@")
+    place.write("guest/__init__.py", "")
+    place.write("guest/kernels.py", code)
+    place.write("guest/constants.py", constants)
+    assert place.run(EDITED).out == "2.0\n"
+    assert place.run(call).out == "6.0 0\n"
+    place.write("guest/constants.py", constants)
+    assert place.run(call).out == "2.0 0\n"
+    assert place.run(call).out == "2.0 1\n"
+
+
 def truncated(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-7])
 

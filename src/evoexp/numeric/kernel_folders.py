@@ -37,6 +37,7 @@ ROOMS_ABOVE = frozenset(
     {"batch", "commands", "configuration", "papers", "playback", "report", "testing", "assets"}
 )
 _OWN = __name__.split(".")[0]
+_STATES: dict[Path, tuple[int, int] | None] = {}  # of the sources, when they were hashed
 _KINDS = (".nbi", ".nbc")  # numba's files: indices, machine code
 
 
@@ -113,9 +114,23 @@ def sources_key(package: str = _OWN) -> str:
     """
     key = hashlib.sha256()
     for path in sorted(_sources(package)):
+        _STATES[path] = _state(path)
         key.update(f"{path.name}\0".encode())
         key.update(path.read_bytes())
     return key.hexdigest()
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    """Return when a file was changed, and its size; None if it is not there."""
+    with contextlib.suppress(OSError):
+        status = path.stat()
+        return status.st_mtime_ns, status.st_size
+    return None
+
+
+def _are_edited() -> bool:
+    """Return whether sources changed since they were hashed: other ones may be loaded by now."""
+    return any(_state(path) != state for path, state in _STATES.items())
 
 
 def _sources(package: str) -> Iterator[Path]:
@@ -173,7 +188,8 @@ class Checksums(event.Listener):
         while self._writing:
             folder, lock = self._writing.pop()
             with lock, contextlib.suppress(OSError):
-                self.list_new(folder)
+                if not _are_edited():
+                    self.list_new(folder)
 
     def list_new(self, folder: Path) -> None:
         """Append the files of a folder that are new or changed to its list."""

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, TypeVar
 
-from evoexp.numeric.kept_files import cache_root
+from evoexp.numeric.cache_folder import cache_root
 
 Result = TypeVar("Result")
 

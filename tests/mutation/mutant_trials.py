@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from mutants import PACKAGE, Mutant
 
-from evoexp.numeric.kept_files import cache_root
+from evoexp.numeric.cache_folder import cache_root
 
 IMPORT = re.compile(r"^ *from ([\w.]+) import (\([^)]*\)|[^\n]+)$|^ *import ([\w.]+)", re.MULTILINE)
 NOT_NEAR = ("tests/mutation", "src/evoexp/assets")  # tests that are none of the module's

@@ -1,8 +1,7 @@
 """Compiles the kernels that conditions need before their replicates run, on two cores at once.
 
 The calling process compiles what planners search with. A worker, which would wait meanwhile,
-compiles what judges their motions: about half of all. What both need is compiled by the one that
-comes first; the other waits for it (see `kernel_cache`).
+compiles what judges their motions: about half of all.
 """
 
 import contextlib
@@ -15,7 +14,6 @@ from typing import Any, NamedTuple
 from evoexp.batch.jobs import load
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.numeric.compiled_kinds import is_compiled, note_compiled
 from evoexp.records import FloatArray, generations
 from evoexp.registry import component_modules
 
@@ -51,13 +49,12 @@ def compile_all(config_jsons: Iterable[bytes]) -> None:
     """Compile every kernel that some conditions need, once and here, unless they are kept."""
     kinds = _not_compiled(config_jsons)
     # all searches first: a worker compiles the kernels of verdicts meanwhile
-    for kind, found in [(kind, _search(kind)) for kind in kinds]:
+    for found in [_search(kind) for kind in kinds]:
         # a planner that fails does so again in its replicate, and is noted there
         with contextlib.suppress(Exception):
             if found is not None:
                 for solution in found.solutions:
                     _judge(found.planner, found.problem, solution)
-                note_compiled(kind.name, kind.modules)
 
 
 def load_and_compile(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
@@ -78,7 +75,7 @@ def _not_compiled(config_jsons: Iterable[bytes]) -> list[_Kind]:
         if name not in found:
             modules = frozenset(component_modules(json.loads(text)))
             found[name] = _Kind(name, modules, text)
-    return [kind for kind in found.values() if not is_compiled(kind.name, kind.modules)]
+    return list(found.values())
 
 
 def _prepared(kind: _Kind) -> tuple[Any, Any, Any]:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from evoexp.batch.jobs import Job, Outcome
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.store.kept_facts import installed_code
 
 SHORT_S = 0.3  # [s] of all replicates together, below which they are run without workers

@@ -76,12 +76,10 @@ def _load(modules: Iterable[str]) -> None:
 
     from evoexp.batch import jobs, replicate  # noqa: F401
     from evoexp.evolution.cost_statistics import cost_statistics
-    from evoexp.numeric.kept_files import damage_left_alone
 
     for module in modules:
         importlib.import_module(module)
-    with damage_left_alone():  # the parent finds damaged kernels, and says so
-        cost_statistics(np.zeros(1))
+    cost_statistics(np.zeros(1))
     gc.freeze()
 
 

@@ -22,7 +22,7 @@ from typing import IO, Any, NamedTuple, Protocol, Self
 
 from evoexp.batch.worker_server import HEADER, Answer, send
 from evoexp.errors import EvoexpError
-from evoexp.numeric.kept_files import cache_root
+from evoexp.numeric.cache_folder import cache_root
 
 DIED_TWICE = "worker process died twice"  # the reason of a replicate that kills its worker
 MOST_LOST = 5  # [-] times that all workers may die before they have begun

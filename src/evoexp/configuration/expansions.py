@@ -27,7 +27,7 @@ from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.interpolations import MARK
 from evoexp.configuration.kept_condition import KeptCondition
 from evoexp.configuration.search_path import EXPERIMENT, file_directories, folders, is_file
-from evoexp.numeric.kept_files import cache_root
+from evoexp.numeric.cache_folder import cache_root
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 from evoexp.store.kept_facts import add_files, installed_code

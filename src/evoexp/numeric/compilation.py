@@ -3,56 +3,50 @@
 The options keep results bit-identical: no fastmath, no contraction, no reassociation.
 """
 
+import contextlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
-from evoexp.numeric.bare_numba import numba
-from evoexp.numeric.kernel_cache import SharedCache, use_content_cache
-from evoexp.numeric.plain_arrays import use_plain_arrays
+import numba
+from numba.core import cgutils, types
+
+from evoexp.numeric.kernel_folders import CHECKSUMS, kept_kernels
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Value = TypeVar("Value")
-
-cgutils, types, intrinsic = numba.core.cgutils, numba.core.types, numba.extending.intrinsic
-
-use_content_cache()
-use_plain_arrays()
 
 _OPTIONS: dict[str, Any] = {
     "fastmath": False,  # nor contraction, nor reassociation: the same bits on every machine
     "error_model": "numpy",
     "nogil": True,
     "boundscheck": False,
-    "_nrt": True,  # else inherited from whichever kernel is compiled when this one is first called
 }
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function with the options that keep results bit-identical, once for all time."""
-    compiled: Function = _kept(numba.njit(**_OPTIONS)(function))
-    return compiled
+    """Compile a function with the options that keep results bit-identical; numba keeps the code."""
+    return _compiled(function, _OPTIONS)
 
 
 def inlined(function: Function) -> Function:
     """Compile like `kernel`, and have LLVM inline every call: a loop around a call stays scalar."""
-    compiled: Function = _kept(numba.njit(forceinline=True, **_OPTIONS)(function))
-    return compiled
+    return _compiled(function, _OPTIONS | {"forceinline": True})
 
 
-def uncounted(function: Function) -> Function:
-    """Compile a kernel that creates no array like `kernel`, but without counts of references.
+def _compiled(function: Function, options: dict[str, Any]) -> Function:
+    with kept_kernels(function) as are_kept:
+        if are_kept:
+            with contextlib.suppress(RuntimeError):  # numba cannot keep what is in no file
+                compiled = numba.njit(cache=True, **options)(function)
+                CHECKSUMS.check(Path(compiled.stats.cache_path))
+                return cast(Function, compiled)
+    return cast(Function, numba.njit(**options)(function))
 
-    A `kernel` that another one calls counts a reference to every array of its arguments, in tuples
-    too, when it begins and when it ends: with the tuples of a search that is fifty calls.
-    """
-    compiled: Function = _kept(numba.njit(**_OPTIONS | {"_nrt": False})(function))
-    return compiled
 
-
-def _kept(dispatcher: Any) -> Any:
-    """Have a kernel's machine code kept, and compiled by one process at a time."""
-    dispatcher._cache = SharedCache(dispatcher.py_func)
-    return dispatcher
+def intrinsic(function: Callable[..., Any]) -> Any:
+    """Return numba's intrinsic; kernels call it without the typing context that it begins with."""
+    return numba.extending.intrinsic(function)
 
 
 def _borrow(typing_context: Any, value: Any) -> Any:
@@ -64,14 +58,9 @@ def _borrow(typing_context: Any, value: Any) -> Any:
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     if isinstance(kind, types.Array):
-        array = context.make_array(kind)(context, builder, value)
-        array.meminfo = cgutils.get_null_value(array.meminfo.type)
-        array.parent = cgutils.get_null_value(array.parent.type)
-        return array._getvalue()
+        return _without(context, builder, kind, value, "meminfo", "parent")
     if isinstance(kind, types.NumPyRandomGeneratorType):
-        generator = cgutils.create_struct_proxy(kind)(context, builder, value)
-        generator.meminfo = cgutils.get_null_value(generator.meminfo.type)
-        return generator._getvalue()
+        return _without(context, builder, kind, value, "meminfo")
     if isinstance(kind, types.BaseTuple):
         items: Any = kind
         for k, item in enumerate(items):
@@ -80,27 +69,37 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
+def _without(context: Any, builder: Any, kind: Any, value: Any, *fields: str) -> Any:
+    """Return a value of a structure whose fields, pointers, are null."""
+    model = context.data_model_manager[kind]
+    for field in fields:
+        null = cgutils.get_null_value(model.get(builder, value, field).type)
+        value = model.set(builder, value, null, field)
+    return value
+
+
 def _viewing(num_widths: int) -> Any:
     """Return a function for kernels that views part of a flat array, with rows or without."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        from numba.np.arrayobj import populate_array  # what only compiles is not loaded to run
-
         whole, first, *shape = arguments
         data = context.make_array(signature.args[0])(context, builder, whole).data
-        itemsize = context.get_constant(types.intp, 8)
-        made = context.make_array(signature.return_type)(context, builder)
-        populate_array(
-            made,
-            data=builder.gep(data, [first]),
-            shape=cgutils.pack_array(builder, shape),
-            strides=cgutils.pack_array(
-                builder, [*(builder.mul(width, itemsize) for width in shape[1:]), itemsize]
-            ),
-            itemsize=itemsize,
-            meminfo=None,
-        )
-        return made._getvalue()
+        itemsize, num_items = context.get_constant(types.intp, 8), shape[0]
+        for width in shape[1:]:
+            num_items = builder.mul(num_items, width)
+        strides = [*(builder.mul(width, itemsize) for width in shape[1:]), itemsize]
+        fields = {
+            "data": builder.gep(data, [first]),
+            "nitems": num_items,
+            "itemsize": itemsize,
+            "shape": cgutils.pack_array(builder, shape),
+            "strides": cgutils.pack_array(builder, strides),
+        }
+        model = context.data_model_manager[signature.return_type]
+        view = cgutils.get_null_value(model.get_value_type())  # no owner
+        for field, value in fields.items():
+            view = model.set(builder, view, value, field)
+        return view
 
     def flat(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
         return types.Array(array.dtype, 1, "C")(array, types.intp, types.intp), generate
@@ -155,7 +154,7 @@ class _Borrowing(Protocol):
     def __call__(self, value: Value, /) -> Value: ...
 
 
-borrowed: _Borrowing = cast(Any, intrinsic(_borrow))
+borrowed: _Borrowing = intrinsic(_borrow)
 """Return arrays, generators, or tuples of them to any depth, as views that own nothing.
 
 numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and

@@ -9,15 +9,14 @@ A kernel takes a generator as `words`: high and low half of the state, of the in
 """
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.compilation import inlined, intrinsic, kernel
 from evoexp.numeric.elementary import scale_to_normal
 from evoexp.numeric.generator_state import MULTIPLIER, demand_pcg64
 
@@ -102,11 +101,10 @@ def _make_word(typing_context: Any, high: Any, low: Any) -> Any:
     return types.uint64(types.uint64, types.uint64), generate
 
 
-# for kernels: without the typing context
-step_state: Callable[..., tuple[np.uint64, np.uint64]] = cast(Any, _step)
+step_state: Callable[..., tuple[np.uint64, np.uint64]] = _step
 """Return state · factor + addend, modulo 2^128; all of them are given in halves."""
 
-word_of_state: Callable[[np.uint64, np.uint64], np.uint64] = cast(Any, _make_word)
+word_of_state: Callable[[np.uint64, np.uint64], np.uint64] = _make_word
 """Return the word of a state: exclusive or of its halves, rotated."""
 
 

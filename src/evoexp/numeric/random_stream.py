@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import kernel, uncounted
+from evoexp.numeric.compilation import kernel
 from evoexp.numeric.generator_state import state_bytes, states_behind
 
 
@@ -87,7 +87,7 @@ class DrawnAhead:
         return states
 
 
-@uncounted
+@kernel
 def draw(draws: Block) -> float:
     """Return the next uniform number of a block; 0 behind its end."""
     uniforms, taken = draws.uniforms, draws.taken
@@ -104,13 +104,13 @@ def draw_many(draws: Block, count: int) -> NDArray[np.float64]:
     return uniforms[first : taken[0]] if taken[0] <= len(uniforms) else uniforms[:0]
 
 
-@uncounted
+@kernel
 def draw_index(draws: Block, count: int) -> int:
     """Return one of 0 … count − 1."""
     return min(int(draw(draws) * count), count - 1)
 
 
-@uncounted
+@kernel
 def used_up(draws: Block) -> bool:
     """Return whether more numbers were asked for than the block has."""
     return bool(draws.taken[0] > len(draws.uniforms))

@@ -12,9 +12,10 @@ import numpy as np
 from llvmlite import ir
 from numba.core import types
 from numba.core.errors import TypingError
-from numba.extending import intrinsic, models, register_model
+from numba.extending import models, register_model
 from numpy.typing import NDArray
 
+from evoexp.numeric.compilation import intrinsic
 from evoexp.numeric.vectors import LANES, Mask, mask_type
 
 _BYTE = ir.IntType(8)
@@ -114,25 +115,20 @@ def _load_mask(typing_context: Any, array: Any, place: Any) -> Any:
     return mask_type(array, place), generate
 
 
-def _for_kernels(function: Any) -> Any:
-    """Return an intrinsic as kernels call it: without the typing context."""
-    return function
-
-
-load_bytes: Callable[[NDArray[np.int8], np.uint64], Bytes] = _for_kernels(_load_bytes)
+load_bytes: Callable[[NDArray[np.int8], np.uint64], Bytes] = _load_bytes
 """Return eight numbers that stand side by side in a contiguous array, from an index on.
 
 As with `vectors.load`, nothing checks that they lie within the array.
 """
 
-store_bytes: Callable[[NDArray[np.int8], np.uint64, Bytes], None] = _for_kernels(_store_bytes)
+store_bytes: Callable[[NDArray[np.int8], np.uint64, Bytes], None] = _store_bytes
 """Write eight numbers side by side into a contiguous array, from an index on."""
 
-spread_byte: Callable[[int], Bytes] = _for_kernels(_spread_byte)
+spread_byte: Callable[[int], Bytes] = _spread_byte
 """Return bytes of one number, from −128 to 127, in every lane."""
 
-equal_bytes: Callable[[Bytes, int], Mask] = _for_kernels(_equal_bytes)
+equal_bytes: Callable[[Bytes, int], Mask] = _equal_bytes
 """Return where bytes are a number from −128 to 127."""
 
-load_mask: Callable[[NDArray[np.uint8], np.uint64], Mask] = _for_kernels(_load_mask)
+load_mask: Callable[[NDArray[np.uint8], np.uint64], Mask] = _load_mask
 """Return eight truth values from the bits of a number in a contiguous array, the lowest first."""

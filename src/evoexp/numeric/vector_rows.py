@@ -13,9 +13,9 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.errors import TypingError
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from evoexp.numeric.compilation import intrinsic
 from evoexp.numeric.vectors import LANES, Vector, vector_type
 
 _INDEX = ir.IntType(32)
@@ -180,23 +180,18 @@ def _store_places(typing_context: Any, array: Any, place: Any, vector: Any) -> A
     return types.void(array, types.uint64, vector_type), generate
 
 
-def _for_kernels(function: Any) -> Any:
-    """Return an intrinsic as kernels call it: without the typing context."""
-    return function
-
-
 Eight = tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]
 FloatArray = NDArray[np.float64]
 Places = NDArray[np.uint64]
 
-transposed: Callable[[Eight], Eight] = _for_kernels(_transpose)
+transposed: Callable[[Eight], Eight] = _transpose
 """Return eight vectors as rows of a square, transposed: lane j of row i becomes lane i of row j."""
 
-load_each: Callable[[FloatArray, Places, np.uint64, np.uint64], Vector] = _for_kernels(_load_each)
+load_each: Callable[[FloatArray, Places, np.uint64, np.uint64], Vector] = _load_each
 """Return the number that stands at an offset from each lane's place; see `load_pairs`."""
 
-load_pairs: Callable[[FloatArray, Places, np.uint64, np.uint64], tuple[Vector, Vector]] = (
-    _for_kernels(_columns(2))
+load_pairs: Callable[[FloatArray, Places, np.uint64, np.uint64], tuple[Vector, Vector]] = _columns(
+    2
 )
 """Return the two numbers that stand at an offset from each lane's place, as two vectors.
 
@@ -209,12 +204,10 @@ Args:
 
 load_quads: Callable[
     [FloatArray, Places, np.uint64, np.uint64], tuple[Vector, Vector, Vector, Vector]
-] = _for_kernels(_columns(4))
+] = _columns(4)
 """Return four numbers per lane as four vectors; see `load_pairs`."""
 
-num_up_to: Callable[[FloatArray, Places, np.uint64, np.uint64, Vector, int], Vector] = _for_kernels(
-    _count
-)
+num_up_to: Callable[[FloatArray, Places, np.uint64, np.uint64, Vector, int], Vector] = _count
 """Return how many of eight numbers at an offset from each lane's place are not above its limit.
 
 Args:
@@ -226,8 +219,8 @@ Args:
     num: How many of the eight are looked at, the last ones; a constant.
 """
 
-store_places: Callable[[Places, np.uint64, Vector], None] = _for_kernels(_store_places)
+store_places: Callable[[Places, np.uint64, Vector], None] = _store_places
 """Write eight whole numbers, not negative, as places into an array, from an index on."""
 
-lane_numbers: Callable[[], Vector] = _for_kernels(_number_lanes)
+lane_numbers: Callable[[], Vector] = _number_lanes
 """Return 0, 1, … 7."""

@@ -19,10 +19,10 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.errors import TypingError
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import lower_builtin, models, register_model
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import inlined
+from evoexp.numeric.compilation import inlined, intrinsic
 
 LANES = 8
 
@@ -320,41 +320,34 @@ def _reinterpretation(targets: dict[Any, Any]) -> Any:
     return reinterpret
 
 
-def _for_kernels(function: Any) -> Any:
-    """Return an intrinsic as kernels call it: without the typing context."""
-    return function
-
-
-load: Callable[[NDArray[np.float64], np.uint64], Vector] = _for_kernels(_load)
+load: Callable[[NDArray[np.float64], np.uint64], Vector] = _load
 """Return eight numbers that stand side by side in a contiguous array, from an index on.
 
 Neither `load` nor `store` checks that they lie within the array.
 """
 
-store: Callable[[NDArray[np.float64], np.uint64, Vector], None] = _for_kernels(_store)
+store: Callable[[NDArray[np.float64], np.uint64, Vector], None] = _store
 """Write eight numbers side by side into a contiguous array, from an index on."""
 
-load_singles: Callable[[NDArray[np.float32], np.uint64], Singles] = _for_kernels(_load_singles)
+load_singles: Callable[[NDArray[np.float32], np.uint64], Singles] = _load_singles
 """Return eight numbers of a contiguous array of float32; see `load`."""
 
-store_singles: Callable[[NDArray[np.float32], np.uint64, Vector | Singles], None] = _for_kernels(
-    _store_singles
-)
+store_singles: Callable[[NDArray[np.float32], np.uint64, Vector | Singles], None] = _store_singles
 """Write eight numbers, rounded, side by side into a contiguous array of float32."""
 
-spread: Callable[[float], Vector] = _for_kernels(_spread_scalar)
+spread: Callable[[float], Vector] = _spread_scalar
 """Return a vector of one number in every lane."""
 
-spread_single: Callable[[np.float32], Singles] = _for_kernels(_spread_scalar)
+spread_single: Callable[[np.float32], Singles] = _spread_scalar
 """Return singles of one number in every lane."""
 
-select: Callable[[Any, Any, Any], Any] = _for_kernels(_select)
+select: Callable[[Any, Any, Any], Any] = _select
 """Return the first value in lanes where a condition holds, the second in the others."""
 
-mask_bits: Callable[[Mask], int] = _for_kernels(_mask_bits)
+mask_bits: Callable[[Mask], int] = _mask_bits
 """Return the lanes in which a condition holds as the bits of a whole number, the first lowest."""
 
-least_lane: Callable[[Vector], float] = _for_kernels(_least_lane)
+least_lane: Callable[[Vector], float] = _least_lane
 """Return the least number of a vector without NaN."""
 
 root: Callable[[Vector], Vector] = _of_llvm("sqrt")

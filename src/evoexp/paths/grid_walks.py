@@ -8,7 +8,7 @@ the path has that node at its place; so nothing needs to be cleared between path
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, inlined, kernel, uncounted
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, used_up
 from evoexp.paths.grid_choices import SHIFT, TOTAL
 from evoexp.paths.grids import Moves, NodeArray, StepArray
@@ -99,7 +99,7 @@ def walk_by_choices(
     _write(trail, count, False, path, place)
 
 
-@uncounted
+@kernel
 def walk_to_exits(
     draws: Block,
     entries: NDArray[np.uint32],
@@ -168,7 +168,7 @@ def _walked(
     return (at if node == target else num + ONE), bool(is_rounded or nearest < REST - NEAR)
 
 
-@uncounted
+@kernel
 def follow_exits(exits: NodeArray, ends: tuple[int, int], path: NodeArray) -> None:
     """Write a walk without its loops: every node's last exit leads on (Wilson 1996).
 
@@ -217,7 +217,7 @@ def walk_each(
     return len(paths)
 
 
-@uncounted
+@kernel
 def _next_node(
     uniform: float,
     neighbours: NodeArray,
@@ -250,7 +250,7 @@ def _next_node(
     return chosen
 
 
-@uncounted
+@kernel
 def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
     """Write a path without its loops: the nodes between two visits of a node are left out.
 
@@ -265,7 +265,7 @@ def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray)
     _leap(nodes, count, path, place)
 
 
-@uncounted
+@kernel
 def _leap(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
     """Write a path without its loops: from the last place of a node it never comes back."""
     kept, k = 0, 1
@@ -277,7 +277,7 @@ def _leap(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> No
     path[0] = kept
 
 
-@uncounted
+@kernel
 def _write(
     trail: NodeArray,
     count: int,

@@ -147,7 +147,7 @@ def spline_pivots(num_segments: int, end_condition: EndCondition) -> FloatArray:
 def aligned_zeros(size: int) -> FloatArray:
     """Return zeros (size,) float64 that begin at a cache line."""
     raw = np.zeros(size + 8)
-    offset = (-raw.ctypes.data % 64) // 8
+    offset = (-raw.__array_interface__["data"][0] % 64) // 8
     return raw[offset : offset + size]
 
 

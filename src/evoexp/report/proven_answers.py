@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray

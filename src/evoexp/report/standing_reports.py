@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.store.kept_facts import file_stamps, installed_code
 from evoexp.version import version_of
 

@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.errors import SettingError
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.mesh_checks import load, triangles_of

@@ -14,11 +14,10 @@ import numpy as np
 
 from evoexp.collision.box_support import EXACT, coal
 from evoexp.collision.models.body_covers import Cover, sphere_cover
-from evoexp.numeric.code_keys import loaded_key
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.kernel_folders import sources_key
 from evoexp.version import version_of
 
-_CODE = sphere_cover.__module__
 _LIBRARIES = ("numpy", "scipy", "coal")
 _SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 
@@ -69,4 +68,4 @@ def _corners(triangle: Any) -> list[int]:
 @functools.cache
 def _code() -> bytes:
     versions = [*map(version_of, _LIBRARIES)]
-    return hashlib.sha256(json.dumps([*versions, EXACT, loaded_key(_CODE)]).encode()).digest()
+    return hashlib.sha256(json.dumps([*versions, EXACT, sources_key()]).encode()).digest()

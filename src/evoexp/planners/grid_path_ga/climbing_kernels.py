@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import borrowed, inlined, kernel, uncounted
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_measures import POSITIVE, Tolls, length_and_mean
 from evoexp.paths.grid_walks import walk_to_exits
@@ -130,7 +130,7 @@ def climb_generations(
     return trial
 
 
-@uncounted
+@kernel
 def climb_by_pieces(
     draws: Block,
     first: int,
@@ -235,7 +235,7 @@ def _tolls_between(nodes: NodeArray, first: int, last: int, tolls: Tolls) -> tup
     return int(moved), int(level)
 
 
-@uncounted
+@kernel
 def _replace(path: NodeArray, piece: Piece, ledger: Ledger, k: int) -> None:
     """Write a path with its regenerated piece."""
     place, walked, count = ledger.place[k], ledger.walked, path[0]
@@ -257,7 +257,7 @@ def _replace(path: NodeArray, piece: Piece, ledger: Ledger, k: int) -> None:
     _enter(path, head + 1, ledger, k)
 
 
-@uncounted
+@kernel
 def _enter(path: NodeArray, first: int, ledger: Ledger, k: int) -> None:
     """Write places and sums of a path from a place on."""
     place, moves, levels = ledger.place[k], ledger.moves[k], ledger.levels[k]

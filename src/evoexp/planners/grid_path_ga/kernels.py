@@ -9,7 +9,7 @@ import numpy as np
 
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
-from evoexp.numeric.compilation import borrowed, inlined, kernel, uncounted
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
 from evoexp.paths.grid_measures import measure_by_tolls, measure_path
 from evoexp.paths.grids import NodeArray
@@ -145,7 +145,7 @@ def note(population: Population, place: int, found: Population, summaries: Float
     copy_path(population.paths[int(own[0])], found.paths[place])
 
 
-@uncounted
+@kernel
 def advance(
     draws: Block,
     world: World,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import copy_part, inlined, uncounted
+from evoexp.numeric.compilation import copy_part, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_choices import Choices
 from evoexp.paths.grid_measures import Tolls
@@ -97,13 +97,13 @@ class Scratch(NamedTuple):
         return cls(place, joined, seen, sites, steps, queue, walked)
 
 
-@uncounted
+@kernel
 def copy_path(path: NodeArray, out: NodeArray) -> None:
     """Copy a path; the rest of the row stays as it is."""
     copy_part(path, 0, out, 0, path[0] + 1)
 
 
-@uncounted
+@kernel
 def cross(
     draws: Block,
     world: World,
@@ -161,7 +161,7 @@ def places_of(site: int) -> tuple[int, int]:
     return site >> PLACE_BITS, site & (2**PLACE_BITS - 1)
 
 
-@uncounted
+@kernel
 def exchange_without_loops(
     one: NodeArray,
     two: NodeArray,
@@ -196,7 +196,7 @@ def exchange_without_loops(
     _splice(two, j, one, i, children[1])
 
 
-@uncounted
+@kernel
 def _exchange(
     head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray, scratch: Scratch
 ) -> None:
@@ -216,7 +216,7 @@ def _splice(head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray) 
     child[0] = tail[0] - j + i
 
 
-@uncounted
+@kernel
 def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: NodeArray) -> int:
     """Write the head of a path up to i, the node `link` if it is one, another's tail from j.
 
@@ -232,7 +232,7 @@ def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: N
     return count + left
 
 
-@uncounted
+@kernel
 def coincident_sites(one: NodeArray, two: NodeArray, seen: IntArray, sites: IntArray) -> int:
     """Write the places of common nodes but start and goal into `sites` (nodes + 1,).
 
@@ -261,7 +261,7 @@ def coincident_sites(one: NodeArray, two: NodeArray, seen: IntArray, sites: IntA
     return int(np.int64(count))
 
 
-@uncounted
+@kernel
 def near_sites(
     draws: Block, coordinates: NodeArray, one: NodeArray, two: NodeArray, reach: int
 ) -> tuple[int, int]:
@@ -297,7 +297,7 @@ def near_sites(
     return 0, 0
 
 
-@uncounted
+@kernel
 def _count_near(coordinates: NodeArray, path: NodeArray, node: int, reach: int) -> int:
     count = 0
     for i in range(2, path[0]):
@@ -305,7 +305,7 @@ def _count_near(coordinates: NodeArray, path: NodeArray, node: int, reach: int) 
     return count
 
 
-@uncounted
+@kernel
 def _near(coordinates: NodeArray, one: int, two: int, reach: int) -> bool:
     near = True
     for axis in range(coordinates.shape[1]):
@@ -313,7 +313,7 @@ def _near(coordinates: NodeArray, one: int, two: int, reach: int) -> bool:
     return near
 
 
-@uncounted
+@kernel
 def connection(draws: Block, neighbours: NodeArray, one: int, two: int) -> int:
     """Return a node between two others, drawn among all that moves join to both.
 
@@ -344,7 +344,7 @@ def connection(draws: Block, neighbours: NodeArray, one: int, two: int) -> int:
     return NOT_CONNECTED
 
 
-@uncounted
+@kernel
 def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Scratch) -> None:
     """Replace the piece between two nodes of a path, drawn at random, by a random walk."""
     neighbours, potentials, fronts = world.neighbours, world.potentials, world.fronts
@@ -379,7 +379,7 @@ def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Sc
     settle(joined, last, erase, path, place)
 
 
-@uncounted
+@kernel
 def settle(nodes: NodeArray, count: int, erase: bool, path: NodeArray, place: NodeArray) -> None:
     """Write a joined path, without its loops if these are erased or if it is too long with them."""
     if erase or count > len(path) - 1:

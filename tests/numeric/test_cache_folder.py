@@ -1,40 +1,24 @@
 """Files of the cache are checked before they are used, and are this user's alone."""
 
 import os
-import pickle
 import random
 import shutil
 import stat
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from evoexp.numeric import kept_files
-from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
-from evoexp.numeric.kernel_files import KernelFiles
+from evoexp.numeric import cache_folder
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 
-FORM = {"machine code": b"\x00\x01" * 500}
-OTHER = {"machine code": b"\x02\x03" * 500}
-
-
-class Opened:
-    """Pickled, it notes in a file that it was unpickled."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __reduce__(self) -> Any:
-        return Path.touch, (self.path,)
+CONTENT = bytes(range(256)) * 4
 
 
 @pytest.fixture(autouse=True)
 def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Say everything anew in every test."""
-    monkeypatch.setattr(kept_files.MESSAGES, "_said", set())
-    monkeypatch.setattr(kept_files.MESSAGES, "are_printed", True)
-    kept_files._settled.cache_clear()
+    """Look at the folder anew in every test."""
+    monkeypatch.setattr(cache_folder, "_settled", cache_folder._settled.__wrapped__)
 
 
 def truncated(path: Path) -> None:
@@ -61,69 +45,28 @@ def made_a_directory(path: Path) -> None:
 
 
 def taken_from_another(path: Path) -> None:
-    other = KernelFiles(path.parent, "other")
-    other.save("double", OTHER)
-    shutil.copy(next(path.parent.glob(f"other*{path.suffix}")), path)
+    write_kept(path.with_name("other"), b"other")
+    shutil.copy(path.with_name("other"), path)
 
 
-def replaced_by_a_pickle(path: Path) -> None:
-    path.write_bytes(pickle.dumps(Opened(path.parent / "opened")))
-
-
-DAMAGES = (
-    truncated,
-    emptied,
-    zeroed,
-    flipped,
-    made_a_directory,
-    taken_from_another,
-    replaced_by_a_pickle,
-)
+DAMAGES = (truncated, emptied, zeroed, flipped, made_a_directory, taken_from_another)
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-@pytest.mark.parametrize("which", [".nbi", ".nbc"])
-def test_a_damaged_file_counts_as_missing_is_said_once_and_replaced(
-    damage: Callable[[Path], None],
-    which: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+def test_a_damaged_file_is_not_read_and_can_be_replaced(
+    damage: Callable[[Path], None], tmp_path: Path
 ) -> None:
-    KernelFiles(tmp_path, "kernel").save("double", FORM)
-    assert KernelFiles(tmp_path, "kernel").load("double") == FORM
-    assert KernelFiles(tmp_path, "kernel").load("int") is None
-    (path,) = tmp_path.glob(f"kernel*{which}")
+    path = tmp_path / "file"
+    with pytest.raises(FileNotFoundError):
+        read_kept(path)
+    write_kept(path, CONTENT)
+    assert read_kept(path) == CONTENT
     damage(path)
-    files = KernelFiles(tmp_path, "kernel")
-    assert files.load("double") is None
-    assert files.load("double") is None
-    text = f"evoexp: {path}: damaged; damaged kernels are compiled again\n"
-    assert capsys.readouterr().err == text
-    assert not (tmp_path / "opened").exists(), "nothing is unpickled unchecked"
-    files.save("double", FORM)
-    assert KernelFiles(tmp_path, "kernel").load("double") == FORM
-    assert not list(tmp_path.glob("*.tmp"))
-
-
-def test_a_form_that_is_replaced_leaves_no_file(tmp_path: Path) -> None:
-    files = KernelFiles(tmp_path, "kernel")
-    files.save("double", FORM)
-    files.save("int", FORM | {"more": b""})
-    files.save("double", OTHER)
-    assert files.load("double") == OTHER
-    assert files.load("int") == FORM | {"more": b""}
-    assert len(list(tmp_path.iterdir())) == 3
-
-
-def test_another_process_finds_the_damage_that_a_server_leaves(tmp_path: Path) -> None:
-    KernelFiles(tmp_path, "kernel").save("double", FORM)
-    flipped(next(tmp_path.glob("*.nbc")))
-    server = KernelFiles(tmp_path, "kernel")
-    with kept_files.damage_left_alone():
-        assert server.load("double") is None
-        server.save("double", FORM)
     with pytest.raises(Damaged):
-        read_kept(next(tmp_path.glob("*.nbc")))
+        read_kept(path)
+    write_kept(path, CONTENT)
+    assert read_kept(path) == CONTENT
+    assert not list(tmp_path.glob("*.tmp"))
 
 
 def test_a_full_disk_leaves_no_part_of_a_file(
@@ -170,7 +113,7 @@ def test_the_cache_of_another_user_is_not_used(
 ) -> None:
     own.mkdir()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kept_files, "_owner", lambda: os.geteuid() + 1)
+        patch.setattr(cache_folder, "is_own", lambda path: False)
         other = cache_root()
     assert other != own
     assert stat.S_IMODE(other.stat().st_mode) == 0o700
@@ -186,7 +129,7 @@ def test_a_file_of_another_user_is_not_read(
 ) -> None:
     write_kept(tmp_path / "a", b"content")
     assert read_kept(tmp_path / "a") == b"content"
-    monkeypatch.setattr(kept_files, "_owner", lambda: os.geteuid() + 1)
+    monkeypatch.setattr(cache_folder, "is_own", lambda path: False)
     with pytest.raises(Damaged):
         read_kept(tmp_path / "a")
 

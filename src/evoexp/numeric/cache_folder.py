@@ -1,0 +1,113 @@
+"""The user's cache: a folder that is theirs alone, and files in it that are checked when read.
+
+Compiled kernels are unpickled and run. So nothing is read out of a folder or a file of another
+user. A file begins with a hash of its name and content, and counts as missing if it is damaged.
+"""
+
+import atexit
+import functools
+import os
+import shutil
+import sys
+import tempfile
+import uuid
+from pathlib import Path
+
+import platformdirs
+import xxhash
+
+VARIABLE = "EVOEXP_CACHE"  # names the folder; by default it is the system's for this user
+_SIZE = 16  # [B] of the hash
+_OTHERS_MAY_WRITE = 0o022  # bits of a folder's mode
+
+
+class Damaged(Exception):
+    """A file that is not as it was written, or that another user wrote."""
+
+
+def cache_root() -> Path:
+    """Return a folder that this user can write and nobody else; a temporary one if need be."""
+    return _settled(os.environ.get(VARIABLE) or platformdirs.user_cache_dir("evoexp"))
+
+
+@functools.cache
+def _settled(named: str) -> Path:
+    folder, reason = Path(named), "must be an absolute path"  # a user without a home
+    if folder.is_absolute() or VARIABLE in os.environ:
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            reason = _made_private(folder)
+        except OSError as error:
+            reason = error.strerror or str(error)
+        if not reason:
+            return folder
+    temporary = Path(tempfile.mkdtemp(prefix="evoexp-"))
+    os.environ[VARIABLE] = str(temporary)  # worker processes inherit it
+    atexit.register(_remove, temporary, os.getpid())
+    text = f"evoexp: {folder}: {reason}; kernels are compiled for this command and not kept"
+    print(text, file=sys.stderr, flush=True)
+    return temporary
+
+
+def _made_private(folder: Path) -> str:
+    """Take others' permission to write; return why a folder cannot be used, or nothing."""
+    if not is_own(folder):
+        return "belongs to another user, whose files are not run"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return "cannot be written"
+    mode = folder.stat().st_mode
+    if mode & _OTHERS_MAY_WRITE:
+        folder.chmod(mode & ~_OTHERS_MAY_WRITE & 0o777)
+    return ""
+
+
+def is_own(path: Path) -> bool:
+    """Return whether a file or folder is this user's; where nobody owns files, all are."""
+    return not hasattr(os, "geteuid") or path.stat().st_uid == os.geteuid()
+
+
+def _remove(temporary: Path, process: int) -> None:
+    if os.getpid() == process:  # and not a worker that was forked from it
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def read_kept(path: Path) -> bytes:
+    """Return the content of a kept file.
+
+    Raises:
+        FileNotFoundError: If it is not there.
+        Damaged: If it is not as it was written, or not this user's.
+    """
+    try:
+        content = path.read_bytes() if is_own(path) else b""
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise FileNotFoundError(path) from error
+    except OSError as error:
+        raise Damaged(path) from error
+    if content[:_SIZE] != _hash(path, content[_SIZE:]):
+        raise Damaged(path)
+    return content[_SIZE:]
+
+
+def write_kept(path: Path, content: bytes) -> None:
+    """Keep a file under a name, whole or not at all.
+
+    Raises:
+        OSError: If that cannot be done.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}.tmp")
+    try:
+        temporary.write_bytes(_hash(path, content) + content)
+        if path.is_dir():  # put there by somebody else: no file can take its place
+            shutil.rmtree(path)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _hash(path: Path, content: bytes) -> bytes:
+    """Return the hash of a content under a name and that of its folder, wherever the cache is."""
+    digest = xxhash.xxh3_128(f"{path.parent.name}/{path.name}\0".encode(errors="surrogateescape"))
+    digest.update(content)
+    return digest.digest()

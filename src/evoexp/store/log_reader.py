@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import orjson
-from mcap.records import Message
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
@@ -116,11 +115,6 @@ class _OpenLog:
         ):
             raise CorruptLog(f"{self.name}: altered: its summary is of another replicate")
         return summary
-
-    def messages(self, topic: str) -> Iterator[Message]:
-        """Yield the messages of a topic in the order of the file."""
-        for _, _, message in self.reader.iter_messages(topic, log_time_order=False):
-            yield message
 
     def _by_name(self, records: list[tuple[str, Value]]) -> dict[str, Value]:
         """Return records by their names, of which none stands there twice."""
@@ -239,7 +233,8 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
     with _opened(source) as log:
-        rows = [orjson.loads(message.data) for message in log.messages(written.GENERATION_TOPIC)]
+        messages = log.reader.iter_messages(written.GENERATION_TOPIC, log_time_order=False)
+        rows = [orjson.loads(message.data) for _, _, message in messages]
         names = dict.fromkeys(name for row in rows for name in row if name.startswith(TERM))
         # rows that each have terms of their own: their table would be larger than any log
         if len(names) * len(rows) * 8 > MAX_LOG:

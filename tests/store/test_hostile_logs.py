@@ -240,12 +240,29 @@ def test_a_log_as_large_as_any_takes_the_stated_memory(
         assert confined(task, tmp_path, MOST // share) == []
 
 
-def test_more_attachments_than_any_log_has(content: bytes) -> None:
-    index = index_of(put_together(take_apart(content)))
-    entry = next(each for each in index if each[0] == Opcode.ATTACHMENT_INDEX)
-    names = [entry[1].replace(b"config.json", b"%011d" % k) for k in range(1100)]
-    hostile = put_together(take_apart(content), [*index, *((entry[0], name) for name in names)])
-    assert len(attempt(hostile)) == len(READERS)
+@pytest.mark.parametrize("opcode", [Opcode.ATTACHMENT, Opcode.METADATA])
+def test_more_attachments_than_any_log_has(content: bytes, tmp_path: Path, opcode: Opcode) -> None:
+    """Each takes many times its bytes in memory."""
+    record = Attachment(0, 0, "", "", b"") if opcode == Opcode.ATTACHMENT else Metadata("", {})
+    many = [Part(opcode, written(record))] * 3_000
+    hostile = put_together([*take_apart(content), *many], index_of(content))
+    assert len(confined(lambda: attempt(hostile), tmp_path, LITTLE)) == len(READERS)
+
+
+def test_an_index_that_points_elsewhere(content: bytes) -> None:
+    """What an attachment holds may look like a chunk, which nobody has checked."""
+    parts = take_apart(content)
+    index = index_of(put_together(parts))
+    entry = next(body for opcode, body in index if opcode == Opcode.CHUNK_INDEX)
+    moved = entry[:16] + struct.pack("<Q", 100) + entry[24:]
+    for summary in (
+        [(op, moved if body == entry else body) for op, body in index],
+        [*index, (Opcode.CHUNK_INDEX, moved)],
+        [(op, body) for op, body in index if body != entry],
+    ):
+        refusals = attempt(put_together(parts, summary))
+        assert len(refusals) == len(READERS)
+        assert all("index does not tell the records" in text for text in refusals)
 
 
 def test_a_file_that_is_too_large_or_no_file(tmp_path: Path) -> None:

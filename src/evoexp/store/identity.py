@@ -1,4 +1,4 @@
-"""What a run directory holds beside its logs: its configuration, its manifest, its plans.
+"""The files of a run beside its logs: its configuration, its manifest, its plans.
 
 The configuration is the identity of the run; where it is lost, a log has it.
 """

@@ -2,7 +2,7 @@
 
 A log may come from anybody, and checksums are no proof of good will. Whatever a file claims, what
 is read of it takes memory in proportion to `MAX_LOG` and `MAX_MESSAGE`: both checksums are
-compared, every record must fit into its own bytes, sizes are compared with these limits before
+compared, records must fit into their own bytes, sizes are compared with these limits before
 anything is decompressed, and the index must point to the records that are there and to no others.
 """
 
@@ -11,13 +11,14 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
-from typing import Any
+from typing import Any, NamedTuple
 
 import zstandard
-from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
+from mcap.records import Attachment, Metadata
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from evoexp.errors import CorruptLog
@@ -29,9 +30,9 @@ MAX_LOG = 128 * MEGABYTE
 # One solution or front: 300,000 numbers. The largest of a shipped experiment takes 60 kB.
 MAX_MESSAGE = 8 * MEGABYTE
 MAX_CHUNK = MAX_MESSAGE + 64 * 1024  # a chunk ends with the message that passes 56 KiB
-MAX_RECORD = MEGABYTE  # [B] of any record but chunks and attachments
-MAX_RECORDS = 50_000  # outside of chunks; the largest log has some 2,300 chunks
-MAX_ATTACHMENTS = 1000
+MAX_METADATA = MEGABYTE  # [B] of a record of metadata
+MAX_SUMMARY = 8 * MEGABYTE  # [B] of the summary section
+MAX_ATTACHMENTS = 1000  # records of metadata included
 # Reading a log takes at most so many times the memory of `MAX_LOG`, whatever the log holds.
 MEMORY_FACTOR = 10
 
@@ -40,25 +41,6 @@ _CHUNK = struct.Struct("<16xQ4xI4sQ")  # size, bytes of the compression's name, 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
 _TAIL = _FOOTER.size + len(MAGIC)
-_INDICES = {  # opcode of a record → that of the index that tells its place
-    Opcode.CHUNK: Opcode.CHUNK_INDEX,
-    Opcode.ATTACHMENT: Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA: Opcode.METADATA_INDEX,
-}
-_IN_DATA: dict[int, Any] = {
-    Opcode.HEADER: records.Header,
-    Opcode.ATTACHMENT: records.Attachment,
-    Opcode.METADATA: records.Metadata,
-}
-_IN_SUMMARY: dict[int, Any] = {
-    Opcode.SCHEMA: records.Schema,
-    Opcode.CHANNEL: records.Channel,
-    Opcode.STATISTICS: records.Statistics,
-    Opcode.CHUNK_INDEX: records.ChunkIndex,
-    Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
-    Opcode.METADATA_INDEX: records.MetadataIndex,
-    Opcode.SUMMARY_OFFSET: records.SummaryOffset,
-}
 _UNREADABLE = (
     McapError,
     zstandard.ZstdError,
@@ -73,6 +55,14 @@ _UNREADABLE = (
 )
 
 
+class CheckedLog(NamedTuple):
+    """A log that is checked."""
+
+    reader: SeekingReader  # of mcap, for its messages
+    metadata: list[Metadata]
+    attachments: list[Attachment]
+
+
 @contextmanager
 def unreadable_is_corrupt(name: str) -> Iterator[None]:
     """Turn any error of decoding damaged or foreign bytes into one line that names the log."""
@@ -84,21 +74,30 @@ def unreadable_is_corrupt(name: str) -> Iterator[None]:
         ) from error
 
 
-def check(content: bytes, name: str) -> None:
-    """Check the bytes of a log: magic, checksums, the size of every record, its index.
+def check(content: bytes, name: str) -> CheckedLog:
+    """Check the bytes of a log: magic, checksums, the sizes of its records, its index.
 
     Raises:
         CorruptLog: The bytes are empty, too many, no MCAP, cut, altered, beyond a limit, or an MCAP
             without checksums.
     """
-    summary_start = _checked_sums(content, name)
+    summary_start = check_sums(content, name)
     with unreadable_is_corrupt(name):
-        held = _checked_data(content, summary_start - _DATA_END.size)
-        if held != _told_places(content, summary_start):
+        if len(content) - summary_start > MAX_SUMMARY:
+            raise ValueError(f"a summary section of more than {MAX_SUMMARY} bytes")
+        log = CheckedLog(SeekingReader(BytesIO(content), validate_crcs=True), [], [])
+        summary: Any = log.reader.get_summary()
+        told = [
+            [each.chunk_start_offset for each in summary.chunk_indexes],
+            [each.offset for each in summary.metadata_indexes],
+            [each.offset for each in summary.attachment_indexes],
+        ]
+        if told != _places(content, summary_start - _DATA_END.size, log):
             raise CorruptLog(f"{name}: altered: its index does not tell the records that it holds")
+        return log
 
 
-def _checked_sums(content: bytes, name: str) -> int:
+def check_sums(content: bytes, name: str) -> int:
     """Check magic, footer and both checksums, which together cover every byte.
 
     Returns:
@@ -136,62 +135,38 @@ def _checked_sums(content: bytes, name: str) -> int:
     return int(summary_start)
 
 
-def _checked_data(content: bytes, data_end: int) -> dict[int, list[int]]:
-    """Check the records of the data section.
+def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
+    """Check the records of the data section; add metadata and attachments to a log.
 
     Returns:
-        Opcode of an index → where the records stand that it tells.
+        Where chunks, metadata and attachments stand.
     """
-    held: dict[int, list[int]] = {index: [] for index in _INDICES.values()}
-    size, view = 0, memoryview(content)
-    for opcode, start, body, stop in _places(content, len(MAGIC), data_end):
+    chunks, metadata, attachments = list[int](), list[int](), list[int]()
+    size, start, view = 0, len(MAGIC), memoryview(content)
+    while start < data_end:
+        opcode, length = _HEAD.unpack_from(content, start)
+        body, stop = start + _HEAD.size, start + _HEAD.size + length
+        if stop > data_end:
+            raise ValueError(f"a record ends at byte {stop}, beyond {data_end}")
         if opcode == Opcode.CHUNK:
+            chunks.append(start)
             size += _chunk_size(view[body:stop])
             if size > MAX_LOG:
                 raise ValueError(f"too large: {_too_large(size)}")
-        elif opcode in _IN_DATA:
-            _parse(_IN_DATA[opcode], view[body:stop])
-        elif opcode != Opcode.MESSAGE_INDEX:
+        elif opcode == Opcode.METADATA:
+            if length > MAX_METADATA:
+                raise ValueError(f"{length} bytes in a record of at most {MAX_METADATA}")
+            metadata.append(start)
+            log.metadata.append(Metadata.read(ReadDataStream(BytesIO(view[body:stop]))))
+        elif opcode == Opcode.ATTACHMENT:
+            attachments.append(start)
+            log.attachments.append(Attachment.read(ReadDataStream(BytesIO(view[body:stop]))))
+        elif opcode not in (Opcode.HEADER, Opcode.MESSAGE_INDEX):
             raise ValueError(f"a record of kind {opcode} among the data")
-        if opcode in _INDICES:
-            held[_INDICES[Opcode(opcode)]].append(start)
-    if (count := len(held[Opcode.ATTACHMENT_INDEX])) > MAX_ATTACHMENTS:
-        raise ValueError(f"{count} attachments; {MAX_ATTACHMENTS} are read")
-    return held
-
-
-def _told_places(content: bytes, summary_start: int) -> dict[int, list[int]]:
-    """Check the records of the summary section; return the places that its indices tell."""
-    told: dict[int, list[int]] = {index: [] for index in _INDICES.values()}
-    view = memoryview(content)
-    for opcode, _, body, stop in _places(content, summary_start, len(content) - _TAIL):
-        record = _parse(_IN_SUMMARY[opcode], view[body:stop])
-        if opcode == Opcode.CHUNK_INDEX:
-            told[opcode].append(record.chunk_start_offset)
-        elif opcode in told:
-            told[opcode].append(record.offset)
-    return told
-
-
-def _places(content: bytes, start: int, end: int) -> Iterator[tuple[int, int, int, int]]:
-    """Yield (opcode, start, start of the body, end) of the records of a section."""
-    for _ in range(MAX_RECORDS):
-        if start == end:
-            return
-        opcode, length = _HEAD.unpack_from(content, start)
-        body, stop = start + _HEAD.size, start + _HEAD.size + length
-        if stop > end:
-            raise ValueError(f"a record ends at byte {stop}, beyond {end}")
-        if length > MAX_RECORD and opcode not in (Opcode.CHUNK, Opcode.ATTACHMENT):
-            raise ValueError(f"{length} bytes in a record of at most {MAX_RECORD}")
-        yield opcode, start, body, stop
+        if len(metadata) + len(attachments) > MAX_ATTACHMENTS:
+            raise ValueError(f"more than {MAX_ATTACHMENTS} attachments and records of metadata")
         start = stop
-    raise ValueError(f"more than {MAX_RECORDS} records")
-
-
-def _parse(record: Any, body: memoryview) -> Any:
-    """Return the record of mcap's class `record`; one that claims more than its body raises."""
-    return record.read(ReadDataStream(BytesIO(body)))
+    return [chunks, metadata, attachments]
 
 
 def _chunk_size(body: memoryview) -> int:

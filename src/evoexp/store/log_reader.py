@@ -7,15 +7,12 @@ and compares the content digest.
 import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import orjson
-from mcap.reader import SeekingReader
-from mcap.records import Message
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
@@ -23,7 +20,7 @@ from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
 from evoexp.store.digests import ContentDigest, channel_identity
-from evoexp.store.log_bounds import MAX_LOG, check, unreadable_is_corrupt
+from evoexp.store.log_bounds import MAX_LOG, CheckedLog, check, unreadable_is_corrupt
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
@@ -77,18 +74,19 @@ class LogContents(NamedTuple):
 
 
 class _OpenLog:
-    """A log of a run, checked, behind mcap's reader."""
+    """A log of a run, checked."""
 
-    def __init__(self, content: bytes, name: str) -> None:
-        """Read its metadata.
+    def __init__(self, checked: CheckedLog, name: str) -> None:
+        """Look at what it says of itself.
 
         Raises:
             CorruptLog: It is a log of another program, or of another version.
         """
-        self.name = name
-        self.reader = SeekingReader(BytesIO(content), validate_crcs=True)
-        records = [(each.name, each.metadata) for each in self.reader.iter_metadata()]
+        self.name, self.reader = name, checked.reader
+        records = [(each.name, each.metadata) for each in checked.metadata]
         self._metadata = self._by_name(records)
+        files = [(each.name, each.data) for each in checked.attachments]
+        self.attachments = self._by_name(files)
         if written.RUN not in self._metadata:
             raise CorruptLog(
                 f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'"
@@ -118,15 +116,6 @@ class _OpenLog:
             raise CorruptLog(f"{self.name}: altered: its summary is of another replicate")
         return summary
 
-    def attachments(self) -> dict[str, bytes]:
-        """Return all attachments by name."""
-        return self._by_name([(each.name, each.data) for each in self.reader.iter_attachments()])
-
-    def messages(self, topic: str) -> Iterator[Message]:
-        """Yield the messages of a topic in the order of the file."""
-        for _, _, message in self.reader.iter_messages(topic, log_time_order=False):
-            yield message
-
     def _by_name(self, records: list[tuple[str, Value]]) -> dict[str, Value]:
         """Return records by their names, of which none stands there twice."""
         if len(by_name := dict(records)) < len(records):
@@ -138,9 +127,9 @@ class _OpenLog:
 def _opened(source: Source) -> Iterator[_OpenLog]:
     """Check a log of a run and open it; a body that cannot be read is a damaged log."""
     content, name = _content(source)
-    check(content, name)
+    checked = check(content, name)
     with unreadable_is_corrupt(name):
-        yield _OpenLog(content, name)
+        yield _OpenLog(checked, name)
 
 
 def _content(source: Source) -> tuple[bytes, str]:
@@ -166,7 +155,7 @@ def read_log(source: Source) -> LogContents:
             opened.
     """
     with _opened(source) as log:
-        attachments = log.attachments()
+        attachments = log.attachments
         rows: dict[str, list[Any]] = {topic: [] for topic in _DECODE}
         digest, cpu_ns = ContentDigest(), list[int]()
         for schema, channel, message in log.reader.iter_messages(log_time_order=False):
@@ -244,7 +233,8 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
     with _opened(source) as log:
-        rows = [orjson.loads(message.data) for message in log.messages(written.GENERATION_TOPIC)]
+        messages = log.reader.iter_messages(written.GENERATION_TOPIC, log_time_order=False)
+        rows = [orjson.loads(message.data) for _, _, message in messages]
         names = dict.fromkeys(name for row in rows for name in row if name.startswith(TERM))
         # rows that each have terms of their own: their table would be larger than any log
         if len(names) * len(rows) * 8 > MAX_LOG:
@@ -271,7 +261,7 @@ def array_names(source: Source) -> list[str]:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
     with _opened(source) as log:
-        names = sorted(log.attachments())
+        names = sorted(log.attachments)
         return [name.removesuffix(written.ARRAY) for name in names if name.endswith(written.ARRAY)]
 
 
@@ -287,7 +277,7 @@ def read_array(source: Source, array: str) -> NDArray[Any]:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
     with _opened(source) as log:
-        data = log.attachments().get(array + written.ARRAY)
+        data = log.attachments.get(array + written.ARRAY)
         if data is not None:
             return decode_array(data)
     raise KeyError(array)

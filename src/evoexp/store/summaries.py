@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import ReplicateSummary, flatten
 from evoexp.store.files import listed, reason, set_aside, warn, write_file
-from evoexp.store.log_bounds import check
+from evoexp.store.log_bounds import check_sums
 from evoexp.store.log_reader import checked_summary
 from evoexp.store.messages import field_types
 from evoexp.store.run_context import run_context, with_context
@@ -243,7 +243,7 @@ def _intact(run: RunDirectory, stored: _Summary) -> dict[str, bool]:
     for name in filter(_is_log, stored.row_names):
         try:
             with open(f"{folder}/{name}", "rb") as file:
-                check(file.read(), name)
+                check_sums(file.read(), name)
             found[name] = True
         except (CorruptLog, OSError):
             found[name] = False

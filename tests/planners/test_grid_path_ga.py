@@ -12,11 +12,8 @@ from evoexp.errors import SettingError
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
-from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
-from evoexp.planners.grid_path_ga.path_sampling import PathSampling
-from evoexp.planners.grid_path_ga.planner import STRETCH
 from evoexp.planners.proofs import judge_motion
 from evoexp.testing.small_conditions import conditions
 from matrix import num_cases
@@ -307,39 +304,6 @@ def test_random_search_draws_the_same_first_paths() -> None:
         nodes_of(path) for path in drawn.population
     ]
     assert np.array_equal(first.costs, drawn.costs)
-
-
-@pytest.mark.parametrize(("shape", "num_elites"), [((9, 9), 0), ((9, 9), 3), ((4, 4, 4), 1)])
-def test_random_paths_drawn_generations_at_once_are_those_of_words_drawn_before(
-    shape: tuple[int, ...], num_elites: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = planner(num_elites=num_elites, num_generations=2 * STRETCH + 3)
-    problem, at_once, one_by_one = solvable(shape, 0.3, 4, own), rng(5), rng(5)
-    control = RandomSearch(planner=own)
-    run = control.evolve(problem, at_once)
-    assert isinstance(run, Run)
-    stretches = list(run.stretches(lambda: 0.0))
-    costs = [row for each in stretches for block in each.costs for row in block]
-    states = [state for each in stretches for state in each.states]
-    # the longer way, of any generator
-    monkeypatch.setattr(PathSampling, "is_fit", lambda *_: False)
-    for g in control.evolve(problem, one_by_one):
-        np.testing.assert_array_equal(g.costs, costs[g.index])
-        state = one_by_one.bit_generator.state["state"]["state"]
-        assert states[g.index][:16] == state.to_bytes(16, "little")
-    np.testing.assert_array_equal(stretches[-1].population, g.population)
-    np.testing.assert_array_equal(stretches[-1].standings[-1].best, g.best)
-    assert stretches[-1].standings[-1].terms == g.terms
-    assert at_once.bit_generator.state == one_by_one.bit_generator.state
-
-
-def test_no_more_paths_are_drawn_at_once_than_there_is_memory_for() -> None:
-    problem = solvable((9, 9), 0.3, 4, planner())
-    sampling = PathSampling(problem, rng(5), 12)
-    assert sampling.draw(12).shape[0] == 12
-    for count in (0, 13):
-        with pytest.raises(ValueError, match=rf"count must be 1\.\.12, was {count}"):
-            sampling.draw(count)
 
 
 def test_populations_are_checked() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.paths.grids import NodeArray, StepArray
+from evoexp.paths.grids import Moves, NodeArray, StepArray
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 MOST_SLOTS = 256  # of a node
@@ -92,6 +92,16 @@ def choices_of(
     stays = (~repeats.any(axis=1)).astype(np.int64)  # without a neighbour a walk stays
     counts = np.column_stack([repeats, stays]).ravel()
     return Choices(entries, np.repeat(np.tile([*shifts, 0], count), counts).astype(np.int16))
+
+
+def choice_table(moves: Moves) -> Choices:
+    """Return the choices of walks to one target, one row of them.
+
+    There is no row if the weights are no whole numbers or the table would be large; such walks
+    weigh the moves of every node anew, see `grid_walks.walk`.
+    """
+    fronts = moves.steps[None, :]
+    return choices_of(moves.neighbours, moves.potentials, fronts, len(moves.neighbours))
 
 
 @kernel

@@ -23,12 +23,12 @@ from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.pcg64 import draw_words
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_choices import Choices, choices_of
+from evoexp.paths.grid_choices import Choices, choice_table, choices_of
 from evoexp.paths.grid_measures import Tolls
 from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
-from evoexp.paths.walkers import Walkers, choice_table
+from evoexp.paths.walkers import LANES, WORDS, Walkers
 from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
@@ -42,12 +42,6 @@ from evoexp.planners.grid_path_ga.kernels import (
     solution_of,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
-from evoexp.planners.grid_path_ga.path_sampling import (
-    FEW_WORDS,
-    PathSampling,
-    RandomPaths,
-    first_words,
-)
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
@@ -63,6 +57,8 @@ MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 ROUND = 8  # generations; see `BlockStretches`: another number needs another revision
 STRETCH = 64  # generations that are computed in one call where they are recorded together: rounds
+STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
+FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
@@ -72,7 +68,7 @@ class Problem(NamedTuple):
     Attributes:
         fields: Grid, unsafeness, potentials.
         moves: The moves of walks to the goal, and their weights.
-        choices: The same as a table, see `walkers.choice_table`.
+        choices: The same as a table, see `grid_choices.choice_table`.
         ends: Indices of start and goal.
         world: Grid and fields, as the kernels take them.
         scene: The bodies themselves, for the exact verdict on a motion.
@@ -159,8 +155,6 @@ class GridPathGa(PlannerDefaults, Component):
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
-        if not self.revisits and PathSampling.is_fit(problem, rng) and count:
-            return np.ascontiguousarray(PathSampling(problem, rng, count).draw(count))
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
         if len(problem.choices.entries):
             self._fill(problem, rng, paths)
@@ -168,16 +162,11 @@ class GridPathGa(PlannerDefaults, Component):
             self._fill_one_by_one(problem, rng, paths)
         return trimmed(paths)
 
-    def random_run(self, problem: Problem, rng: np.random.Generator) -> Run | None:
-        """Return generations of random paths, see `PlannerDefaults`."""
-        if self.revisits or not PathSampling.is_fit(problem, rng) or not self.ga.num_offspring:
-            return None
-        return run_of(partial(RandomPaths, self, problem, rng), rng, 1, STRETCH)
-
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths."""
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
-        num_words = first_words(len(paths), int(problem.moves.steps[problem.ends[0]]))
+        fewest = int(problem.moves.steps[problem.ends[0]])
+        num_words = WORDS * (int(STEPS_PER_WALK * len(paths) * fewest / LANES) + 1)
         while walkers.complete < len(paths):
             walkers.go(draw_words(rng, num_words))
             num_words = FEW_WORDS
@@ -188,7 +177,7 @@ class GridPathGa(PlannerDefaults, Component):
         """Fill a table of paths where the weights of moves allow no table of choices."""
         draws, complete = Draws(BLOCK), 0
         place = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
-        arguments = problem.moves, problem.ends, not self.revisits
+        arguments = problem.moves, problem.choices, problem.ends, not self.revisits
         while (complete := walk_each(draws.block, *arguments, complete, paths, place)) < len(paths):
             draws.extend(rng)
 

@@ -49,25 +49,12 @@ def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
     Raises:
         ValueError: If the shapes contradict each other.
     """
-    check_shapes(collisions, own, own.shape)
-    team = np.empty(len(own), dtype=np.int64)
-    return BestTeam(team, float(find_best_team(collisions, own, own.shape[1], team)))
-
-
-def check_shapes(
-    collisions: CollisionCounts, own: FloatArray, front_shape: tuple[int, ...]
-) -> None:
-    """Check the arrays of teams, see the module, and the shape (P, N) of their fronts.
-
-    Raises:
-        ValueError: If they contradict each other.
-    """
     num, count = own.shape
     enough = collisions.ndim == 3 and min(collisions.shape[1:]) >= count
-    if num < 2 or front_shape != own.shape or not enough or len(collisions) != num * (num - 1) // 2:
-        raise ValueError(
-            f"collisions {collisions.shape}, costs {own.shape} and front {front_shape} do not match"
-        )
+    if num < 2 or not enough or len(collisions) != num * (num - 1) // 2:
+        raise ValueError(f"collisions {collisions.shape} and costs {own.shape} do not match")
+    team = np.empty(len(own), dtype=np.int64)
+    return BestTeam(team, float(find_best_team(collisions, own, count, team)))
 
 
 @kernel
@@ -92,7 +79,7 @@ def sort_by_cost(own: FloatArray, count: int) -> IntArray:
 def find_best_team(
     collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray
 ) -> float:
-    """The kernel of `best_team`, for other kernels, on the first `count` individuals.
+    """Write the best team, see `best_team`, of the first `count` individuals.
 
     Args:
         collisions: See the module.

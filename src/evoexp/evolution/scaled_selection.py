@@ -62,8 +62,9 @@ def choose_parents(
     return True
 
 
-def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> FloatArray:
-    """Return the expected numbers of copies by linear scaling (Chen & Zalzala 1995, Eqs. 5, 16).
+@kernel
+def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatArray) -> None:
+    """Write the expected numbers of copies by linear scaling (Chen & Zalzala 1995, Eqs. 5, 16).
 
     The paper, after Goldberg (1989), scales a fitness f = C_m − C to f' = a f + b, whose mean is
     that of f and whose maximum is `multiple` times the mean; negative values are set to 0. An
@@ -80,26 +81,9 @@ def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> Floa
             copy and is left out of the mean.
         count: Number of parents.
         multiple: Copies that the best one expects if there is a parent per individual, > 1 [-].
-
-    Returns:
-        (individuals,) ≥ 0; their sum is `count` but for rounding. Individuals of equal finite cost
-        expect equally many copies; without any finite cost all individuals do.
-
-    Raises:
-        ValueError: If an argument is out of range.
+        expected: (individuals,) ≥ 0, written; their sum is `count` but for rounding. Individuals of
+            equal finite cost expect equally many copies; without any finite cost all do.
     """
-    if costs.ndim != 1 or len(costs) == 0:
-        raise ValueError(f"costs must have shape (individuals,), at least one, was {costs.shape}")
-    if count < 0 or not multiple > 1.0:
-        raise ValueError(f"count must be ≥ 0 and multiple > 1, were {count} and {multiple}")
-    expected = np.empty(len(costs))
-    scale_costs(costs, count, multiple, expected)
-    return expected
-
-
-@kernel
-def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatArray) -> None:
-    """The kernel of `scale_linearly`, for other kernels; `expected` (individuals,) is written."""
     # mean and least of the finite costs
     num, finite, total, least = len(costs), 0, 0.0, np.inf
     for k in range(num):
@@ -133,7 +117,10 @@ def num_remainder_uniforms(num: int, count: int) -> int:
     return num + 1 + count
 
 
-def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> IntArray:
+@kernel
+def choose_by_remainders(
+    uniforms: FloatArray, expected: FloatArray, order: IntArray, parents: IntArray
+) -> None:
     """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
 
     Every individual first becomes a parent as often as the whole part of its expected number says.
@@ -146,43 +133,12 @@ def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> IntA
     (of 0.9 and 0.1 the second one gets the place with probability 0.06).
 
     Args:
-        rng: Source of `num_remainder_uniforms` uniform numbers.
-        expected: (individuals,) ≥ 0, as `scale_linearly` returns them; their sum is the
-            number of parents.
-
-    Returns:
-        (parents,) indices in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋
-        times or once more.
-
-    Raises:
-        ValueError: If a number is negative or not finite, or the sum is no whole number.
-    """
-    if expected.ndim != 1 or not np.all(np.isfinite(expected)) or np.any(expected < 0.0):
-        raise ValueError("expected must be finite numbers ≥ 0 of shape (individuals,)")
-    total = float(expected.sum())
-    count = round(total)
-    if abs(total - count) > 1e-9 * max(1.0, total):
-        raise ValueError(f"expected must add up to a whole number of parents, was {total}")
-    parents = np.empty(count, dtype=np.int64)
-    order = np.empty(len(expected), dtype=np.int64)
-    choose_by_remainders(
-        rng.random(num_remainder_uniforms(len(expected), count)), expected, order, parents
-    )
-    return parents
-
-
-@kernel
-def choose_by_remainders(
-    uniforms: FloatArray, expected: FloatArray, order: IntArray, parents: IntArray
-) -> None:
-    """The kernel of `stochastic_remainder`, for other kernels.
-
-    Args:
         uniforms: (`num_remainder_uniforms`,) in [0, 1).
         expected: (individuals,) ≥ 0, adding up to the number of parents but for rounding.
         order: (individuals,) scratch: the random order of the scan; negative where a place was
             given.
-        parents: (parents,) written.
+        parents: (parents,) written, in random order: neighbours are a random pairing; k occurs
+            ⌊expected[k]⌋ times or once more.
     """
     num, count, filled = len(expected), len(parents), 0
     # whole parts

@@ -24,15 +24,11 @@ CollisionCounts = NDArray[np.integer[Any]]  # short integers, where they are man
 
 
 class BestTeam(NamedTuple):
-    """The cheapest team without a collision.
+    """The cheapest team without a collision."""
 
-    Attributes:
-        individuals: (P,) index of the member in each population; −1 if there is no such team.
-        cost: Sum of the members' own costs; inf if there is no such team.
-    """
-
+    # (P,) index of the member in each population; −1 if there is no such team
     individuals: IntArray
-    cost: float
+    cost: float  # sum of the members' own costs; inf if there is no such team
 
     @property
     def found(self) -> bool:

@@ -1,4 +1,12 @@
-"""Crossover of individuals: strings of via-points, and genomes at one point or gene by gene."""
+"""Crossover of individuals: strings of via-points, and genomes at one point or gene by gene.
+
+"Double cross-over" of a string p : q (Rana & Zalzala 1995, section 3.4b) can be read in two ways:
+
+- tails: either arm's path is cut in two, and what follows the site is exchanged, arm by arm;
+- segment: the whole string is cut at both sites, and what lies between them is exchanged: the end
+  of the first arm's path and the beginning of the second arm's. With more arms every second piece
+  of the string is exchanged.
+"""
 
 from typing import Literal, get_args
 
@@ -32,13 +40,7 @@ def cross_at_sites(
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with
     probability `rate`, and only if at the sites chosen in both arms' portions the two parents'
-    via-points are closer than `max_distance`. What is not crossed is copied. "Double cross-over" of
-    the string p : q can be read in two ways:
-
-    - tails: either arm's path is cut in two, and what follows the site is exchanged, arm by arm;
-    - segment: the whole string is cut at both sites, and what lies between them is exchanged: the
-      end of the first arm's path and the beginning of the second arm's. With more arms every second
-      piece of the string is exchanged.
+    via-points are closer than `max_distance`. What is not crossed is copied.
 
     Args:
         uniforms: (`num_uniforms`,) in [0, 1); per pair: decision, a site per arm.

@@ -1,7 +1,9 @@
 """The hall of fame of co-evolving populations (Curkovic et al. 2013, section 3).
 
 It holds the best teams of collaborators. A team's key is (collisions within the team, sum of its
-members' own costs): lower is better. Nothing is random and every tie is settled by an order.
+members' own costs): lower is better. Nothing is random and every tie is settled by an order: the
+next hall takes candidates by key; among equals the present hall's own come first, in their order,
+then the new ones in the order of `gather_teams`, then the best team of all.
 
 The arrays `collisions` and `own` of P populations are those of `best_team`; `front`  # (P, ≥ N)
 bool: the non-dominated individuals of each population.
@@ -17,33 +19,20 @@ from evoexp.records import BoolArray, FloatArray, IntArray
 
 
 class Teams(NamedTuple):
-    """Teams and their keys.
+    """Teams and their keys."""
 
-    Attributes:
-        teams: (teams, P) index of the member in each population.
-        collisions: (teams,) colliding configurations within each team.
-        costs: (teams,) sum of the members' own costs.
-    """
-
-    teams: IntArray
-    collisions: IntArray
-    costs: FloatArray
+    teams: IntArray  # (teams, P) index of the member in each population
+    collisions: IntArray  # (teams,) colliding configurations within each team
+    costs: FloatArray  # (teams,) sum of the members' own costs
 
 
 class Hall(NamedTuple):
-    """The teams that are kept, best first unless some are kept for another reason than their key.
+    """The teams that are kept, best first unless some stay for another reason than their key."""
 
-    Attributes:
-        teams: (teams, P) index of the member in each population.
-        ages: (teams,) generations since each team entered.
-        collisions: (teams,) colliding configurations within each team.
-        costs: (teams,) sum of the members' own costs.
-    """
-
-    teams: IntArray
-    ages: IntArray
-    collisions: IntArray
-    costs: FloatArray
+    teams: IntArray  # (teams, P) index of the member in each population
+    ages: IntArray  # (teams,) generations since each team entered
+    collisions: IntArray  # (teams,) colliding configurations within each team
+    costs: FloatArray  # (teams,) sum of the members' own costs
 
     @classmethod
     def room(cls, depth: int, num_populations: int) -> Self:
@@ -75,19 +64,14 @@ class Hall(NamedTuple):
 
 
 class HallRules(NamedTuple):
-    """Which teams a hall takes.
+    """Which teams a hall takes."""
 
-    Attributes:
-        memory: A team that entered more than this many generations ago is taken only where no new
-            team can be; the same team formed again is not new. 0: no such rule.
-        frozen: Whether the hall's teams stay, and new ones only fill free places. Overrides
-            `memory`.
-        exclusive: (P,) whether an individual of a population may be in one team only.
-    """
-
+    # A team that entered more than this many generations ago is taken only where no new team can
+    # be; the same team formed again is not new. 0: no such rule.
     memory: int
+    # whether the hall's teams stay, and new ones only fill free places. Overrides `memory`.
     frozen: bool
-    exclusive: BoolArray
+    exclusive: BoolArray  # (P,) whether an individual of a population may be in one team only
 
 
 @kernel
@@ -178,12 +162,8 @@ def renew_hall(
 ) -> int:
     """Choose the next hall: the best of its teams and of those formed around the fronts.
 
-    Candidates are taken by key; among equals the hall's own come first, in their order, then the
-    new ones in the order of `gather_teams`, then `best`. Keys of old teams are computed anew from
-    the arrays given.
-
     Args:
-        collisions: (pairs, ≥ N, ≥ N), see `best_team`.
+        collisions: (pairs, ≥ N, ≥ N), see `best_team`; keys of old teams are computed anew.
         own: (P, ≥ N), see `best_team`.
         front: (P, ≥ N) the non-dominated individuals.
         count: N.
@@ -198,10 +178,7 @@ def renew_hall(
         Number of teams that the hall holds then.
     """
     # candidates: the hall's own teams, one per member of a front, the best of all
-    most = num_teams + (1 if best[0] >= 0 else 0)
-    for p in range(len(own)):
-        for i in range(count):
-            most += 1 if front[p, i] else 0
+    most = num_teams + np.count_nonzero(front[:, :count]) + (1 if best[0] >= 0 else 0)
     pool = np.empty((most, len(own)), dtype=np.int64)
     ages, ranks = np.zeros(most, dtype=np.int64), np.zeros(most, dtype=np.int64)
     hits, costs = np.empty(most, dtype=np.int64), np.empty(most)

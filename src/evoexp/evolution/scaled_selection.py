@@ -3,6 +3,15 @@
 Linear scaling says how many copies of every individual are expected among the parents; sampling
 makes each a parent as often as expected, rounded up or down. Which ones are rounded up is found by
 one systematic scan of the remainders, which is assumed: the paper names the sampling only.
+
+Every individual first becomes a parent as often as the whole part of its expected number says. For
+the places left, the remainders are added up once, in random order; an individual that brings the
+sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an individual gets at
+most one of these places, with exactly the probability of its remainder.
+
+Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
+order of indices against individuals that come late, and in any order against small remainders (of
+0.9 and 0.1 the second one gets the place with probability 0.06).
 """
 
 from typing import NamedTuple
@@ -16,19 +25,12 @@ from evoexp.records import FloatArray, IntArray
 
 
 class SelectionMemory(NamedTuple):
-    """Arrays that the selection of a generation writes.
+    """Arrays that the selection of a generation writes."""
 
-    Attributes:
-        parents: (offspring,) indices of individuals.
-        elites: (elites,) likewise.
-        expected: (individuals,) expected numbers of copies.
-        order: (individuals,) order in which remainders are scanned.
-    """
-
-    parents: IntArray
-    elites: IntArray
-    expected: FloatArray
-    order: IntArray
+    parents: IntArray  # (offspring,) indices of individuals
+    elites: IntArray  # (elites,) likewise
+    expected: FloatArray  # (individuals,) expected numbers of copies
+    order: IntArray  # (individuals,) order in which remainders are scanned
 
     @classmethod
     def of(cls, num_offspring: int, num_elites: int, size: int) -> "SelectionMemory":
@@ -122,15 +124,6 @@ def choose_by_remainders(
     uniforms: FloatArray, expected: FloatArray, order: IntArray, parents: IntArray
 ) -> None:
     """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
-
-    Every individual first becomes a parent as often as the whole part of its expected number says.
-    For the places left, the remainders are added up once, in random order; an individual that
-    brings the sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an
-    individual gets at most one of these places, with exactly the probability of its remainder.
-
-    Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
-    order of indices against individuals that come late, and in any order against small remainders
-    (of 0.9 and 0.1 the second one gets the place with probability 0.06).
 
     Args:
         uniforms: (`num_remainder_uniforms`,) in [0, 1).

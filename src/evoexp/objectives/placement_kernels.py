@@ -159,15 +159,8 @@ def _measure_branch(
 ) -> None:
     """Measure one value of θ3 of every posture, without a branch in the loop.
 
-    Args:
-        angles: (2, ≥ count) θ1, θ2 [deg].
-        count: Individuals.
-        links: (7, count) sine and cosine of θ1, of θ1 + θ2 and of θ1 + θ2 + θ3 (beyond ±1 and NaN
-            where the target is out of reach), and that angle [deg]; the third link points to +x.
-        branch: 0: the third link points to +x, 1: to −x.
-        model: Task, weights and limits.
-        out: (RESULTS, count) written.
-        within: (count,) written.
+    `links` (7, count) are sine and cosine of θ1, of θ1 + θ2 and of θ1 + θ2 + θ3 (beyond ±1 and NaN
+    out of reach), and that angle [deg], the third link to +x; it points to −x in branch 1.
     """
     task, weights, _, limits = model
     l1, l2, l3, x_e, _, f_x, f_y = task

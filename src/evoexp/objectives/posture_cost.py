@@ -200,30 +200,21 @@ class PostureCost(Component):
 
 
 class Aim(NamedTuple):
-    """The goal of a phase, as `rate_poses` takes it.
+    """The goal of a phase, as `rate_poses` takes it."""
 
-    Attributes:
-        rotation: (9,) wanted rotation of the controlled frame, row by row; or that of an object.
-        point: (3,) wanted place; of the surface of an object the object's middle [length unit].
-        axis: (3,) axis of the object.
-        surface: The distance is measured to POINT, to a ROD (also a sphere), to a ROUND (a
-            cylinder) or to an EDGED body (a box).
-        half_length: Half the length of the object's axis [length unit].
-        radius: Of rods and cylinders [length unit].
-        half_edges: (3,) of a box [length unit].
-        up: (3,) direction up.
-        local_up: (3,) the up axis of the controlled frame.
-    """
-
+    # (9,) wanted rotation of the controlled frame, row by row; or that of an object
     rotation: FloatArray
+    # (3,) wanted place; of the surface of an object the object's middle [length unit]
     point: FloatArray
-    axis: FloatArray
+    axis: FloatArray  # (3,) axis of the object
+    # the distance is measured to POINT, to a ROD (also a sphere), to a ROUND (a cylinder) or to an
+    # EDGED body (a box)
     surface: int
-    half_length: float
-    radius: float
-    half_edges: FloatArray
-    up: FloatArray
-    local_up: FloatArray
+    half_length: float  # half the length of the object's axis [length unit]
+    radius: float  # of rods and cylinders [length unit]
+    half_edges: FloatArray  # (3,) of a box [length unit]
+    up: FloatArray  # (3,) direction up
+    local_up: FloatArray  # (3,) the up axis of the controlled frame
 
 
 @kernel

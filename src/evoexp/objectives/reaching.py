@@ -132,12 +132,8 @@ def measure_reach_from(
         count: Number of individuals.
         arm: See `planar_ends.block_ends`.
         target: As of `measure_reach`, and so are `box` and `weights`.
-        box: See there.
-        weights: See there.
         cost: (≥ count, filled up to whole vectors) written, and so are `error` and `displacement`;
             behind `count` anything.
-        error: See there.
-        displacement: See there.
     """
     lengths, base_x, base_y, base_angle = arm
     flat, width = ends.reshape(-1), U(ends.shape[1])

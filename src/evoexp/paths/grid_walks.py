@@ -46,7 +46,7 @@ def walk(
         if is_table:
             following = chosen_node(uniforms[at], choices, node)
         else:
-            following = np.uint64(_weighed_node(uniforms[at], moves, np.int64(node)))
+            following = np.uint64(_weighed_node(uniforms[at], moves, int(np.int64(node))))
         if erase:
             place[node] = following
         else:

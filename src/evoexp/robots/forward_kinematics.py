@@ -26,17 +26,11 @@ PLANAR_FRAME, SPATIAL_FRAME = U(PLANAR_ROWS * LANES), U(SPATIAL_ROWS * LANES)
 
 
 class Eight(NamedTuple):
-    """Eight neighbours of a batch of configurations.
+    """Eight neighbours of a batch of configurations."""
 
-    Attributes:
-        q: The batch, flat: coordinate k of the first one stands at k · stride + place.
-        place: Of the first one.
-        stride: From one coordinate to the next.
-    """
-
-    q: FloatArray
-    place: np.uint64
-    stride: np.uint64
+    q: FloatArray  # the batch, flat: coordinate k of the first one stands at k · stride + place
+    place: np.uint64  # of the first one
+    stride: np.uint64  # from one coordinate to the next
 
 
 def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray, FloatArray]:

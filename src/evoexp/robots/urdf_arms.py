@@ -18,14 +18,9 @@ AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
 class Carrier(NamedTuple):
-    """The joint of the robot that carries the frame of a joint of the URDF.
+    """The joint of the robot that carries the frame of a joint of the URDF."""
 
-    Attributes:
-        joint: Index of the robot's joint, 0: the world.
-        placement: The frame's place in the joint's frame; None: it is the joint's.
-    """
-
-    joint: int
+    joint: int  # index of the robot's joint, 0: the world
     placement: Any  # pin.SE3 or None
 
     def place(self, local: Any) -> Any:

@@ -21,19 +21,13 @@ BASE = "base"  # what the coordinates of a base that moves are called: base_x, b
 
 
 class JointRules(NamedTuple):
-    """How joints are taken that have no limits, or several coordinates.
+    """How joints are taken that have no limits, or several coordinates."""
 
-    Attributes:
-        continuous_turns: Turns of a continuous joint to either side.
-        turn_limit: Limit to either side of a turning joint that has none [deg].
-        slide_limit: The same of a sliding joint [m].
-        base: Whether planar and floating joints stand still (fixed) or move (free), or the root
-            moves besides (planar, floating).
-    """
-
-    continuous_turns: float
-    turn_limit: float
-    slide_limit: float
+    continuous_turns: float  # turns of a continuous joint to either side
+    turn_limit: float  # limit to either side of a turning joint that has none [deg]
+    slide_limit: float  # the same of a sliding joint [m]
+    # whether planar and floating joints stand still (fixed) or move (free), or the root moves
+    # besides (planar, floating)
     base: str
 
 

@@ -15,15 +15,10 @@ KINDS = ("", "box", "sphere", "cylinder", "cone", "prism")  # numbered as in Sol
 
 
 class Pose(NamedTuple):
-    """A place and an orientation.
+    """A place and an orientation."""
 
-    Attributes:
-        rotation: (3, 3).
-        position: (3,) [m].
-    """
-
-    rotation: FloatArray
-    position: FloatArray
+    rotation: FloatArray  # (3, 3)
+    position: FloatArray  # (3,) [m]
 
     def times(self, other: "Pose") -> "Pose":
         """Return a pose that is given in this one's frame."""

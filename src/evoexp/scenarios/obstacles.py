@@ -135,21 +135,16 @@ Obstacle = Annotated[
 
 
 class ObstacleTable(NamedTuple):
-    """Obstacles as arrays.
+    """Obstacles as arrays."""
 
-    Attributes:
-        kind: (obstacles,) SPHERE, BOX (of a hull, too), CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE.
-        center: (obstacles, 3); of a half-space a point of its boundary.
-        rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and
-            cylinders lie along their z axis, a half-space is all points with z ≤ 0.
-        size: (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and
-            cylinders; the length of a capsule is that of its segment) | unused (half-spaces) |
-            semi-axes.
-    """
-
+    # (obstacles,) SPHERE, BOX (of a hull, too), CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE
     kind: np.ndarray
-    center: FloatArray
+    center: FloatArray  # (obstacles, 3); of a half-space a point of its boundary
+    # (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and cylinders lie
+    # along their z axis, a half-space is all points with z ≤ 0
     rotation: FloatArray
+    # (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and cylinders;
+    # the length of a capsule is that of its segment) | unused (half-spaces) | semi-axes
     size: FloatArray
 
     def without_ellipses(self) -> "ObstacleTable":

@@ -1,7 +1,7 @@
 """The product of a robot description: one Pinocchio model, with the arms as slices of q."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -109,29 +109,50 @@ class ArmStates(NamedTuple):
         return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
 
 
-class Arm(Protocol):
-    """A part of a robot, as `Chain` describes it function by function."""
+class Arm:
+    """Base of a part of a robot: joints, bodies, a tool and what a file tells of them."""
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the joints."""
+        """Add the arm's joints to a model; return its links."""
+        raise NotImplementedError
 
     def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies."""
+        """Return the bodies as `pin.GeometryObject`: the links, unless an arm has others.
+
+        Args:
+            model: With the arm's joints.
+            arm: Its number.
+            first_joint: Its first joint.
+            links: Its links.
+        """
+        return [link_capsule(link, "") for link in links]
 
     def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame."""
+        """Return the tool's frame: at the end of the last link, turned as its joint.
+
+        An arm with another tool overrides this.
+        """
+        return Tool(links[-1].joint, np.eye(3), links[-1].end)
 
     def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs that are never judged."""
+        """Return pairs of bodies' names that are never judged."""
+        return set()
 
     def own_names(self) -> tuple[set[str], set[str]]:
-        """Return the names of joints and of bodies that a file gives."""
+        """Return the names of joints and of bodies that a file gives, which are kept; or none."""
+        return set(), set()
 
     def followers(self, first_joint: int) -> list[Follower]:
-        """Return the joints that follow others."""
+        """Return the joints that follow others.
+
+        Args:
+            first_joint: Index of the arm's first joint.
+        """
+        return []
 
     def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states, of this arm alone."""
+        """Return the named states: none, unless a file names some."""
+        return (ArmStates((), (), {}),)
 
 
 class Robot(Component):
@@ -219,54 +240,12 @@ def _slices(model: Any, ranges: list[tuple[int, int]]) -> np.ndarray:
     return np.array(slices, dtype=np.int64)
 
 
-class Chain(Robot):
+class Chain(Arm, Robot):
     """Base of a single arm, which can stand as a robot of its own."""
 
     def chains(self) -> tuple[Arm, ...]:
         """Return the arm itself."""
         return (self,)
-
-    def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the arm's joints to a model; return its links."""
-        raise NotImplementedError
-
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies as `pin.GeometryObject`: the links, unless an arm has others.
-
-        Args:
-            model: With the arm's joints.
-            arm: Its number.
-            first_joint: Its first joint.
-            links: Its links.
-        """
-        return [link_capsule(link, "") for link in links]
-
-    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame: at the end of the last link, turned as its joint.
-
-        An arm with another tool overrides this.
-        """
-        return Tool(links[-1].joint, np.eye(3), links[-1].end)
-
-    def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs of bodies' names that are never judged."""
-        return set()
-
-    def own_names(self) -> tuple[set[str], set[str]]:
-        """Return the names of joints and of bodies that a file gives, which are kept; or none."""
-        return set(), set()
-
-    def followers(self, first_joint: int) -> list[Follower]:
-        """Return the joints that follow others.
-
-        Args:
-            first_joint: Index of the arm's first joint.
-        """
-        return []
-
-    def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states: none, unless a file names some."""
-        return (ArmStates((), (), {}),)
 
 
 def link_capsule(link: Link, name: str) -> Any:

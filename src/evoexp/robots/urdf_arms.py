@@ -9,7 +9,7 @@ from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import ArmStates, Follower, Link, Tool
+from evoexp.robots.assembly import Arm, ArmStates, Follower, Link, Tool
 from evoexp.robots.joint_choice import JointRoles
 from evoexp.robots.srdf import Srdf
 
@@ -249,7 +249,7 @@ def body_names(items: list[Any]) -> list[str]:
     ]
 
 
-class UrdfArm:
+class UrdfArm(Arm):
     """One arm of a URDF; bodies that stand still belong to the first arm."""
 
     def __init__(self, tree: UrdfTree, index: int) -> None:

@@ -1,5 +1,6 @@
 """A URDF rewritten for Pinocchio: every joint that moves has one coordinate between limits."""
 
+import copy
 import xml.etree.ElementTree as ET
 from typing import Any, NamedTuple
 
@@ -37,10 +38,11 @@ def plain_urdf(root: Any, rules: JointRules, places: dict[str, str] | None = Non
     Cylinders stand in the place of capsules, which urdfdom leaves out.
 
     Args:
-        root: That `read_urdf` returned; it is changed.
+        root: That `read_urdf` returned.
         rules: For joints without limits, or of several coordinates.
         places: Where each mesh lies; None: collision bodies are left out.
     """
+    root = copy.deepcopy(root)
     for link in root.iterfind("link"):
         for collision in link.findall("collision"):
             (shape,) = collision.find("geometry")

@@ -43,17 +43,8 @@ TERMS = (
 DISTANCE, ANGLE, AXIAL, HEADING, UPRIGHT, PARALLEL, MARGIN, COLLISION, FREE_SPACE = range(
     len(TERMS)
 )
-COLUMNS = (
-    "goal_distance",
-    "goal_angle_rad",
-    "axial_approach_rad",
-    "heading_rad",
-    "upright_rad",
-    "keep_parallel_rad",
-    "limit_margin",
-    "collision",
-    "free_space",
-)
+IN_RADIANS = (ANGLE, AXIAL, HEADING, UPRIGHT, PARALLEL)
+COLUMNS = tuple(f"{name}_rad" if k in IN_RADIANS else name for k, name in enumerate(TERMS))
 """Names of the terms in records, with their units; lengths are in the scene's."""
 
 POINT, ROD, ROUND, EDGED = range(4)  # surfaces that a distance is measured to, see `Aim`

@@ -6,8 +6,8 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.rotations import rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 
@@ -228,18 +228,6 @@ def obstacle_hulls(obstacles: tuple[Any, ...]) -> dict[int, FloatArray]:
         for k, obstacle in enumerate(obstacles)
         if isinstance(obstacle, HullObstacle)
     }
-
-
-def rotation_matrix(angles: Angles) -> FloatArray:
-    """Return the rotation of roll, pitch, yaw [deg]: Rz(yaw) Ry(pitch) Rx(roll), (3, 3)."""
-    (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 def _point(coordinates: tuple[float, ...]) -> FloatArray:

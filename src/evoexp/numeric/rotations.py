@@ -3,7 +3,7 @@
 import numpy as np
 
 from evoexp.numeric.elementary import DEGREE, sincos
-from evoexp.records import FloatArray
+from evoexp.numeric.ordered_sums import FloatArray
 
 
 def rotation_matrix(angles: tuple[float, float, float]) -> FloatArray:

@@ -247,6 +247,16 @@ _MUST = {
 }
 
 
+def check_range(field: str, limits: tuple[float, float]) -> None:
+    """Check that limits leave room between them.
+
+    Raises:
+        SettingError: If they do not.
+    """
+    if not limits[0] < limits[1]:
+        raise SettingError(field, "[least, greatest] with least < greatest", list(limits))
+
+
 def _must(error: Any) -> tuple[str, str]:
     context = error.get("ctx", {})
     template = _MUST.get(error["type"])

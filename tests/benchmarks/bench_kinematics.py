@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 from evoexp.configuration import compose
-from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.kinematics import kinematic_table
+from evoexp.robots.poses import IDENTITY, frame_poses
 
 SIZE = 2000
 
@@ -58,15 +58,16 @@ def bench_forward_kinematics(beside: Any, name: str) -> None:
     data, table = model.createData(), kinematic_table(model)
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (model.nq, SIZE))
     some = np.ascontiguousarray(q[:, :200].T)
-    rotations, origins = forward_kinematics(table, q)
+    poses, last = np.empty((12, SIZE)), len(table.parent) - 1
+    frame_poses(table.chain, last, IDENTITY, q, poses)
     pin.forwardKinematics(model, data, some[7])
-    assert np.abs(origins[-1, :, 7] - data.oMi[model.njoints - 1].translation).max() < 1e-12
+    assert np.abs(poses[9:, 7] - data.oMi[model.njoints - 1].translation).max() < 1e-12
     expected = numpy_frames(table, q)
-    assert np.abs(rotations[-1] - expected[0][-1].transpose(1, 2, 0)).max() < 1e-12
-    assert np.abs(origins[-1] - expected[1][-1].T).max() < 1e-12
+    assert np.abs(poses[:9].reshape(3, 3, -1) - expected[0][-1].transpose(1, 2, 0)).max() < 1e-12
+    assert np.abs(poses[9:] - expected[1][-1].T).max() < 1e-12
     beside(
         f"forward kinematics, {name}, {SIZE} configurations",
-        lambda: forward_kinematics(table, q),
+        lambda: frame_poses(table.chain, last, IDENTITY, q, poses),
         {
             "numpy": (lambda: numpy_frames(table, q), SIZE, 1),
             "Pinocchio": (lambda: pinocchio_frames(model, data, some), len(some), 1),

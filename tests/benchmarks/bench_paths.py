@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from evoexp.paths.redistribution import redistribute
-from evoexp.paths.relaxation import relax
-from evoexp.paths.walk import num_uniforms, walk
+from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.paths.workspace import prepare_redistribution
+from paths.string_operators import redistribute, relax
 
 ARMS, N, LANES, STRINGS = np.array([[0, 2], [2, 4]]), 20, 56, 50
 START, GOAL = np.array([225.0, 0.0, 315.0, 0.0]), np.array([315.0, 135.0, 225.0, 90.0])
@@ -24,7 +23,7 @@ UNIFORMS = np.random.default_rng(0).random((STRINGS, num_uniforms(ARMS, N)))
 def population() -> Any:
     """Return fresh walks with one crossover each, what redistribution meets.  # (4, 21, 56)."""
     via_points = np.zeros((4, N + 1, LANES))
-    walk(via_points, np.arange(STRINGS), UNIFORMS, START, GOAL, ARMS, STEP, TURN)
+    walk_strings(via_points, np.arange(STRINGS), UNIFORMS, START, GOAL, ARMS, STEP, TURN)
     redistribute(via_points, ARMS, STRINGS, prepare_redistribution(N, 2))
     relax(via_points, 0.5, STRINGS)
     other = np.roll(via_points[:, :, :STRINGS], 1, axis=2)
@@ -125,7 +124,7 @@ def test_walk(benchmark: Any, strings: int) -> None:
         UNIFORMS[:strings],
     )
     benchmark.pedantic(
-        lambda: walk(via_points, lanes, uniforms, START, GOAL, ARMS, STEP, TURN),
+        lambda: walk_strings(via_points, lanes, uniforms, START, GOAL, ARMS, STEP, TURN),
         rounds=300, iterations=10, warmup_rounds=5,
     )  # fmt: skip
     turn = (2 * uniforms[:, : N - 1] - 1) * TURN

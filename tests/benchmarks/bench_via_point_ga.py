@@ -15,12 +15,11 @@ import pytest
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.paths.redistribution import redistribute
-from evoexp.paths.relaxation import relax
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.via_point_ga.strings import PER_CALL
 from evoexp.records import generations
 from evoexp.store.log import Log
+from paths.string_operators import redistribute, relax
 from references import rana_numpy
 
 LATER = 50  # generation from which on single generations are measured: collisions have become rare

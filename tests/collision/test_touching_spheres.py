@@ -10,10 +10,11 @@ import pytest
 
 from collision.touching_arms import ONE_PLANAR, THREE_PLANAR, TWO_PLANAR, TWO_SPATIAL
 from evoexp.collision.models.touching_spheres import SphereCollision, TouchingSpheres
+from evoexp.numeric.rotations import rotation_matrix
 from evoexp.robots.arms import Arms
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_chain import PlanarChain
-from evoexp.scenarios.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle, rotation_matrix
+from evoexp.scenarios.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
 
 MODEL = TouchingSpheres(spheres_per_link=5, sphere_radius=0.5, collision_substeps=1)
 OBSTACLES = (

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.crossover import site_crossover
+from evoexp.evolution.crossover import cross_at_sites, num_uniforms
 from evoexp.evolution.genetic_settings import GeneticSettings
-from evoexp.evolution.selection import elites, roulette
+from evoexp.evolution.selection import choose_elites
+from evolution.drawn_parents import roulette
 
 ARMS = np.array([[0, 2], [2, 5]])
 
@@ -27,8 +28,8 @@ def crossed(
     segment: bool = False,
 ) -> np.ndarray:
     out = np.full((*strings.shape[:2], len(parents) + 4), np.nan)
-    rng = np.random.default_rng(seed)
-    site_crossover(rng, strings, parents, ARMS, rate, distance, out, segment)
+    uniforms = np.random.default_rng(seed).random(num_uniforms(len(ARMS), len(parents) // 2))
+    cross_at_sites(uniforms, strings, parents, ARMS, rate, distance, segment, out)
     return out[:, :, : len(parents)]
 
 
@@ -151,8 +152,10 @@ def test_roulette_agrees_with_searchsorted() -> None:
 
 
 def test_elites_are_the_lowest_costs_and_ties_keep_their_order() -> None:
-    assert elites(np.array([3.0, 1.0, np.inf, 1.0, 2.0]), 3).tolist() == [1, 3, 4]
-    assert elites(np.array([1.0]), 0).tolist() == []
+    elites = np.empty(3, dtype=np.int64)
+    choose_elites(np.array([3.0, 1.0, np.inf, 1.0, 2.0]), elites)
+    assert elites.tolist() == [1, 3, 4]
+    choose_elites(np.array([1.0]), elites[:0])
 
 
 @given(st.lists(st.floats(-1e6, 1e6) | st.just(np.inf), min_size=1, max_size=30))

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.selection import difference_weights, inverse_weights, roulette
+from evoexp.evolution.selection import difference_weights, inverse_weights
+from evolution.drawn_parents import roulette
 
 costs_with_inf = st.lists(st.floats(0.0, 1e300) | st.just(np.inf), min_size=1, max_size=30)
 

@@ -8,9 +8,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.scaled_selection import scale_linearly, stochastic_remainder
+from evoexp.evolution.scaled_selection import (
+    choose_by_remainders,
+    num_remainder_uniforms,
+    scale_costs,
+)
 
 COSTS = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=30).map(np.array)
+
+
+def scale_linearly(costs: np.ndarray, count: int, multiple: float = 2.0) -> np.ndarray:
+    expected = np.empty(len(costs))
+    scale_costs(costs, count, multiple, expected)
+    return expected
+
+
+def stochastic_remainder(rng: np.random.Generator, expected: np.ndarray) -> np.ndarray:
+    count, num = round(expected.sum()), len(expected)
+    parents, order = np.empty(count, dtype=np.int64), np.empty(num, dtype=np.int64)
+    choose_by_remainders(rng.random(num_remainder_uniforms(num, count)), expected, order, parents)
+    return parents
 
 
 def scaled_as_printed(fitness: np.ndarray, multiple: float = 2.0) -> np.ndarray:
@@ -60,15 +77,6 @@ def test_infeasible_ones_expect_nothing_and_equal_ones_equally_much() -> None:
     np.testing.assert_allclose(scale_linearly(np.full(5, np.inf), 4), np.full(5, 0.8))
 
 
-@pytest.mark.parametrize(
-    ("costs", "count", "multiple"),
-    [(np.ones((2, 2)), 3, 2.0), (np.ones(0), 3, 2.0), (np.ones(3), -1, 2.0), (np.ones(3), 3, 1.0)],
-)
-def test_scaling_refuses_what_cannot_be(costs: np.ndarray, count: int, multiple: float) -> None:
-    with pytest.raises(ValueError, match="must"):
-        scale_linearly(costs, count, multiple)
-
-
 @given(COSTS, st.integers(0, 60), st.integers(0, 2**32))
 def test_counts_are_the_floor_or_one_more(costs: np.ndarray, count: int, seed: int) -> None:
     expected = scale_linearly(costs, count)
@@ -104,9 +112,3 @@ def test_order_of_parents_is_random() -> None:
         / num
     )
     np.testing.assert_allclose(first, 1 / 3, atol=0.037)
-
-
-@pytest.mark.parametrize("expected", [[0.5, 0.7], [-1.0, 2.0], [np.nan, 1.0], [[1.0]]])
-def test_selection_refuses_what_cannot_be(expected: list[float]) -> None:
-    with pytest.raises(ValueError, match="expected must"):
-        stochastic_remainder(np.random.default_rng(0), np.array(expected))

@@ -5,11 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.crossover import (
-    cross_single_point,
-    num_single_point_uniforms,
-    single_point_crossover,
-)
+from evoexp.evolution.crossover import cross_single_point, num_single_point_uniforms
 
 
 def population(num_genes: int = 8, individuals: int = 12) -> np.ndarray:
@@ -19,7 +15,8 @@ def population(num_genes: int = 8, individuals: int = 12) -> np.ndarray:
 
 def crossed(seed: int, genomes: np.ndarray, parents: np.ndarray, rate: float) -> np.ndarray:
     out = np.full((len(genomes), len(parents) + 4), -1.0)
-    single_point_crossover(np.random.default_rng(seed), genomes, parents, rate, out)
+    uniforms = np.random.default_rng(seed).random(num_single_point_uniforms(len(parents) // 2))
+    cross_single_point(uniforms, genomes, parents, rate, out)
     assert np.all(out[:, len(parents) :] == -1.0)
     return out[:, : len(parents)]
 
@@ -93,18 +90,3 @@ def test_the_last_site_is_the_last_gene_even_for_the_largest_draw() -> None:
     genomes, out = population(), np.empty((8, 2))
     cross_single_point(np.array([0.0, np.nextafter(1.0, 0.0)]), genomes, np.array([0, 1]), 1.0, out)
     assert (out[:, 0] != genomes[:, 0]).tolist() == [False] * 7 + [True]
-
-
-def test_draws_are_fixed_whatever_the_rate() -> None:
-    for rate in (0.0, 1.0):
-        rng, twin = np.random.default_rng(5), np.random.default_rng(5)
-        single_point_crossover(rng, population(), np.arange(7), rate, np.empty((8, 7)))
-        twin.random(num_single_point_uniforms(3))
-        assert rng.random() == twin.random()
-
-
-def test_offspring_that_do_not_fit_are_an_error() -> None:
-    with pytest.raises(ValueError, match=r"3 offspring of \(8, 12\) do not fit \(8, 2\)"):
-        single_point_crossover(
-            np.random.default_rng(0), population(), np.arange(3), 0.5, np.empty((8, 2))
-        )

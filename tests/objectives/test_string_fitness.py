@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.objectives.string_fitness import StringFitness, count_collisions, weigh
+from evoexp.objectives.string_fitness import StringFitness, count_collisions, fill_wheel, weigh
 
 PAPER = StringFitness(
     length_weight=0.5, unevenness_weight=0.005, collision_weight=100.0, fitness_offset=500.0
@@ -24,7 +24,9 @@ def test_collisions_lower_the_fitness() -> None:
 
 
 def test_roulette_weights_are_never_negative() -> None:
-    assert PAPER.roulette_weights(np.array([499.0, 501.0, np.inf])).tolist() == [1.0, 0.0, 0.0]
+    weights = np.empty(3)
+    fill_wheel(PAPER.fitness_offset, np.array([499.0, 501.0, np.inf]), weights)
+    assert weights.tolist() == [1.0, 0.0, 0.0]
 
 
 def test_an_instant_collides_if_any_of_its_substeps_does() -> None:

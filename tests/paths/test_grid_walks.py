@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
 from evoexp.paths.grid_choices import choices_of
-from evoexp.paths.grid_walks import (
-    erase_loops,
-    walk,
-    walk_by_choices,
-    walk_each,
-)
+from evoexp.paths.grid_walks import erase_loops, walk, walk_each
 from evoexp.paths.grids import UNREACHED
 from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of, without_loops
 
@@ -30,7 +25,7 @@ def test_a_single_walk_is_that_of_a_single_walker(
         np.zeros(world.grid.num_nodes + 1, dtype=np.int32),
         np.zeros(world.grid.num_nodes, dtype=np.int32),
     )
-    walk(Block(uniforms, taken), world.moves, world.ends, erase, path, place)
+    walk(Block(uniforms, taken), world.moves, world.no_choices, world.ends, erase, path, place)
     trail = world.trail(iter(uniforms[7:].tolist()))
     assert taken[0] == 7 + len(trail) - 1
     assert nodes_of(path) == as_path(trail, erase, world.grid.num_nodes)
@@ -58,14 +53,10 @@ def test_choices_lead_to_the_same_nodes(
     special = [0.0, 1.0 - 2.0**-53, *parts, *below, *np.nextafter(below, 0.0)]
     uniforms = np.where(rng.random(5000) < 0.5, rng.choice(special, 5000), rng.random(5000))
     found = []
-    for by_choices in (False, True):
+    for own in (world.no_choices, choices):
         path, place = np.zeros(nodes + 1, dtype=np.int32), np.zeros(nodes, dtype=np.int32)
         draws = Block(uniforms, np.array([3]))
-        if by_choices:
-            own = choices.entries[0], choices.slots
-            walk_by_choices(draws, *own, world.ends, erase, path, place)
-        else:
-            walk(draws, moves, world.ends, erase, path, place)
+        walk(draws, moves, own, world.ends, erase, path, place)
         found.append((draws.taken[0], path[: path[0] + 1].tolist()))
     assert found[0] == found[1]
 
@@ -78,7 +69,7 @@ def test_numbers_that_do_not_suffice_are_said() -> None:
     )
     for taken in (np.array([0]), np.array([5])):
         draws = Block(np.full(5, 0.5), taken)
-        walk(draws, world.moves, world.ends, True, path, place)
+        walk(draws, world.moves, world.no_choices, world.ends, True, path, place)
         assert used_up(draws)
 
 
@@ -94,7 +85,9 @@ def test_walks_one_by_one_are_those_of_a_walker_wherever_blocks_end(
     while complete < len(paths):
         end, k = end + blocks[k % len(blocks)], k + 1
         draws = Block(uniforms[begin:end], np.array([0]))
-        complete = walk_each(draws, world.moves, world.ends, erase, complete, paths, place)
+        complete = walk_each(
+            draws, world.moves, world.no_choices, world.ends, erase, complete, paths, place
+        )
         begin += int(draws[1][0])
     numbers = iter(uniforms.tolist())
     assert [nodes_of(path) for path in paths] == [

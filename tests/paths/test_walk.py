@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_paths import walked
 
-from evoexp.paths.walk import num_uniforms, walk
+from evoexp.paths.walk import num_uniforms, walk_strings
 
 TURN = math.radians(120)
 
@@ -25,7 +25,9 @@ def fresh(seed, joints, num, strings, step=2.5, max_turn=TURN, start=None, goal=
     goal = rng.uniform(-300.0, 300.0, stops[-1]) if goal is None else np.array(goal)
     via_points = np.full((stops[-1], num + 1, strings + 5), np.nan)
     uniforms = rng.random((strings, num_uniforms(arm_slices, num)))
-    walk(via_points, np.arange(3, strings + 3), uniforms, start, goal, arm_slices, step, max_turn)
+    walk_strings(
+        via_points, np.arange(3, strings + 3), uniforms, start, goal, arm_slices, step, max_turn
+    )
     return via_points, uniforms, start, goal, arm_slices
 
 
@@ -112,13 +114,3 @@ def test_consumes_one_angle_fewer_than_joints_per_step():
     assert num_uniforms(np.array([[0, 2], [2, 4]]), 20) == 38
     assert num_uniforms(np.array([[0, 3], [3, 4], [4, 10]]), 40) == 39 * 7
     assert num_uniforms(np.array([[0, 2]]), 1) == 0
-
-
-def test_what_does_not_fit_is_refused_untouched():
-    population, arm_slices, q = np.zeros((2, 6, 8)), np.array([[0, 2]]), np.ones(2)
-    with pytest.raises(ValueError, match="uniforms"):
-        walk(population, np.array([0]), np.zeros((1, 3)), q, q + 1, arm_slices, 2.5, 1.0)
-    for lane in (-1, 8):
-        with pytest.raises(ValueError, match="lanes"):
-            walk(population, np.array([lane]), np.zeros((1, 4)), q, q + 1, arm_slices, 2.5, 1.0)
-    assert not population.any()

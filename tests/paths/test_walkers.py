@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
+from evoexp.paths.grid_choices import choice_table
+from evoexp.paths.walkers import LANES, WORDS, Walkers
 from matrix import num_cases
 from paths.walked_worlds import SEEDS, SHAPES, World, as_path, nodes_of
 

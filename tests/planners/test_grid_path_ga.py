@@ -15,7 +15,6 @@ from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
 from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
-from evoexp.planners.grid_path_ga.path_sampling import PER_CALL, PathSampling
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
 from evoexp.testing.small_conditions import conditions
@@ -318,37 +317,6 @@ def test_random_search_draws_the_same_first_paths() -> None:
         nodes_of(path) for path in drawn.population
     ]
     assert np.array_equal(first.costs, drawn.costs)
-
-
-@pytest.mark.parametrize(("shape", "num_elites"), [((9, 9), 0), ((9, 9), 3), ((4, 4, 4), 1)])
-def test_random_paths_drawn_generations_at_once_are_those_of_words_drawn_before(
-    shape: tuple[int, ...], num_elites: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = planner(num_elites=num_elites, num_generations=2 * PER_CALL + 3)
-    problem, at_once, one_by_one = solvable(shape, 0.3, 4, own), rng(5), rng(5)
-    control = RandomSearch(planner=own)
-    rows = [
-        row._replace(state=row.state or state_bytes(at_once.bit_generator))
-        for row in generations(control.evolve(problem, at_once))
-    ]
-    # the longer way, of any generator
-    monkeypatch.setattr(PathSampling, "is_fit", lambda *_: False)
-    for g in generations(control.evolve(problem, one_by_one)):
-        np.testing.assert_array_equal(g.costs, rows[g.index].costs)
-        assert rows[g.index].state == state_bytes(one_by_one.bit_generator)
-    np.testing.assert_array_equal(rows[-1].population, g.population)
-    np.testing.assert_array_equal(rows[-1].best, g.best)
-    assert rows[-1].terms == g.terms
-    assert at_once.bit_generator.state == one_by_one.bit_generator.state
-
-
-def test_no_more_paths_are_drawn_at_once_than_there_is_memory_for() -> None:
-    problem = solvable((9, 9), 0.3, 4, planner())
-    sampling = PathSampling(problem, rng(5), 12)
-    assert sampling.draw(12).shape[0] == 12
-    for count in (0, 13):
-        with pytest.raises(ValueError, match=rf"count must be 1\.\.12, was {count}"):
-            sampling.draw(count)
 
 
 def test_populations_are_checked() -> None:

@@ -13,8 +13,8 @@ from evoexp.paths import lengths, relaxation
 
 def main() -> None:
     via_points, arms = np.zeros((4, 21, 8)), np.array([[0, 2], [2, 4]])
-    lengths.path_lengths(via_points, arms, np.empty((2, 8)), np.empty((2, 8)))
-    relaxation.relax(via_points, 0.5, 8)
+    lengths.measure_paths(via_points, arms, np.empty((2, 8)), np.empty((2, 8)))
+    relaxation.relax_points(via_points, 0.5, 8)
     values = [value for module in (lengths, relaxation) for value in vars(module).values()]
     kernels = [value for value in values if getattr(value, "nopython_signatures", None)]
     assembly = "\n".join(text for kernel in kernels for text in kernel.inspect_asm().values())

@@ -5,9 +5,9 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.robots.dh_chain import DhChain, DhJoint
-from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.poses import compose as behind
 from evoexp.robots.poses import frame_pose, invert, local_pose, pose_of
+from robots.joint_frames import forward_kinematics
 
 SPHERE = {"name": "ball", "joint": 1, "shape": "sphere", "center": (0.0, 0.0, 0.0), "radius": 0.1}
 

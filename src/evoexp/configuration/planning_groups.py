@@ -13,8 +13,8 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
 from evoexp.robots.joint_choice import joint_roles
 from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_reading import read_urdf
-from evoexp.robots.urdf_text import JointText, read_joints
+from evoexp.robots.urdf_reading import urdf_file
+from evoexp.robots.urdf_text import JointText
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
 
@@ -73,7 +73,7 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
 
 
 def _joints(robot: dict[str, Any]) -> dict[str, JointText]:
-    return read_joints(read_urdf(File(**robot["urdf"]).content, "robot.path"), "robot.path")
+    return urdf_file(File(**robot["urdf"]).content).joints
 
 
 def _standing(

@@ -24,15 +24,11 @@ CollisionCounts = NDArray[np.integer[Any]]  # short integers, where they are man
 
 
 class BestTeam(NamedTuple):
-    """The cheapest team without a collision.
+    """The cheapest team without a collision."""
 
-    Attributes:
-        individuals: (P,) index of the member in each population; −1 if there is no such team.
-        cost: Sum of the members' own costs; inf if there is no such team.
-    """
-
+    # (P,) index of the member in each population; −1 if there is no such team
     individuals: IntArray
-    cost: float
+    cost: float  # sum of the members' own costs; inf if there is no such team
 
     @property
     def found(self) -> bool:
@@ -49,25 +45,12 @@ def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
     Raises:
         ValueError: If the shapes contradict each other.
     """
-    check_shapes(collisions, own, own.shape)
-    team = np.empty(len(own), dtype=np.int64)
-    return BestTeam(team, float(find_best_team(collisions, own, own.shape[1], team)))
-
-
-def check_shapes(
-    collisions: CollisionCounts, own: FloatArray, front_shape: tuple[int, ...]
-) -> None:
-    """Check the arrays of teams, see the module, and the shape (P, N) of their fronts.
-
-    Raises:
-        ValueError: If they contradict each other.
-    """
     num, count = own.shape
     enough = collisions.ndim == 3 and min(collisions.shape[1:]) >= count
-    if num < 2 or front_shape != own.shape or not enough or len(collisions) != num * (num - 1) // 2:
-        raise ValueError(
-            f"collisions {collisions.shape}, costs {own.shape} and front {front_shape} do not match"
-        )
+    if num < 2 or not enough or len(collisions) != num * (num - 1) // 2:
+        raise ValueError(f"collisions {collisions.shape} and costs {own.shape} do not match")
+    team = np.empty(len(own), dtype=np.int64)
+    return BestTeam(team, float(find_best_team(collisions, own, count, team)))
 
 
 @kernel
@@ -92,66 +75,11 @@ def sort_by_cost(own: FloatArray, count: int) -> IntArray:
 def find_best_team(
     collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray
 ) -> float:
-    """The kernel of `best_team`, for other kernels, on the first `count` individuals.
+    """Write the best team, see `best_team`, of the first `count` individuals; return its cost.
 
-    Args:
-        collisions: See the module.
-        own: See the module.
-        count: N.
-        team: (P,) written.
-
-    Returns:
-        The team's cost.
-    """
-    if len(own) == 2:
-        return float(find_best_pair(collisions, own, count, team))
-    return float(search_teams(collisions, own, count, team))
-
-
-@kernel
-def find_best_pair(
-    collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray
-) -> float:
-    """`find_best_team` of two populations.
-
-    Rounding is monotone: the lowest sum of an individual is the sum with its cheapest partner.
-    """
-    table, first, second = collisions[0], own[0], own[1]
-    # the cheapest free partner of all of the second, four candidates at a time
-    least, last = np.full(count, np.inf), count - 1
-    for i in range(0, count, 4):
-        k, m, n = min(i + 1, last), min(i + 2, last), min(i + 3, last)
-        rows = table[i], table[k], table[m], table[n]
-        a, b, c, d = first[i], first[k], first[m], first[n]
-        for j in range(count):
-            p, q = a if rows[0][j] == 0 else np.inf, b if rows[1][j] == 0 else np.inf
-            r, s = c if rows[2][j] == 0 else np.inf, d if rows[3][j] == 0 else np.inf
-            p, r, known = q if q < p else p, s if s < r else r, least[j]
-            p = r if r < p else p
-            least[j] = p if p < known else known
-    best = np.inf
-    for j in range(count):
-        best = min(best, least[j] + second[j])
-    # of all pairs with this sum the first
-    team[:] = -1
-    if best < np.inf:
-        team[0] = count
-        for j in range(count):
-            if least[j] + second[j] == best:
-                for i in range(team[0]):
-                    if table[i, j] == 0 and first[i] + second[j] == best:
-                        team[0], team[1] = i, j
-                        break
-    return best
-
-
-@kernel
-def search_teams(collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray) -> float:
-    """`find_best_team` of any number of populations: depth first, the cheapest first, with bounds.
-
-    Bounds are summed in the order of the populations like the costs themselves, so rounding cannot
-    make one too high. Where a bound only equals the best cost, a branch is worth it if its indices
-    come first in lexicographic order.
+    Depth first, the cheapest first, with bounds. These are summed in the order of the populations
+    like the costs themselves, so rounding cannot make one too high. Where a bound only equals the
+    best cost, a branch is worth it if its indices come first in lexicographic order.
     """
     num, order = len(own), sort_by_cost(own, count)
     ranks, trial, partial = np.zeros(num, dtype=np.int64), np.full(num, -1), np.zeros(num + 1)

@@ -9,27 +9,16 @@ from evoexp.records import FloatArray
 
 
 class CostStatistics(NamedTuple):
-    """Statistics of the costs of one generation.
+    """Statistics of the costs of one generation; NaN without a finite cost."""
 
-    Attributes:
-        best: Index of the lowest cost, the first among equals.
-        mean: Over the finite costs; NaN if there are none.
-        std: Over the finite costs, population standard deviation; NaN if there are none.
-    """
-
-    best: int
-    mean: float
-    std: float
-
-
-def cost_statistics(costs: FloatArray) -> CostStatistics:
-    """Return best, mean and standard deviation of costs (individuals,)."""
-    return CostStatistics(*summarise(costs))
+    best: int  # index of the lowest cost, the first among equals
+    mean: float  # over the finite costs
+    std: float  # over the finite costs, of the population
 
 
 @kernel
-def summarise(costs: FloatArray) -> tuple[int, float, float]:
-    """The kernel of `cost_statistics`, for other kernels: best, mean, standard deviation."""
+def cost_statistics(costs: FloatArray) -> CostStatistics:
+    """Return best, mean and standard deviation of costs (individuals,)."""
     # the best, and the sum of the finite costs
     best, count, total = 0, 0, 0.0
     for k in range(len(costs)):
@@ -39,11 +28,11 @@ def summarise(costs: FloatArray) -> tuple[int, float, float]:
             count += 1
             total += costs[k]
     if count == 0:
-        return best, np.nan, np.nan
+        return CostStatistics(best, np.nan, np.nan)
     # the deviation, by squares of differences to the mean
     mean = total / count
     squares = 0.0
     for k in range(len(costs)):
         if np.isfinite(costs[k]):
             squares += (costs[k] - mean) * (costs[k] - mean)
-    return best, mean, np.sqrt(squares / count)
+    return CostStatistics(best, mean, np.sqrt(squares / count))

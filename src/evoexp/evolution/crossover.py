@@ -1,55 +1,28 @@
-"""Crossover of individuals: strings of via-points, and genomes at one point or gene by gene."""
+"""Crossover of individuals: strings of via-points, and genomes at one point or gene by gene.
+
+"Double cross-over" of a string p : q (Rana & Zalzala 1995, section 3.4b) can be read in two ways:
+
+- tails: either arm's path is cut in two, and what follows the site is exchanged, arm by arm;
+- segment: the whole string is cut at both sites, and what lies between them is exchanged: the end
+  of the first arm's path and the beginning of the second arm's. With more arms every second piece
+  of the string is exchanged.
+"""
+
+from typing import Literal, get_args
 
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray, IntArray
 
-CROSSOVERS = ("one_point", "uniform", "arithmetic", "blx_alpha")
-"""Names of crossovers; kernels take their places in this list."""
-
-ONE_POINT, UNIFORM, ARITHMETIC, BLX_ALPHA = range(4)
+Crossover = Literal["one_point", "uniform", "arithmetic", "blx_alpha"]
+CROSSOVERS: tuple[str, ...] = get_args(Crossover)
+ONE_POINT, UNIFORM, ARITHMETIC, BLX_ALPHA = range(len(CROSSOVERS))  # as kernels take them
 
 
 def num_uniforms(num_arms: int, num_pairs: int) -> int:
-    """Count the uniform numbers of `site_crossover`: per pair a decision, and a site per arm."""
+    """Count the uniform numbers of `cross_at_sites`: per pair a decision, and a site per arm."""
     return num_pairs * (1 + num_arms)
-
-
-def site_crossover(
-    rng: np.random.Generator,
-    population: FloatArray,
-    parents: IntArray,
-    arm_slices: IntArray,
-    rate: float,
-    max_distance: float,
-    out: FloatArray,
-    segment: bool = False,
-) -> None:
-    """Cross strings at one site per arm, where the parents are close (Rana & Zalzala, 3.4b).
-
-    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with
-    probability `rate`, and only if at the sites chosen in both arms' portions the two parents'
-    via-points are closer than `max_distance`. What is not crossed is copied. "Double cross-over" of
-    the string p : q can be read in two ways:
-
-    - tails: either arm's path is cut in two, and what follows the site is exchanged, arm by arm;
-    - segment: the whole string is cut at both sites, and what lies between them is exchanged: the
-      end of the first arm's path and the beginning of the second arm's. With more arms every second
-      piece of the string is exchanged.
-
-    Args:
-        rng: Source of `num_uniforms` uniform numbers.
-        population: (nq, N + 1, individuals) strings of via-points.
-        parents: (offspring,) indices into the population.
-        arm_slices: (arms, 2) rows of each arm.
-        rate: Probability in [0, 1].
-        max_distance: Euclidean, in the units of the via-points.
-        out: (nq, N + 1, ≥ offspring), written: the offspring.
-        segment: Whether the segment between the sites is exchanged, instead of the tails.
-    """
-    uniforms = rng.random(num_uniforms(len(arm_slices), len(parents) // 2))
-    cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance, segment, out)
 
 
 @kernel
@@ -63,7 +36,22 @@ def cross_at_sites(
     segment: bool,
     out: FloatArray,
 ) -> None:
-    """The kernel of `site_crossover`, for other kernels."""
+    """Cross strings at one site per arm, where the parents are close (Rana & Zalzala, 3.4b).
+
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with
+    probability `rate`, and only if at the sites chosen in both arms' portions the two parents'
+    via-points are closer than `max_distance`. What is not crossed is copied.
+
+    Args:
+        uniforms: (`num_uniforms`,) in [0, 1); per pair: decision, a site per arm.
+        population: (nq, N + 1, individuals) strings of via-points.
+        parents: (offspring,) indices into the population.
+        arm_slices: (arms, 2) rows of each arm.
+        rate: Probability in [0, 1].
+        max_distance: Euclidean, in the units of the via-points.
+        segment: Whether the segment between the sites is exchanged, instead of the tails.
+        out: (nq, N + 1, ≥ offspring), written: the offspring.
+    """
     num_points, num_arms, num_offspring = population.shape[1], len(arm_slices), len(parents)
     # mates and sites of every pair; who is not crossed is its own mate
     mates = parents.copy()
@@ -101,12 +89,13 @@ def cross_at_sites(
 
 
 def num_single_point_uniforms(num_pairs: int) -> int:
-    """Count the uniform numbers of `single_point_crossover`: per pair a decision and a site."""
+    """Count the uniform numbers of `cross_single_point`: per pair a decision and a site."""
     return 2 * num_pairs
 
 
-def single_point_crossover(
-    rng: np.random.Generator, genomes: FloatArray, parents: IntArray, rate: float, out: FloatArray
+@kernel
+def cross_single_point(
+    uniforms: FloatArray, genomes: FloatArray, parents: IntArray, rate: float, out: FloatArray
 ) -> None:
     """Cut pairs of parents at one site and exchange what follows (Curkovic et al. 2013, section 3).
 
@@ -114,27 +103,12 @@ def single_point_crossover(
     `rate`, before one of the genes 1 … genes − 1, each equally likely. What is not cut is copied.
 
     Args:
-        rng: Source of `num_single_point_uniforms` uniform numbers, whatever the rate.
+        uniforms: (`num_single_point_uniforms`,) in [0, 1); per pair: decision, site.
         genomes: (genes, individuals, padding allowed).
         parents: (offspring,) indices of individuals.
         rate: Probability in [0, 1].
         out: (genes, ≥ offspring), written: the offspring.
-
-    Raises:
-        ValueError: If the offspring do not fit.
     """
-    two = genomes.ndim == out.ndim == 2
-    if not (two and len(out) == len(genomes) and out.shape[1] >= len(parents)):
-        raise ValueError(f"{len(parents)} offspring of {genomes.shape} do not fit {out.shape}")
-    uniforms = rng.random(num_single_point_uniforms(len(parents) // 2))
-    cross_single_point(uniforms, genomes, parents, rate, out)
-
-
-@kernel
-def cross_single_point(
-    uniforms: FloatArray, genomes: FloatArray, parents: IntArray, rate: float, out: FloatArray
-) -> None:
-    """The kernel of `single_point_crossover`, for other kernels; per pair: decision, site."""
     # copies; an unsigned index, as numba would test a signed one for counting from the end
     num_genes, num_offspring = len(genomes), len(parents)
     for gene in range(num_genes):

@@ -54,7 +54,7 @@ class ScaledGenetic(GeneticSettings):
     are scanned systematically: added up once in random order, one place wherever the sum passes u,
     u + 1, u + 2, …, with one uniform number u. That is assumed: Chen & Zalzala 1995 name the
     sampling, not the scan, and Goldberg (1989) tosses a coin per remainder instead, which is biased
-    (see `scaled_selection.stochastic_remainder`).
+    (see `scaled_selection.choose_by_remainders`).
 
     Attributes:
         scaling_multiple: Copies that the best one expects, in units of the mean [-].

@@ -1,7 +1,9 @@
 """The hall of fame of co-evolving populations (Curkovic et al. 2013, section 3).
 
 It holds the best teams of collaborators. A team's key is (collisions within the team, sum of its
-members' own costs): lower is better. Nothing is random and every tie is settled by an order.
+members' own costs): lower is better. Nothing is random and every tie is settled by an order: the
+next hall takes candidates by key; among equals the present hall's own come first, in their order,
+then the new ones in the order of `gather_teams`, then the best team of all.
 
 The arrays `collisions` and `own` of P populations are those of `best_team`; `front`  # (P, ≥ N)
 bool: the non-dominated individuals of each population.
@@ -11,39 +13,26 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from evoexp.evolution.best_team import CollisionCounts, check_shapes, pair_index, sort_by_cost
+from evoexp.evolution.best_team import CollisionCounts, pair_index, sort_by_cost
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 
 class Teams(NamedTuple):
-    """Teams and their keys.
+    """Teams and their keys."""
 
-    Attributes:
-        teams: (teams, P) index of the member in each population.
-        collisions: (teams,) colliding configurations within each team.
-        costs: (teams,) sum of the members' own costs.
-    """
-
-    teams: IntArray
-    collisions: IntArray
-    costs: FloatArray
+    teams: IntArray  # (teams, P) index of the member in each population
+    collisions: IntArray  # (teams,) colliding configurations within each team
+    costs: FloatArray  # (teams,) sum of the members' own costs
 
 
 class Hall(NamedTuple):
-    """The teams that are kept, best first unless some are kept for another reason than their key.
+    """The teams that are kept, best first unless some stay for another reason than their key."""
 
-    Attributes:
-        teams: (teams, P) index of the member in each population.
-        ages: (teams,) generations since each team entered.
-        collisions: (teams,) colliding configurations within each team.
-        costs: (teams,) sum of the members' own costs.
-    """
-
-    teams: IntArray
-    ages: IntArray
-    collisions: IntArray
-    costs: FloatArray
+    teams: IntArray  # (teams, P) index of the member in each population
+    ages: IntArray  # (teams,) generations since each team entered
+    collisions: IntArray  # (teams,) colliding configurations within each team
+    costs: FloatArray  # (teams,) sum of the members' own costs
 
     @classmethod
     def room(cls, depth: int, num_populations: int) -> Self:
@@ -62,12 +51,6 @@ class Hall(NamedTuple):
         """Number of teams."""
         return len(self.teams)
 
-    def with_room(self, depth: int) -> Self:
-        """Return a copy whose arrays have room for `depth` teams; the rest is not set."""
-        copy = self.room(depth, self.teams.shape[1])
-        copy.teams[: self.num_teams], copy.ages[: self.num_teams] = self.teams, self.ages
-        return copy
-
     def first(self, count: int) -> Self:
         """Return the first `count` teams."""
         teams, ages, collisions, costs = self
@@ -81,84 +64,14 @@ class Hall(NamedTuple):
 
 
 class HallRules(NamedTuple):
-    """Which teams a hall takes.
+    """Which teams a hall takes."""
 
-    Attributes:
-        memory: A team that entered more than this many generations ago is taken only where no new
-            team can be; the same team formed again is not new. 0: no such rule.
-        frozen: Whether the hall's teams stay, and new ones only fill free places. Overrides
-            `memory`.
-        exclusive: (P,) whether an individual of a population may be in one team only.
-    """
-
+    # A team that entered more than this many generations ago is taken only where no new team can
+    # be; the same team formed again is not new. 0: no such rule.
     memory: int
+    # whether the hall's teams stay, and new ones only fill free places. Overrides `memory`.
     frozen: bool
-    exclusive: BoolArray
-
-
-def form_teams(collisions: CollisionCounts, own: FloatArray, front: BoolArray) -> Teams:
-    """Give every member of a front its best collaborators.
-
-    They are chosen population by population, in order of index: the fewest collisions with all who
-    are in the team already, then the lowest own cost, then the lowest index.
-
-    Returns:
-        The teams in the order of the members they were formed around: population by population,
-        index by index. A team may come up several times.
-
-    Raises:
-        ValueError: If the shapes contradict each other.
-    """
-    check_shapes(collisions, own, front.shape)
-    formed = Hall.room(int(np.count_nonzero(front)), len(own))
-    teams = Teams(formed.teams, formed.collisions, formed.costs)
-    gather_teams(collisions, own, front, own.shape[1], teams)
-    return teams
-
-
-def update_hall(
-    collisions: CollisionCounts,
-    own: FloatArray,
-    front: BoolArray,
-    hall: Hall,
-    depth: int,
-    rules: HallRules | None = None,
-    best: IntArray | None = None,
-) -> Hall:
-    """Choose the next hall: the best of its teams and of those formed around the fronts.
-
-    Candidates are taken by key; among equals the hall's own come first, in their order, then the
-    new ones in the order of `form_teams`, then `best`. Keys of old teams are computed anew from the
-    arrays given.
-
-    Args:
-        collisions: See the module.
-        own: See the module.
-        front: See the module.
-        hall: The present one, its members' places in the present populations.
-        depth: Most teams that it holds.
-        rules: Which teams it takes; None: the best, nobody in two.
-        best: (P,) the best team of all, offered to the hall even if none of its members is on a
-            front; −1: there is none. None: it is not offered.
-
-    Returns:
-        The next hall, at most `depth` teams, ages counted on; its members' places are in the
-        present populations.
-
-    Raises:
-        ValueError: If the shapes contradict each other or the hall is larger than `depth`.
-    """
-    check_shapes(collisions, own, front.shape)
-    if hall.teams.shape[1] != len(own) or hall.num_teams > depth:
-        raise ValueError(
-            f"a hall of {hall.teams.shape} is not one of at most {depth} teams of {len(own)}"
-        )
-    num, count = own.shape
-    rules = rules or HallRules(memory=0, frozen=False, exclusive=np.ones(num, dtype=np.bool_))
-    best, renewed = np.full(num, -1) if best is None else best, hall.with_room(depth)
-    return renewed.first(
-        renew_hall(collisions, own, front, count, renewed, hall.num_teams, best, rules)
-    )
+    exclusive: BoolArray  # (P,) whether an individual of a population may be in one team only
 
 
 @kernel
@@ -203,9 +116,22 @@ def choose_collaborator(
 def gather_teams(
     collisions: CollisionCounts, own: FloatArray, front: BoolArray, count: int, formed: Teams
 ) -> int:
-    """The kernel of `form_teams`, for other kernels, on the first `count` individuals.
+    """Give every member of a front its best collaborators, of the first `count` individuals.
 
-    Writes `formed`, which has room for a team per member of a front; returns how many they are.
+    They are chosen population by population, in order of index: the fewest collisions with all who
+    are in the team already, then the lowest own cost, then the lowest index. A team may come up
+    several times.
+
+    Args:
+        collisions: (pairs, ≥ N, ≥ N), see `best_team`.
+        own: (P, ≥ N), see `best_team`.
+        front: (P, ≥ N) the non-dominated individuals.
+        count: N.
+        formed: With room for a team per member of a front; written in the order of the members that
+            teams were formed around: population by population, index by index.
+
+    Returns:
+        How many teams there are.
     """
     num, filled = len(own), 0
     order = sort_by_cost(own, count)
@@ -234,27 +160,25 @@ def renew_hall(
     best: IntArray,
     rules: HallRules,
 ) -> int:
-    """The kernel of `update_hall`, for other kernels, on the first `count` individuals.
+    """Choose the next hall: the best of its teams and of those formed around the fronts.
 
     Args:
-        collisions: See the module.
-        own: See the module.
-        front: See the module.
+        collisions: (pairs, ≥ N, ≥ N), see `best_team`; keys of old teams are computed anew.
+        own: (P, ≥ N), see `best_team`.
+        front: (P, ≥ N) the non-dominated individuals.
         count: N.
         hall: With room for as many teams as it may hold; teams and ages are read up to
             `num_teams`, everything is rewritten.
         num_teams: Teams of the hall at present.
-        best: (P,) see `update_hall`; −1: none.
+        best: (P,) the best team of all, offered to the hall even if none of its members is on a
+            front; −1: none is offered.
         rules: Which teams the hall takes.
 
     Returns:
         Number of teams that the hall holds then.
     """
     # candidates: the hall's own teams, one per member of a front, the best of all
-    most = num_teams + (1 if best[0] >= 0 else 0)
-    for p in range(len(own)):
-        for i in range(count):
-            most += 1 if front[p, i] else 0
+    most = num_teams + np.count_nonzero(front[:, :count]) + (1 if best[0] >= 0 else 0)
     pool = np.empty((most, len(own)), dtype=np.int64)
     ages, ranks = np.zeros(most, dtype=np.int64), np.zeros(most, dtype=np.int64)
     hits, costs = np.empty(most, dtype=np.int64), np.empty(most)

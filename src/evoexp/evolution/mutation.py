@@ -1,26 +1,27 @@
 """Mutation of genes: of one allele, of real genomes gene by gene, and of bits; its rate."""
 
-import numpy as np
+from typing import Literal, get_args
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import pow_int
 from evoexp.records import FloatArray
 
-MUTATIONS = ("non_uniform", "gaussian", "uniform_reset")
-SCOPES = ("gene", "individual")
-"""Names of mutations and of their scopes; kernels take their places in these lists."""
-
-NON_UNIFORM, GAUSSIAN, UNIFORM_RESET = range(3)
-GENE, INDIVIDUAL = range(2)
+Mutation = Literal["non_uniform", "gaussian", "uniform_reset"]
+Scope = Literal["gene", "individual"]
+MUTATIONS: tuple[str, ...] = get_args(Mutation)
+SCOPES: tuple[str, ...] = get_args(Scope)
+NON_UNIFORM, GAUSSIAN, UNIFORM_RESET = range(len(MUTATIONS))  # as kernels take them
+GENE, INDIVIDUAL = range(len(SCOPES))
 
 
 def num_allele_uniforms(count: int) -> int:
-    """Count the uniform numbers of `allele_mutation`: per individual decision, gene, amount."""
+    """Count the uniform numbers of `mutate_allele`: per individual decision, gene, amount."""
     return 3 * count
 
 
-def allele_mutation(
-    rng: np.random.Generator,
+@kernel
+def mutate_allele(
+    uniforms: FloatArray,
     genomes: FloatArray,
     count: int,
     rate: float,
@@ -35,34 +36,14 @@ def allele_mutation(
     lies in [0, limit); otherwise the allele keeps its value.
 
     Args:
-        rng: Source of `num_allele_uniforms` uniform numbers, whatever the rate.
+        uniforms: (`num_allele_uniforms`,) in [0, 1); per individual: decision, gene, amount.
         genomes: (genes, ≥ count), changed in place.
         count: Individuals that may change; those behind them do not.
         rate: Probability in [0, 1].
         step: Largest change, > 0, in the units of the genes.
         limit: Upper bound of a mutated gene, in the units of the genes.
         symmetric: Whether genes may decrease, too.
-
-    Raises:
-        ValueError: If there are fewer individuals than `count`, or no genes.
     """
-    if genomes.ndim != 2 or not len(genomes) or not 0 <= count <= genomes.shape[1]:
-        raise ValueError(f"genomes are (genes, at least {count} individuals), were {genomes.shape}")
-    uniforms = rng.random(num_allele_uniforms(count))
-    mutate_allele(uniforms, genomes, count, rate, step, limit, symmetric)
-
-
-@kernel
-def mutate_allele(
-    uniforms: FloatArray,
-    genomes: FloatArray,
-    count: int,
-    rate: float,
-    step: float,
-    limit: float,
-    symmetric: bool,
-) -> None:
-    """The kernel of `allele_mutation`, for other kernels; uniforms: decision, gene, amount."""
     num_genes = len(genomes)
     for k in range(count):
         if not uniforms[3 * k] < rate:

@@ -30,7 +30,7 @@ def pareto_front(criteria: FloatArray) -> BoolArray:
 
 @kernel
 def non_dominated(criteria: FloatArray, count: int, out: BoolArray) -> None:
-    """The kernel of `pareto_front`, for other kernels, on the first `count` individuals.
+    """Mark those of the first `count` individuals that are not dominated, see `pareto_front`.
 
     Dominance is transitive, so only those not dominated so far are compared with all. Four criteria
     per pass stay in registers; where fewer are left, the last is repeated, which changes nothing.

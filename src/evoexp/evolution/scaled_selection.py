@@ -3,6 +3,15 @@
 Linear scaling says how many copies of every individual are expected among the parents; sampling
 makes each a parent as often as expected, rounded up or down. Which ones are rounded up is found by
 one systematic scan of the remainders, which is assumed: the paper names the sampling only.
+
+Every individual first becomes a parent as often as the whole part of its expected number says. For
+the places left, the remainders are added up once, in random order; an individual that brings the
+sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an individual gets at
+most one of these places, with exactly the probability of its remainder.
+
+Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
+order of indices against individuals that come late, and in any order against small remainders (of
+0.9 and 0.1 the second one gets the place with probability 0.06).
 """
 
 from typing import NamedTuple
@@ -16,19 +25,12 @@ from evoexp.records import FloatArray, IntArray
 
 
 class SelectionMemory(NamedTuple):
-    """Arrays that the selection of a generation writes.
+    """Arrays that the selection of a generation writes."""
 
-    Attributes:
-        parents: (offspring,) indices of individuals.
-        elites: (elites,) likewise.
-        expected: (individuals,) expected numbers of copies.
-        order: (individuals,) order in which remainders are scanned.
-    """
-
-    parents: IntArray
-    elites: IntArray
-    expected: FloatArray
-    order: IntArray
+    parents: IntArray  # (offspring,) indices of individuals
+    elites: IntArray  # (elites,) likewise
+    expected: FloatArray  # (individuals,) expected numbers of copies
+    order: IntArray  # (individuals,) order in which remainders are scanned
 
     @classmethod
     def of(cls, num_offspring: int, num_elites: int, size: int) -> "SelectionMemory":
@@ -62,8 +64,9 @@ def choose_parents(
     return True
 
 
-def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> FloatArray:
-    """Return the expected numbers of copies by linear scaling (Chen & Zalzala 1995, Eqs. 5, 16).
+@kernel
+def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatArray) -> None:
+    """Write the expected numbers of copies by linear scaling (Chen & Zalzala 1995, Eqs. 5, 16).
 
     The paper, after Goldberg (1989), scales a fitness f = C_m − C to f' = a f + b, whose mean is
     that of f and whose maximum is `multiple` times the mean; negative values are set to 0. An
@@ -80,26 +83,9 @@ def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> Floa
             copy and is left out of the mean.
         count: Number of parents.
         multiple: Copies that the best one expects if there is a parent per individual, > 1 [-].
-
-    Returns:
-        (individuals,) ≥ 0; their sum is `count` but for rounding. Individuals of equal finite cost
-        expect equally many copies; without any finite cost all individuals do.
-
-    Raises:
-        ValueError: If an argument is out of range.
+        expected: (individuals,) ≥ 0, written; their sum is `count` but for rounding. Individuals of
+            equal finite cost expect equally many copies; without any finite cost all do.
     """
-    if costs.ndim != 1 or len(costs) == 0:
-        raise ValueError(f"costs must have shape (individuals,), at least one, was {costs.shape}")
-    if count < 0 or not multiple > 1.0:
-        raise ValueError(f"count must be ≥ 0 and multiple > 1, were {count} and {multiple}")
-    expected = np.empty(len(costs))
-    scale_costs(costs, count, multiple, expected)
-    return expected
-
-
-@kernel
-def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatArray) -> None:
-    """The kernel of `scale_linearly`, for other kernels; `expected` (individuals,) is written."""
     # mean and least of the finite costs
     num, finite, total, least = len(costs), 0, 0.0, np.inf
     for k in range(num):
@@ -133,56 +119,19 @@ def num_remainder_uniforms(num: int, count: int) -> int:
     return num + 1 + count
 
 
-def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> IntArray:
-    """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
-
-    Every individual first becomes a parent as often as the whole part of its expected number says.
-    For the places left, the remainders are added up once, in random order; an individual that
-    brings the sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an
-    individual gets at most one of these places, with exactly the probability of its remainder.
-
-    Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
-    order of indices against individuals that come late, and in any order against small remainders
-    (of 0.9 and 0.1 the second one gets the place with probability 0.06).
-
-    Args:
-        rng: Source of `num_remainder_uniforms` uniform numbers.
-        expected: (individuals,) ≥ 0, as `scale_linearly` returns them; their sum is the
-            number of parents.
-
-    Returns:
-        (parents,) indices in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋
-        times or once more.
-
-    Raises:
-        ValueError: If a number is negative or not finite, or the sum is no whole number.
-    """
-    if expected.ndim != 1 or not np.all(np.isfinite(expected)) or np.any(expected < 0.0):
-        raise ValueError("expected must be finite numbers ≥ 0 of shape (individuals,)")
-    total = float(expected.sum())
-    count = round(total)
-    if abs(total - count) > 1e-9 * max(1.0, total):
-        raise ValueError(f"expected must add up to a whole number of parents, was {total}")
-    parents = np.empty(count, dtype=np.int64)
-    order = np.empty(len(expected), dtype=np.int64)
-    choose_by_remainders(
-        rng.random(num_remainder_uniforms(len(expected), count)), expected, order, parents
-    )
-    return parents
-
-
 @kernel
 def choose_by_remainders(
     uniforms: FloatArray, expected: FloatArray, order: IntArray, parents: IntArray
 ) -> None:
-    """The kernel of `stochastic_remainder`, for other kernels.
+    """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
 
     Args:
         uniforms: (`num_remainder_uniforms`,) in [0, 1).
         expected: (individuals,) ≥ 0, adding up to the number of parents but for rounding.
         order: (individuals,) scratch: the random order of the scan; negative where a place was
             given.
-        parents: (parents,) written.
+        parents: (parents,) written, in random order: neighbours are a random pairing; k occurs
+            ⌊expected[k]⌋ times or once more.
     """
     num, count, filled = len(expected), len(parents), 0
     # whole parts

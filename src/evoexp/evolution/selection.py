@@ -9,47 +9,15 @@ from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray, IntArray
 
 
-def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> IntArray:
+@kernel
+def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -> None:
     """Draw parents with probabilities proportional to their weights (Goldberg 1989).
 
     Args:
-        rng: Source of one uniform number per parent.
         weights: (individuals,) ≥ 0; if all are 0, every individual is equally likely.
-        count: Number of parents.
-
-    Returns:
-        (count,) indices, in the order drawn: neighbours are a random pairing.
+        uniforms: (parents,) in [0, 1).
+        chosen: (parents,) written: indices in the order drawn; neighbours are a random pairing.
     """
-    chosen = np.empty(count, dtype=np.int64)
-    spin_roulette(weights, rng.random(count), chosen)
-    return chosen
-
-
-def elites(costs: FloatArray, count: int) -> IntArray:
-    """Return the indices of the lowest costs, best first; among equals the lower index wins."""
-    chosen = np.empty(count, dtype=np.int64)
-    choose_elites(costs, chosen)
-    return chosen
-
-
-def distinct(rng: np.random.Generator, num: int, count: int) -> IntArray:
-    """Draw `count` distinct indices out of 0 … num − 1, in random order.
-
-    The head of a Fisher–Yates shuffle.
-
-    Args:
-        rng: Source of `count` uniform numbers.
-        num: Number of indices.
-        count: Number of draws, at most `num`.
-    """
-    slots = np.arange(num)
-    shuffle_head(rng.random(count), slots)
-    return slots[:count]
-
-
-@kernel
-def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -> None:
-    """The kernel of `roulette`, for other kernels; writes one index per uniform number."""
     # the wheel: sums of weights up to each individual
     num = len(weights)
     wheel = np.empty(num)
@@ -77,7 +45,10 @@ def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -
 
 @kernel
 def choose_elites(costs: FloatArray, chosen: IntArray) -> None:
-    """The kernel of `elites`, for other kernels: insertion; a later equal cost stays behind."""
+    """Write the indices of the lowest costs, best first; among equals the lower index wins.
+
+    By insertion: a later equal cost stays behind.
+    """
     count, filled = len(chosen), 0
     for k in range(len(costs)):
         if filled == count and (count == 0 or not costs[k] < costs[chosen[count - 1]]):
@@ -92,7 +63,12 @@ def choose_elites(costs: FloatArray, chosen: IntArray) -> None:
 
 @kernel
 def shuffle_head(uniforms: FloatArray, slots: IntArray) -> None:
-    """The kernel of `distinct`, for other kernels: the head of `slots` is the draw."""
+    """Draw distinct indices in random order: the head of a Fisher–Yates shuffle.
+
+    Args:
+        uniforms: (draws,) in [0, 1), at most as many as there are indices.
+        slots: (indices,) 0, 1, 2, … at first, changed: its head is the draw.
+    """
     num = len(slots)
     for k in range(len(uniforms)):
         other = k + min(int(uniforms[k] * (num - k)), num - k - 1)

@@ -20,64 +20,38 @@ RESULTS = 10  # numbers of one posture: the criteria, τ1, τ2, τ3, θ3 [deg], 
 
 
 class Task(NamedTuple):
-    """Links, target and force.
+    """Links, target and force."""
 
-    Attributes:
-        l1: Length of the first link [length unit].
-        l2: Of the second one.
-        l3: Of the third one.
-        x_e: X_e: where the end-effector shall be [length unit].
-        y_e: Y_e.
-        f_x: F_x: force at the end-effector.
-        f_y: F_y.
-    """
-
-    l1: float
-    l2: float
-    l3: float
-    x_e: float
-    y_e: float
-    f_x: float
-    f_y: float
+    l1: float  # length of the first link [length unit]
+    l2: float  # of the second one
+    l3: float  # of the third one
+    x_e: float  # X_e: where the end-effector shall be [length unit]
+    y_e: float  # Y_e
+    f_x: float  # F_x: force at the end-effector
+    f_y: float  # F_y
 
 
 class Weights(NamedTuple):
-    """Weights of Eqs. 11 and 14.
+    """Weights of Eqs. 11 and 14."""
 
-    Attributes:
-        epsilon: ε, of ‖τ‖².
-        lam: λ, of the greatest |α τ|.
-        delta: δ, of 1 / det(J Jᵀ).
-        alpha_1: α1, of the first torque.
-        alpha_2: α2.
-        alpha_3: α3.
-        greatest: E_m: greatest value of E and of every criterion, and the value of singular and of
-            infeasible postures.
-    """
-
-    epsilon: float
-    lam: float
-    delta: float
-    alpha_1: float
+    epsilon: float  # ε, of ‖τ‖²
+    lam: float  # λ, of the greatest |α τ|
+    delta: float  # δ, of 1 / det(J Jᵀ)
+    alpha_1: float  # α1, of the first torque
     alpha_2: float
     alpha_3: float
-    greatest: float
+    greatest: float  # E_m: of E and of every criterion; that of singular and infeasible postures
 
 
 class Model(NamedTuple):
-    """Task, weights and limits of the criteria.
-
-    Attributes:
-        task: Links, target and force.
-        weights: Weights of the criteria.
-        avoided: (n, 5) γ, link (0: the platform), place on it in [0, 1], X_o, Y_o of Eq. 12.
-        limits: (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3.
-    """
+    """Task, weights and limits of the criteria."""
 
     task: Task
     weights: Weights
-    avoided: FloatArray
-    limits: FloatArray
+    avoided: (
+        FloatArray  # (n, 5) γ, link (0: the platform), place on it in [0, 1], X_o, Y_o (Eq. 12)
+    )
+    limits: FloatArray  # (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3
 
     def measure(self, angles: FloatArray) -> FloatArray:
         """Return criteria and branch of postures θ1, θ2 (2, individuals) [deg].
@@ -102,135 +76,19 @@ class Model(NamedTuple):
             Two arrays (2, individuals), by branch.
         """
         angles = np.ascontiguousarray(angles, dtype=np.float64)
-        costs, theta_3 = np.empty(angles.shape), np.empty(angles.shape)
-        measure_branches(angles, self, costs, theta_3)
-        return costs, theta_3
+        branches, _ = measure_branches(angles, angles.shape[1], self)
+        return branches[:, COST], branches[:, THETA_3]
 
     def posture(self, theta_1: float, theta_2: float) -> tuple[int, FloatArray, FloatArray]:
         """Return the better branch, and all numbers of it and of the other one, (RESULTS,) each.
 
         The branch is −1 where neither is feasible.
         """
-        own, other = np.empty(RESULTS), np.empty(RESULTS)
-        return int(measure_both(float(theta_1), float(theta_2), self, own, other)), own, other
-
-
-class LinkDirections(NamedTuple):
-    """Directions of the links at θ1 and θ2.
-
-    Attributes:
-        theta_1: θ1 [deg].
-        theta_2: θ2, relative to the first link [deg].
-        s1: Sine of θ1.
-        c1: Cosine of θ1.
-        s12: Sine of θ1 + θ2.
-        c12: Cosine of θ1 + θ2.
-        s123: Sine of θ1 + θ2 + θ3; beyond ±1 where the target is out of reach.
-        c123: Cosine of it, ≥ 0; NaN where the target is out of reach.
-        absolute: θ1 + θ2 + θ3 [deg]; NaN where the target is out of reach.
-    """
-
-    theta_1: float
-    theta_2: float
-    s1: float
-    c1: float
-    s12: float
-    c12: float
-    s123: float
-    c123: float
-    absolute: float
-
-
-@kernel
-def _directions(theta_1: float, theta_2: float, task: Task) -> LinkDirections:
-    """Return the directions of the links at θ1 and θ2 [deg], the third one to +x."""
-    s1, c1 = sincos(DEGREE * theta_1)
-    s12, c12 = sincos(DEGREE * (theta_1 + theta_2))
-    s123 = (task.y_e - task.l1 * s1 - task.l2 * s12) / task.l3
-    c123, absolute = np.nan, np.nan
-    if abs(s123) <= 1.0:
-        c123 = np.sqrt((1.0 - s123) * (1.0 + s123))
-        absolute = asin(s123) / DEGREE
-    return LinkDirections(theta_1, theta_2, s1, c1, s12, c12, s123, c123, absolute)
-
-
-@kernel
-def measure_posture(directions: LinkDirections, branch: int, model: Model, out: FloatArray) -> bool:
-    """Measure one posture; return whether it is feasible: reachable, and within the limits.
-
-    Args:
-        directions: Of its links.
-        branch: Of θ3: 0: the third link points to +x, 1: to −x.
-        model: Task, weights and limits.
-        out: (RESULTS,) written; θ3, X_p and torques out of reach are NaN.
-    """
-    task, weights, limits = model.task, model.weights, model.limits
-    theta_1, theta_2, s1, c1, s12, c12, s123, c123, absolute = directions
-    cap = weights.greatest
-    if not abs(s123) <= 1.0:
-        for k in range(CRITERIA):
-            out[k] = cap
-        for k in range(CRITERIA, RESULTS):
-            out[k] = np.nan
-        return False
-    # θ3, links, platform
-    if branch == 1:
-        c123, absolute = -c123, 180.0 - absolute
-    theta_3 = absolute - theta_1 - theta_2
-    theta_3 -= 360.0 * np.floor((theta_3 + 180.0) / 360.0)
-    x1, x2, x3 = task.l1 * c1, task.l2 * c12, task.l3 * c123
-    y1, y2, y3 = task.l1 * s1, task.l2 * s12, task.l3 * s123
-    platform = task.x_e - (x1 + x2 + x3)  # Eq. 17
-    # the Jacobian (Eq. 19), row by row, and the torques
-    jx1, jx2, jx3 = -(y1 + y2 + y3), -(y2 + y3), -y3
-    jy1, jy2, jy3 = x1 + x2 + x3, x2 + x3, x3
-    out[TORQUE] = jx1 * task.f_x + jy1 * task.f_y  # Eq. 8
-    out[TORQUE + 1] = jx2 * task.f_x + jy2 * task.f_y
-    out[TORQUE + 2] = jx3 * task.f_x + jy3 * task.f_y
-    out[THETA_3], out[PLATFORM] = theta_3, platform
-    # torques and limits
-    norm, largest, within = 0.0, 0.0, True
-    alphas = (weights.alpha_1, weights.alpha_2, weights.alpha_3)
-    for k in range(3):
-        torque = out[TORQUE + k]
-        norm += torque * torque  # Eq. 10
-        largest = max(largest, abs(alphas[k] * torque))  # Eq. 11
-        angle = theta_1 if k == 0 else (theta_2 if k == 1 else theta_3)
-        within = within and limits[k, 0] <= angle <= limits[k, 1]
-        within = within and limits[3 + k, 0] <= torque <= limits[3 + k, 1]
-    # obstacles, manipulability, cost
-    xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
-    yy = jy1 * jy1 + jy2 * jy2 + jy3 * jy3
-    xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
-    obstacles = _obstacle_costs(platform, (x1, x2, x3), (y1, y2, y3), model.avoided, cap)
-    out[TORQUE_NORM], out[TORQUE_MAX] = min(norm, cap), min(largest, cap)
-    singular = _inverse(xx * yy - xy * xy, cap)  # Eq. 13
-    out[OBSTACLE], out[MANIPULABILITY] = min(obstacles, cap), singular
-    total = obstacles + weights.epsilon * norm + weights.lam * largest  # Eq. 14
-    total += weights.delta * singular
-    out[COST] = min(total, cap) if within else cap
-    return within
-
-
-@kernel
-def _obstacle_costs(
-    platform: float,
-    xs: tuple[float, float, float],
-    ys: tuple[float, float, float],
-    avoided: FloatArray,
-    cap: float,
-) -> float:
-    """Return Σ γ E_obs (Eq. 12) of a platform's place and the links' extents along x and y."""
-    total = 0.0
-    for n in range(len(avoided)):
-        link, place = avoided[n, 1], avoided[n, 2]
-        x = platform + (place if link == 1.0 else 1.0) * xs[0] * (link >= 1.0)
-        y = (place if link == 1.0 else 1.0) * ys[0] * (link >= 1.0)
-        x += (place if link == 2.0 else 1.0) * xs[1] * (link >= 2.0) + place * xs[2] * (link >= 3.0)
-        y += (place if link == 2.0 else 1.0) * ys[1] * (link >= 2.0) + place * ys[2] * (link >= 3.0)
-        dx, dy = x - avoided[n, 3], y - avoided[n, 4]
-        total += avoided[n, 0] * _inverse(dx * dx + dy * dy, cap)
-    return total
+        angles = np.array([[float(theta_1)], [float(theta_2)]])
+        (one, two), within = measure_branches(angles, 1, self)
+        if within[1, 0] and not (within[0, 0] and one[COST, 0] <= two[COST, 0]):
+            return 1, two[:, 0], one[:, 0]
+        return (0 if within[0, 0] else -1), one[:, 0], two[:, 0]
 
 
 @kernel
@@ -240,36 +98,33 @@ def _inverse(value: float, cap: float) -> float:
 
 
 @kernel
-def measure_both(
-    theta_1: float, theta_2: float, model: Model, out: FloatArray, other: FloatArray
-) -> int:
-    """Measure both values of θ3: the better one into `out`, the other one into `other`.
+def measure_branches(angles: FloatArray, count: int, model: Model) -> tuple[FloatArray, BoolArray]:
+    """Measure both values of θ3 of every posture.
+
+    Args:
+        angles: (2, ≥ count) θ1, θ2 [deg].
+        count: Individuals.
+        model: Task, weights and limits.
 
     Returns:
-        The better branch, −1 where neither is feasible.
+        (2, RESULTS, count) by branch: the criteria, torques, θ3 [deg] and X_p, which are NaN out of
+        reach; and (2, count) whether each is feasible: reachable, and within the limits.
     """
-    directions = _directions(theta_1, theta_2, model.task)
-    one = measure_posture(directions, 0, model, out)
-    two = measure_posture(directions, 1, model, other)
-    branch = 0 if one else -1
-    if two and not (one and out[COST] <= other[COST]):
-        branch = 1
-        for k in range(RESULTS):
-            out[k], other[k] = other[k], out[k]
-    return branch
-
-
-@kernel
-def measure_branches(
-    angles: FloatArray, model: Model, costs: FloatArray, theta_3: FloatArray
-) -> None:
-    """Measure both values of θ3 of every posture: `costs` and `theta_3` (2, individuals) [deg]."""
-    out = np.empty(RESULTS)
-    for k in range(angles.shape[1]):
-        directions = _directions(angles[0, k], angles[1, k], model.task)
-        for branch in range(2):
-            measure_posture(directions, branch, model, out)
-            costs[branch, k], theta_3[branch, k] = out[COST], out[THETA_3]
+    task, links = model.task, np.empty((7, count))
+    for k in range(count):
+        s1, c1 = sincos(DEGREE * angles[0, k])
+        s12, c12 = sincos(DEGREE * (angles[0, k] + angles[1, k]))
+        s123 = (task.y_e - task.l1 * s1 - task.l2 * s12) / task.l3
+        c123, absolute = np.nan, np.nan
+        if abs(s123) <= 1.0:
+            c123 = np.sqrt((1.0 - s123) * (1.0 + s123))
+            absolute = asin(s123) / DEGREE
+        links[0, k], links[1, k], links[2, k], links[3, k] = s1, c1, s12, c12
+        links[4, k], links[5, k], links[6, k] = s123, c123, absolute
+    branches, within = np.empty((2, RESULTS, count)), np.empty((2, count), dtype=np.bool_)
+    for branch in range(2):
+        _measure_branch(angles, count, links, branch, model, branches[branch], within[branch])
+    return branches, within
 
 
 @kernel
@@ -282,14 +137,7 @@ def measure_postures(angles: FloatArray, count: int, model: Model, out: FloatArr
         model: Task, weights and limits.
         out: (CRITERIA + 1, ≥ count) written: the criteria, and the branch (−1: infeasible).
     """
-    links, branches = np.empty((7, count)), np.empty((2, CRITERIA, count))
-    within = np.empty((2, count), dtype=np.bool_)
-    for k in range(count):
-        of = _directions(angles[0, k], angles[1, k], model.task)
-        links[0, k], links[1, k], links[2, k], links[3, k] = of.s1, of.c1, of.s12, of.c12
-        links[4, k], links[5, k], links[6, k] = of.s123, of.c123, of.absolute
-    for branch in range(2):
-        _measure_lanes(angles, count, links, branch, model, branches[branch], within[branch])
+    branches, within = measure_branches(angles, count, model)
     # the better branch of each
     for k in range(count):
         one, two = within[0, k], within[1, k]
@@ -300,7 +148,7 @@ def measure_postures(angles: FloatArray, count: int, model: Model, out: FloatArr
 
 
 @kernel
-def _measure_lanes(
+def _measure_branch(
     angles: FloatArray,
     count: int,
     links: FloatArray,
@@ -309,9 +157,13 @@ def _measure_lanes(
     out: FloatArray,
     within: BoolArray,
 ) -> None:
-    """Measure one branch of a population as `measure_posture` does, bit for bit, lane by lane."""
+    """Measure one value of θ3 of every posture, without a branch in the loop.
+
+    `links` (7, count) are sine and cosine of θ1, of θ1 + θ2 and of θ1 + θ2 + θ3 (beyond ±1 and NaN
+    out of reach), and that angle [deg], the third link to +x; it points to −x in branch 1.
+    """
     task, weights, _, limits = model
-    l1, l2, l3, _, _, f_x, f_y = task
+    l1, l2, l3, x_e, _, f_x, f_y = task
     epsilon, lam, delta, a1, a2, a3, cap = weights
     sign = -1.0 if branch == 1 else 1.0
     s1, c1, s12, c12, s123 = links[0], links[1], links[2], links[3], links[4]
@@ -351,6 +203,10 @@ def _measure_lanes(
         out[MANIPULABILITY, k] = singular if reached else cap
         out[OBSTACLE, k] = obstacle if reached & (obstacle < cap) else cap
         out[COST, k] = total if free & (total < cap) else cap
+        out[TORQUE, k] = t1 if reached else np.nan
+        out[TORQUE + 1, k] = t2 if reached else np.nan
+        out[TORQUE + 2, k] = t3 if reached else np.nan
+        out[THETA_3, k], out[PLATFORM, k] = theta_3, x_e - (x1 + x2 + x3)  # Eq. 17
         within[k] = free
 
 

@@ -43,17 +43,8 @@ TERMS = (
 DISTANCE, ANGLE, AXIAL, HEADING, UPRIGHT, PARALLEL, MARGIN, COLLISION, FREE_SPACE = range(
     len(TERMS)
 )
-COLUMNS = (
-    "goal_distance",
-    "goal_angle_rad",
-    "axial_approach_rad",
-    "heading_rad",
-    "upright_rad",
-    "keep_parallel_rad",
-    "limit_margin",
-    "collision",
-    "free_space",
-)
+IN_RADIANS = (ANGLE, AXIAL, HEADING, UPRIGHT, PARALLEL)
+COLUMNS = tuple(f"{name}_rad" if k in IN_RADIANS else name for k, name in enumerate(TERMS))
 """Names of the terms in records, with their units; lengths are in the scene's."""
 
 POINT, ROD, ROUND, EDGED = range(4)  # surfaces that a distance is measured to, see `Aim`
@@ -200,30 +191,21 @@ class PostureCost(Component):
 
 
 class Aim(NamedTuple):
-    """The goal of a phase, as `rate_poses` takes it.
+    """The goal of a phase, as `rate_poses` takes it."""
 
-    Attributes:
-        rotation: (9,) wanted rotation of the controlled frame, row by row; or that of an object.
-        point: (3,) wanted place; of the surface of an object the object's middle [length unit].
-        axis: (3,) axis of the object.
-        surface: The distance is measured to POINT, to a ROD (also a sphere), to a ROUND (a
-            cylinder) or to an EDGED body (a box).
-        half_length: Half the length of the object's axis [length unit].
-        radius: Of rods and cylinders [length unit].
-        half_edges: (3,) of a box [length unit].
-        up: (3,) direction up.
-        local_up: (3,) the up axis of the controlled frame.
-    """
-
+    # (9,) wanted rotation of the controlled frame, row by row; or that of an object
     rotation: FloatArray
+    # (3,) wanted place; of the surface of an object the object's middle [length unit]
     point: FloatArray
-    axis: FloatArray
+    axis: FloatArray  # (3,) axis of the object
+    # the distance is measured to POINT, to a ROD (also a sphere), to a ROUND (a cylinder) or to an
+    # EDGED body (a box)
     surface: int
-    half_length: float
-    radius: float
-    half_edges: FloatArray
-    up: FloatArray
-    local_up: FloatArray
+    half_length: float  # half the length of the object's axis [length unit]
+    radius: float  # of rods and cylinders [length unit]
+    half_edges: FloatArray  # (3,) of a box [length unit]
+    up: FloatArray  # (3,) direction up
+    local_up: FloatArray  # (3,) the up axis of the controlled frame
 
 
 @kernel

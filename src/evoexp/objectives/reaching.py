@@ -5,7 +5,6 @@ from typing import ClassVar
 import numpy as np
 
 from evoexp.numeric.compilation import inlined, kernel
-from evoexp.numeric.elementary import sincos
 from evoexp.numeric.vectors import LANES, Vector, load, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
@@ -107,52 +106,3 @@ def _weigh(
     worth = select(tip_y < box[2], outside, worth)
     worth = select(box[3] < tip_y, outside, worth)
     return worth, off, turned
-
-
-@kernel
-def measure_reach_from(
-    start: FloatArray,
-    ends: FloatArray,
-    count: int,
-    arm: PlanarArm,
-    target: FloatArray,
-    box: FloatArray,
-    weights: tuple[float, float],
-    cost: FloatArray,
-    error: FloatArray,
-    displacement: FloatArray,
-) -> None:
-    """Measure a whole table of individuals from one start, bit for bit as `measure_reach` does.
-
-    Nothing is gathered, and of the links only the last one's end is written.
-
-    Args:
-        start: (N,) [rad].
-        ends: (N, ≥ count, filled up to whole vectors).
-        count: Number of individuals.
-        arm: See `planar_ends.block_ends`.
-        target: As of `measure_reach`, and so are `box` and `weights`.
-        box: See there.
-        weights: See there.
-        cost: (≥ count, filled up to whole vectors) written, and so are `error` and `displacement`;
-            behind `count` anything.
-        error: See there.
-        displacement: See there.
-    """
-    lengths, base_x, base_y, base_angle = arm
-    flat, width = ends.reshape(-1), U(ends.shape[1])
-    for first in range(0, count, LANES):
-        at = U(first)
-        angle, squares = spread(base_angle), spread(0.0)
-        tip_x, tip_y = spread(base_x), spread(base_y)
-        for k in range(len(start)):
-            own = load(flat, U(k) * width + at)
-            turn = start[k] - own
-            angle = angle + own
-            s, c = sincos(angle)
-            tip_x, tip_y = tip_x + lengths[k] * c, tip_y + lengths[k] * s
-            squares = squares + turn * turn
-        worth, off, turned = _weigh(tip_x, tip_y, squares, target, box, weights)
-        store(cost, at, worth)
-        store(error, at, off)
-        store(displacement, at, turned)

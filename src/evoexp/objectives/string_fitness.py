@@ -13,21 +13,12 @@ from evoexp.validation import Component, NonNegative
 
 
 class StringTerms(NamedTuple):
-    """Terms of a population of strings.
+    """Terms of a population of strings."""
 
-    Attributes:
-        lengths: (arms, individuals) C1, C2, … [deg]: path lengths in configuration space (Eqs. 2,
-            3).
-        unevenness: (arms, individuals) C3, C4, … [deg]: sum of |distance − mean distance| (Eqs. 4,
-            5).
-        collisions: (individuals,) C5: colliding instants i = 1 … N (Eq. 6).
-        cost: (individuals,) what Eq. 7 subtracts from C_max.
-    """
-
-    lengths: FloatArray
-    unevenness: FloatArray
-    collisions: FloatArray
-    cost: FloatArray
+    lengths: FloatArray  # (arms, individuals) C1, C2, … in configuration space (Eqs. 2, 3) [deg]
+    unevenness: FloatArray  # (arms, individuals) C3, C4, …: Σ |distance − mean| (Eqs. 4, 5) [deg]
+    collisions: FloatArray  # (individuals,) C5: colliding instants i = 1 … N (Eq. 6)
+    cost: FloatArray  # (individuals,) what Eq. 7 subtracts from C_max
 
 
 class StringFitness(Component):
@@ -58,12 +49,6 @@ class StringFitness(Component):
         """Return the paper's fitness F of a cost, any shape."""
         return self.fitness_offset - cost
 
-    def roulette_weights(self, costs: FloatArray) -> FloatArray:
-        """Return max(F, 0) of costs (individuals,)."""
-        weights = np.empty(len(costs))
-        fill_wheel(self.fitness_offset, costs, weights)
-        return weights
-
 
 @kernel
 def weigh(
@@ -93,7 +78,7 @@ def weigh(
 
 @kernel
 def fill_wheel(fitness_offset: float, costs: FloatArray, weights: FloatArray) -> None:
-    """Run the kernel of `roulette_weights`."""
+    """Write the paper's roulette weights max(F, 0) of costs (individuals,)."""
     for k in range(len(costs)):
         fitness = fitness_offset - costs[k]
         weights[k] = fitness if fitness > 0.0 else 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.paths.grids import NodeArray, StepArray
+from evoexp.paths.grids import Moves, NodeArray, StepArray
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 MOST_SLOTS = 256  # of a node
@@ -27,31 +27,24 @@ class Choices(NamedTuple):
     """The choices of walks to some targets at every node.
 
     There are no rows where there are no such tables.
-
-    Attributes:
-        entries: (targets, nodes) uint32: the sum of the weights in the lowest `TOTAL_BITS`, the
-            place of the first slot above them.
-        slots: (any,) the index of the node that a choice leads to, less that of the node where the
-            walk is.
     """
 
+    # (targets, nodes) uint32: the sum of the weights in the lowest `TOTAL_BITS`, the place of the
+    # first slot above them
     entries: NDArray[np.uint32]
+    # (any,) the index of the node that a choice leads to, less that of the node where the walk is
     slots: NDArray[np.int16]
 
 
 class _Patterns(NamedTuple):
-    """Weights of the moves of one node, each combination once.
+    """Weights of the moves of one node, each combination once."""
 
-    Attributes:
-        words: (patterns + 1, words) a byte for the weight of each move, the lowest first; the last
-            row is scratch.
-        first: (patterns + 1,) place of the first slot of each; behind the last one, of the next.
-        known: (a power of two,) where each is found by its hash; −1: nowhere.
-    """
-
+    # (patterns + 1, words) a byte for the weight of each move, the lowest first; the last row is
+    # scratch
     words: NDArray[np.uint64]
+    # (patterns + 1,) place of the first slot of each; behind the last one, of the next
     first: IntArray
-    known: IntArray
+    known: IntArray  # (a power of two,) where each is found by its hash; −1: nowhere
 
 
 def choices_of(
@@ -64,7 +57,6 @@ def choices_of(
 
     Args:
         neighbours: See `grids.Moves`, as for `potentials`.
-        potentials: See there.
         fronts: (targets, nodes) steps to every node from each target.
         most_patterns: Patterns of weights for which there is memory.
     """
@@ -94,6 +86,16 @@ def choices_of(
     return Choices(entries, np.repeat(np.tile([*shifts, 0], count), counts).astype(np.int16))
 
 
+def choice_table(moves: Moves) -> Choices:
+    """Return the choices of walks to one target, one row of them.
+
+    There is no row if the weights are no whole numbers or the table would be large; such walks
+    weigh the moves of every node anew, see `grid_walks.walk`.
+    """
+    fronts = moves.steps[None, :]
+    return choices_of(moves.neighbours, moves.potentials, fronts, len(moves.neighbours))
+
+
 @kernel
 def _find_patterns(
     neighbours: NodeArray,
@@ -109,8 +111,6 @@ def _find_patterns(
     Args:
         neighbours: See `choices_of`, as for `potentials` and `fronts`.
         has_moves: (nodes,) whether a node has a neighbour.
-        potentials: See there.
-        fronts: See there.
         potential: (nodes,) scratch.
         patterns: Written.
         entries: (targets, nodes) written.

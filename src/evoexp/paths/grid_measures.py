@@ -45,16 +45,12 @@ def measure_path(path: NodeArray, kinds: NodeArray, unsafeness: FloatArray) -> t
 
 
 class Tolls(NamedTuple):
-    """Contributions of moves and nodes to a path, in whole numbers: sums are exact in any order.
+    """Contributions of moves and nodes to a path, in whole numbers: sums are exact in any order."""
 
-    Attributes:
-        of_move: (greatest difference of neighbours' indices + 1,) by that difference: diagonal
-            moves are counted in the lower half of the bits, those through space in the upper half.
-        of_node: (nodes,) unsafeness; (0,) where it is no whole number.
-    """
-
+    # (greatest difference of neighbours' indices + 1,) by that difference: diagonal moves are
+    # counted in the lower half of the bits, those through space in the upper half
     of_move: IntArray
-    of_node: IntArray
+    of_node: IntArray  # (nodes,) unsafeness; (0,) where it is no whole number
 
     @classmethod
     def of(cls, kinds: NodeArray, unsafeness: FloatArray) -> "Tolls":

@@ -22,24 +22,19 @@ StepArray = NDArray[np.integer[Any]]  # numbers of steps
 
 
 class Grid(NamedTuple):
-    """A grid, and the moves that it permits.
+    """A grid, and the moves that it permits."""
 
-    Attributes:
-        free: (nodes along x + 2, along y + 2[, along z + 2]) whether a path may pass a node; never
-            on the ring.
-        coordinates: (nodes, dimensions) of every node, those of the ring included.
-        neighbours: (nodes, moves) index of the node that each move leads to, −1 where it is not
-            permitted.
-        changes: (moves,) how many coordinates each move changes; ascending, so that the first 2m
-            moves are lateral.
-        kinds: (greatest difference of neighbours' indices + 1,) how many coordinates a move
-            changes, by that difference.
-    """
-
+    # (nodes along x + 2, along y + 2[, along z + 2]) whether a path may pass a node; never on the
+    # ring
     free: BoolArray
-    coordinates: NodeArray
+    coordinates: NodeArray  # (nodes, dimensions) of every node, those of the ring included
+    # (nodes, moves) index of the node that each move leads to, −1 where it is not permitted
     neighbours: NodeArray
+    # (moves,) how many coordinates each move changes; ascending, so that the first 2m moves are
+    # lateral
     changes: NodeArray
+    # (greatest difference of neighbours' indices + 1,) how many coordinates a move changes, by that
+    # difference
     kinds: NodeArray
 
     @property
@@ -61,18 +56,12 @@ class Grid(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """The moves of random walks to one target, and their weights.
+    """The moves of random walks to one target, and their weights."""
 
-    Attributes:
-        neighbours: (nodes, moves), see `Grid`.
-        potentials: (≥ greatest number of steps + 1,) potential after so many steps of the front
-            from the target.
-        steps: (nodes,) of that front, see `front`.
-    """
-
-    neighbours: NodeArray
+    neighbours: NodeArray  # (nodes, moves), see `Grid`
+    # (≥ greatest number of steps + 1,) potential after so many steps of the front from the target
     potentials: FloatArray
-    steps: StepArray
+    steps: StepArray  # (nodes,) of that front, see `front`
 
 
 def grid(blocked: BoolArray) -> Grid:

@@ -4,14 +4,14 @@ import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.vectors import LANES, load, magnitude, root, spread, store
-from evoexp.paths.layout import check_arm_slices, check_via_points
 from evoexp.records import FloatArray, IntArray
 
 VECTOR, ONE = np.uint64(LANES), np.uint64(1)
 
 
-def path_lengths(
-    via_points: FloatArray, arm_slices: np.ndarray, lengths: FloatArray, unevenness: FloatArray
+@kernel
+def measure_paths(
+    via_points: FloatArray, arm_slices: IntArray, lengths: FloatArray, unevenness: FloatArray
 ) -> None:
     """Write length and unevenness of every arm's path.
 
@@ -20,26 +20,7 @@ def path_lengths(
         arm_slices: (arms, 2) rows of each arm.
         lengths: (arms, lanes), written: the sum of the distances d_i of neighbours (Eqs. 2, 3).
         unevenness: (arms, lanes), written: the sum of |d_i − their mean| (Eqs. 4, 5).
-
-    Raises:
-        ValueError: If the via-points have not the layout that kernels need, or an output has
-            another shape.
     """
-    check_via_points(via_points)
-    check_arm_slices(arm_slices, len(via_points))
-    expected = (len(arm_slices), via_points.shape[2])
-    if lengths.shape != expected or unevenness.shape != expected:
-        raise ValueError(
-            f"outputs must have shape {expected}, were {lengths.shape} and {unevenness.shape}"
-        )
-    measure_paths(via_points, arm_slices, lengths, unevenness)
-
-
-@kernel
-def measure_paths(
-    via_points: FloatArray, arm_slices: IntArray, lengths: FloatArray, unevenness: FloatArray
-) -> None:
-    """Run the kernel of `path_lengths`."""
     num, pitch = np.uint64(via_points.shape[1] - 1), np.uint64(via_points.shape[2])
     steps = np.empty(num * VECTOR)
     _measure(

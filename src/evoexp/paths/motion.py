@@ -12,14 +12,10 @@ class Motion(NamedTuple):
     """Configurations passed at instants 0, 1, …, along straight lines or cubics between them.
 
     Time t is counted in instants: segment i covers [i, i + 1], on which u = t − i runs from 0 to 1.
-
-    Attributes:
-        q: (instants, nq) [rad], lengths for prismatic joints.
-        coefficients: (segments, 4, nq) of q(u) = c0 + c1 u + c2 u² + c3 u³ on every segment; None:
-            straight lines.
     """
 
-    q: FloatArray
+    q: FloatArray  # (instants, nq) [rad], lengths for prismatic joints
+    # (segments, 4, nq) of q(u) = c0 + c1 u + c2 u² + c3 u³ on every segment; None: straight lines
     coefficients: FloatArray | None = None
 
     @property

@@ -43,7 +43,6 @@ from evoexp.numeric.vectors import (
     upper,
 )
 from evoexp.paths.arc_length import integrate_speed
-from evoexp.paths.layout import check_arm_slices, check_via_points, padded
 from evoexp.paths.spline import fit_splines, write_rows
 from evoexp.paths.workspace import (
     U0,
@@ -53,7 +52,6 @@ from evoexp.paths.workspace import (
     VECTOR,
     Layout,
     Offsets,
-    Redistribution,
     layout,
 )
 from evoexp.records import FloatArray, IntArray
@@ -219,7 +217,23 @@ def redistribute_arms(
     w: FloatArray,
     integers: Offsets,
 ) -> None:
-    """See `redistribute`; num_lanes is a multiple of eight here."""
+    """Move the via-points of every arm's path to equal arc length along its spline, in place.
+
+    The spline runs over the index 0..N (Rana & Zalzala 1995, Sect. 3.3). The end points keep their
+    bits; a path without length keeps all of them. Lengths come from `samples_per_segment` speeds
+    per segment by a rule of fourth order: 8 are about as accurate as 16 chords, 16 about five times
+    better.
+
+    Args:
+        via_points: (nq, N + 1, lanes) paths, N ≥ 2, any unit common to the joints of an arm; lanes
+            a multiple of eight.
+        arm_slices: (arms, 2) first and last-plus-one joint of each arm.
+        num_lanes: Lanes that are treated, a multiple of eight; those behind are left alone.
+        samples_per_segment: A power of two from 8 on.
+        pivots: (N + 1,) of `prepare_redistribution`.
+        w: Scratch, not to be shared between threads.
+        integers: Likewise.
+    """
     N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples_per_segment)
     pitch = np.uint64(via_points.shape[2])
     flat, pivots, w, integers = borrowed((via_points.reshape(-1), pivots, w, integers))
@@ -236,40 +250,3 @@ def redistribute_arms(
             enter_segments(w, N, at, origin, total, integers)
             find_samples(w, N, S, at, origin, total, integers)
             move_points(flat, first, pitch, joints, N, S, w, at, total, integers)
-
-
-def redistribute(
-    via_points: FloatArray,
-    arm_slices: IntArray,
-    num_lanes: int,
-    workspace: Redistribution,
-) -> None:
-    """Move the via-points of every arm's path to equal arc length along its spline, in place.
-
-    The spline runs over the index 0..N (Rana & Zalzala 1995, Sect. 3.3). The end points keep their
-    bits; a path without length keeps all of them. Lengths come from `samples_per_segment` speeds
-    per segment by a rule of fourth order: 8 are about as accurate as 16 chords, 16 about five times
-    better.
-
-    Args:
-        via_points: Paths, any unit common to the joints of an arm.  # (nq, N + 1, lanes)
-        arm_slices: First and last-plus-one joint of each arm.  # (arms, 2) int64
-        num_lanes: Lanes that matter; those up to the next multiple of eight are treated too.
-        workspace: Of `prepare_redistribution`, for this N; not to be shared between threads.
-
-    Raises:
-        ValueError: Wrong shape, type or memory layout; nothing has been written then.
-    """
-    check_via_points(via_points)
-    nq, num_points, lanes = via_points.shape
-    check_arm_slices(arm_slices, nq, workspace.max_joints)
-    if num_points != workspace.num_via_points + 1:
-        raise ValueError(
-            f"via_points: the workspace is for {workspace.num_via_points + 1} points, was "
-            f"{num_points}"
-        )
-    if num_points > 2:
-        redistribute_arms(
-            via_points, arm_slices, padded(num_lanes, lanes), workspace.samples_per_segment,
-            workspace.pivots, workspace.floats, workspace.integers,
-        )  # fmt: skip

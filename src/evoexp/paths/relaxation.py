@@ -4,13 +4,21 @@ import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.vectors import LANES, load, store
-from evoexp.paths.layout import check_via_points, padded
 from evoexp.records import FloatArray
 
 
 @kernel
 def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
-    """Run the kernel of `relax`; num_lanes is a multiple of eight here."""
+    """Move every via-point by `delta` toward the middle of its neighbours, in place and in order.
+
+    This is one sweep of the loop of Rana & Zalzala 1995, Eqs. 8 and 9, as it is written: point i
+    sees point i − 1 as already moved. The ends stay.
+
+    Args:
+        via_points: (nq, N + 1, lanes) paths; lanes a multiple of eight.
+        delta: Part of the way, in (0, 1].
+        num_lanes: Lanes that are treated, a multiple of eight.
+    """
     flat, pitch = borrowed(via_points.reshape(-1)), np.uint64(via_points.shape[2])
     num_points = np.uint64(via_points.shape[1])
     for joint in range(via_points.shape[0]):
@@ -24,25 +32,3 @@ def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
                 before = a + delta * (middle - a)  # (Eqs 8, 9)
                 store(flat, place, before)
                 a = after
-
-
-def relax(via_points: FloatArray, delta: float, num_lanes: int) -> None:
-    """Move every via-point by `delta` toward the middle of its neighbours, in place and in order.
-
-    This is one sweep of the loop of Rana & Zalzala 1995, Eqs. 8 and 9, as it is written: point i
-    sees point i − 1 as already moved. The ends stay. delta = 0 changes nothing.
-
-    Args:
-        via_points: Paths.  # (nq, N + 1, lanes)
-        delta: Part of the way, in [0, 1].
-        num_lanes: Lanes that matter; those up to the next multiple of eight are treated too.
-
-    Raises:
-        ValueError: Wrong shape, type or memory layout, or delta out of range.
-    """
-    check_via_points(via_points)
-    if not 0.0 <= delta <= 1.0:
-        raise ValueError(f"delta: must be in [0, 1], was {delta}")
-    lanes = padded(num_lanes, via_points.shape[2])
-    if delta > 0.0:
-        relax_points(via_points, float(delta), lanes)

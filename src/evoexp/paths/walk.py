@@ -15,13 +15,14 @@ def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
     return int(sum((num_via_points - 1) * (stop - first - 1) for first, stop in arm_slices))
 
 
-def walk(
+@kernel
+def walk_strings(
     via_points: FloatArray,
-    lanes: np.ndarray,
+    lanes: IntArray,
     uniforms: FloatArray,
     start: FloatArray,
     goal: FloatArray,
-    arm_slices: np.ndarray,
+    arm_slices: IntArray,
     step: float,
     max_turn: float,
 ) -> None:
@@ -41,48 +42,7 @@ def walk(
         arm_slices: (arms, 2) rows of each arm.
         step: Step length in units of D / N.
         max_turn: Turns are uniform in ± this [rad].
-
-    Raises:
-        ValueError: If `uniforms` has another shape, or a lane lies outside.
     """
-    if not walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):
-        expected = (len(lanes), num_uniforms(arm_slices, via_points.shape[1] - 1))
-        limit = via_points.shape[2]
-        raise ValueError(
-            f"uniforms must have shape {expected}, was {uniforms.shape}; lanes must lie within "
-            f"0..{limit - 1}; start, goal and arm_slices must be of {len(via_points)} joints"
-        )
-
-
-@kernel
-def walk_strings(
-    via_points: FloatArray,
-    lanes: IntArray,
-    uniforms: FloatArray,
-    start: FloatArray,
-    goal: FloatArray,
-    arm_slices: IntArray,
-    step: float,
-    max_turn: float,
-) -> bool:
-    """Run the kernel of `walk`.
-
-    Returns:
-        False, with nothing written, if the arrays do not fit.
-    """
-    num = via_points.shape[1] - 1
-    needed = 0
-    if len(start) != len(via_points) or len(goal) != len(via_points):
-        return False
-    for arm in range(len(arm_slices)):
-        if not 0 <= arm_slices[arm, 0] < arm_slices[arm, 1] <= len(start):
-            return False
-        needed += (num - 1) * (arm_slices[arm, 1] - arm_slices[arm, 0] - 1)
-    if uniforms.shape[0] != len(lanes) or uniforms.shape[1] != needed:
-        return False
-    for s in range(len(lanes)):
-        if not 0 <= lanes[s] < via_points.shape[2]:
-            return False
     memory = np.empty((3, len(start) * LANES))
     for first in range(0, len(lanes), LANES):
         count = min(LANES, len(lanes) - first)
@@ -99,7 +59,6 @@ def walk_strings(
             memory[1],
             memory[2],
         )
-    return True
 
 
 @kernel

@@ -30,70 +30,42 @@ from evoexp.records import FloatArray
 VECTOR = np.uint64(LANES)  # places of a vector
 U0, U1, U2, U3, U4, U5, U6, U7 = (np.uint64(u) for u in range(8))
 EIGHT = VECTOR * VECTOR  # places of eight vectors
-MAX_SAMPLES = 1024
 
 Offsets = NDArray[np.uint64]
 EndCondition = Literal["natural", "clamped"]
 
 
 class Redistribution(NamedTuple):
-    """Settings, constant factor and scratch of `redistribute`, for one thread.
+    """Settings, constant factor and scratch of `redistribute_arms`, for one thread."""
 
-    Attributes:
-        num_via_points: N; a path has the N + 1 points 0..N.
-        max_joints: The most joints that one arm may have.
-        end_condition: `natural` (no curvature at the ends) or `clamped` (no slope there).
-        samples_per_segment: Speeds evaluated per segment.
-        pivots: Reciprocal pivots of the tridiagonal system.  # (N + 1,)
-        floats: Scratch, 64-byte aligned.
-        integers: Scratch.
-    """
-
-    num_via_points: int
-    max_joints: int
+    num_via_points: int  # N; a path has the N + 1 points 0..N
+    max_joints: int  # the most joints that one arm may have
+    # `natural` (no curvature at the ends) or `clamped` (no slope there)
     end_condition: EndCondition
-    samples_per_segment: int
-    pivots: FloatArray
-    floats: FloatArray
-    integers: Offsets
+    samples_per_segment: int  # speeds evaluated per segment
+    pivots: FloatArray  # reciprocal pivots of the tridiagonal system.  # (N + 1,)
+    floats: FloatArray  # scratch, 64-byte aligned
+    integers: Offsets  # scratch
 
 
 class Layout(NamedTuple):
-    """Places in the scratch; see the module's first lines.
+    """Places in the scratch; see the module's first lines."""
 
-    Attributes:
-        joint: Distance of two joints, in `knots` of vectors and in `rows` of numbers.
-        row: Distance of two lanes in `rows`.
-        sample: Distance of two lanes in `lengths`.
-        begins: `knots` begin at 0.
-        targets: In all, one per point.
-        entered: As `targets`.
-        found: As `targets`.
-        speeds: As `targets`, one per sample.
-        rows: Of lane 0.
-        lengths: Of lane 0.
-        size: Of all.
-        knots: In the other array.
-        samples: In the other array.
-        instants: In the other array.
-        num_places: Size of the other array.
-    """
-
-    joint: np.uint64
-    row: np.uint64
-    sample: np.uint64
-    begins: np.uint64
-    targets: np.uint64
-    entered: np.uint64
-    found: np.uint64
-    speeds: np.uint64
-    rows: np.uint64
-    lengths: np.uint64
-    size: np.uint64
-    knots: np.uint64
-    samples: np.uint64
-    instants: np.uint64
-    num_places: np.uint64
+    joint: np.uint64  # distance of two joints, in `knots` of vectors and in `rows` of numbers
+    row: np.uint64  # distance of two lanes in `rows`
+    sample: np.uint64  # distance of two lanes in `lengths`
+    begins: np.uint64  # `knots` begin at 0
+    targets: np.uint64  # in all, one per point
+    entered: np.uint64  # as `targets`
+    found: np.uint64  # as `targets`
+    speeds: np.uint64  # as `targets`, one per sample
+    rows: np.uint64  # of lane 0
+    lengths: np.uint64  # of lane 0
+    size: np.uint64  # of all
+    knots: np.uint64  # in the other array
+    samples: np.uint64  # in the other array
+    instants: np.uint64  # in the other array
+    num_places: np.uint64  # size of the other array
 
 
 @inlined
@@ -157,35 +129,21 @@ def prepare_redistribution(
     end_condition: EndCondition = "natural",
     samples_per_segment: int = 8,
 ) -> Redistribution:
-    """Factor the splines' system and allocate the scratch of `redistribute`, once.
+    """Factor the splines' system and allocate the scratch of `redistribute_arms`, once.
 
     Args:
         num_via_points: N; a path has the N + 1 points 0..N.
         max_joints: The most joints that one arm may have.
         end_condition: `natural` or `clamped` (zero slope at both ends).
         samples_per_segment: Speeds evaluated per segment, a power of two from 8 to 1024; see
-            `redistribute`.
-
-    Raises:
-        ValueError: A setting out of range.
+            `redistribute_arms`.
     """
-    if num_via_points < 1:
-        raise ValueError(f"num_via_points: must be at least 1, was {num_via_points}")
-    if max_joints < 1:
-        raise ValueError(f"max_joints: must be at least 1, was {max_joints}")
-    if end_condition not in ("natural", "clamped"):
-        raise ValueError(f"end_condition: must be 'natural' or 'clamped', was {end_condition!r}")
-    samples = samples_per_segment
-    if not 8 <= samples <= MAX_SAMPLES or samples & (samples - 1):
-        raise ValueError(
-            f"samples_per_segment: must be a power of two from 8 to {MAX_SAMPLES}, was {samples}"
-        )
-    at = layout(*(np.uint64(size) for size in (max_joints, num_via_points, samples)))
+    at = layout(*(np.uint64(size) for size in (max_joints, num_via_points, samples_per_segment)))
     return Redistribution(
         num_via_points,
         max_joints,
         end_condition,
-        samples,
+        samples_per_segment,
         spline_pivots(num_via_points, end_condition),
         aligned_zeros(int(at.size)),
         aligned_zeros(int(at.num_places)).view(np.uint64),

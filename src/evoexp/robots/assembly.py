@@ -1,7 +1,7 @@
 """The product of a robot description: one Pinocchio model, with the arms as slices of q."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -38,51 +38,33 @@ class Tool(NamedTuple):
 
 
 class LinkFrames(NamedTuple):
-    """The frames of a URDF's links, for tasks that give places in them.
+    """The frames of a URDF's links, for tasks that give places in them."""
 
-    Attributes:
-        root: The link that all others hang on.
-        standing: Name of each link that is fixed to the ground, and its pose (12,) in the world.
-        moving: Names of the links that hang on a joint.
-        ground: The frame to which the SRDF's virtual joint ties the root; empty: none.
-    """
-
-    root: str
+    root: str  # the link that all others hang on
+    # name of each link that is fixed to the ground, and its pose (12,) in the world
     standing: tuple[tuple[str, tuple[float, ...]], ...]
-    moving: frozenset[str]
-    ground: str = ""
+    moving: frozenset[str]  # names of the links that hang on a joint
+    ground: str = ""  # the frame to which the SRDF's virtual joint ties the root; empty: none
 
 
 class Assembly(NamedTuple):
-    """A robot, built. Shared and read-only: whoever needs `pin.Data` makes its own.
-
-    Attributes:
-        model: Pinocchio model of all arms together.
-        geometry: Exact bodies as coal shapes; of robots given by links one capsule per link (of
-            radius 0 for line links), in order of `links`.
-        links: Links as segments.
-        arm_slices: (arms, 2) first and one-past-last index of each arm in q.
-        table: The kinematic table of the model.
-        body_arms: Which arm each body belongs to.
-        tools: The tool's frame of each arm.
-        disabled: Pairs of bodies' names that are never judged (an SRDF's).
-        pairs: Data of `collision.derived_pairs`, attached to the condition; None: there is none.
-        spheres: Spheres that are given as the covers of bodies, by name: (spheres, 4) middles in
-            the body's frame and radii; None: none are.
-        frames: Of the links; None: they have no names.
-    """
+    """A robot, built. Shared and read-only: whoever needs `pin.Data` makes its own."""
 
     model: Any  # pin.Model
     geometry: Any  # pin.GeometryModel
-    links: tuple[Link, ...]
-    arm_slices: np.ndarray
-    table: KinematicTable
-    body_arms: tuple[int, ...]
-    tools: tuple[Tool, ...] = ()
+    links: tuple[Link, ...]  # links as segments
+    arm_slices: np.ndarray  # (arms, 2) first and one-past-last index of each arm in q
+    table: KinematicTable  # the kinematic table of the model
+    body_arms: tuple[int, ...]  # which arm each body belongs to
+    tools: tuple[Tool, ...] = ()  # the tool's frame of each arm
+    # pairs of bodies' names that are never judged (an SRDF's)
     disabled: frozenset[frozenset[str]] = frozenset()
+    # data of `collision.derived_pairs`, attached to the condition; None: there is none
     pairs: bytes | None = None
+    # spheres that are given as the covers of bodies, by name: (spheres, 4) middles in the body's
+    # frame and radii; None: none are
     spheres: Mapping[str, FloatArray] | None = None
-    frames: LinkFrames | None = None
+    frames: LinkFrames | None = None  # of the links; None: they have no names
 
     @property
     def num_arms(self) -> int:
@@ -100,16 +82,11 @@ class Follower(NamedTuple):
 
 
 class ArmStates(NamedTuple):
-    """The named states of an arm.
+    """The named states of an arm."""
 
-    Attributes:
-        joints: Names of the joints that move, in the order of q.
-        units: Of each: degrees, or 1 for lengths [rad, m].
-        states: Values of joints by their names [rad, m], by the states' names.
-    """
-
-    joints: tuple[str, ...]
-    units: tuple[float, ...]
+    joints: tuple[str, ...]  # names of the joints that move, in the order of q
+    units: tuple[float, ...]  # of each: degrees, or 1 for lengths [rad, m]
+    # values of joints by their names [rad, m], by the states' names
     states: dict[str, dict[str, float]]
 
     def values_of(self, name: str, field: str) -> list[float]:
@@ -132,29 +109,50 @@ class ArmStates(NamedTuple):
         return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
 
 
-class Arm(Protocol):
-    """A part of a robot, as `Chain` describes it function by function."""
+class Arm:
+    """Base of a part of a robot: joints, bodies, a tool and what a file tells of them."""
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the joints."""
+        """Add the arm's joints to a model; return its links."""
+        raise NotImplementedError
 
     def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies."""
+        """Return the bodies as `pin.GeometryObject`: the links, unless an arm has others.
+
+        Args:
+            model: With the arm's joints.
+            arm: Its number.
+            first_joint: Its first joint.
+            links: Its links.
+        """
+        return [link_capsule(link, "") for link in links]
 
     def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame."""
+        """Return the tool's frame: at the end of the last link, turned as its joint.
+
+        An arm with another tool overrides this.
+        """
+        return Tool(links[-1].joint, np.eye(3), links[-1].end)
 
     def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs that are never judged."""
+        """Return pairs of bodies' names that are never judged."""
+        return set()
 
     def own_names(self) -> tuple[set[str], set[str]]:
-        """Return the names of joints and of bodies that a file gives."""
+        """Return the names of joints and of bodies that a file gives, which are kept; or none."""
+        return set(), set()
 
     def followers(self, first_joint: int) -> list[Follower]:
-        """Return the joints that follow others."""
+        """Return the joints that follow others.
+
+        Args:
+            first_joint: Index of the arm's first joint.
+        """
+        return []
 
     def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states, of this arm alone."""
+        """Return the named states: none, unless a file names some."""
+        return (ArmStates((), (), {}),)
 
 
 class Robot(Component):
@@ -242,54 +240,12 @@ def _slices(model: Any, ranges: list[tuple[int, int]]) -> np.ndarray:
     return np.array(slices, dtype=np.int64)
 
 
-class Chain(Robot):
+class Chain(Arm, Robot):
     """Base of a single arm, which can stand as a robot of its own."""
 
     def chains(self) -> tuple[Arm, ...]:
         """Return the arm itself."""
         return (self,)
-
-    def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the arm's joints to a model; return its links."""
-        raise NotImplementedError
-
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies as `pin.GeometryObject`: the links, unless an arm has others.
-
-        Args:
-            model: With the arm's joints.
-            arm: Its number.
-            first_joint: Its first joint.
-            links: Its links.
-        """
-        return [link_capsule(link, "") for link in links]
-
-    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame: at the end of the last link, turned as its joint.
-
-        An arm with another tool overrides this.
-        """
-        return Tool(links[-1].joint, np.eye(3), links[-1].end)
-
-    def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs of bodies' names that are never judged."""
-        return set()
-
-    def own_names(self) -> tuple[set[str], set[str]]:
-        """Return the names of joints and of bodies that a file gives, which are kept; or none."""
-        return set(), set()
-
-    def followers(self, first_joint: int) -> list[Follower]:
-        """Return the joints that follow others.
-
-        Args:
-            first_joint: Index of the arm's first joint.
-        """
-        return []
-
-    def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states: none, unless a file names some."""
-        return (ArmStates((), (), {}),)
 
 
 def link_capsule(link: Link, name: str) -> Any:

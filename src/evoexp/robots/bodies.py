@@ -8,8 +8,7 @@ import pinocchio as pin
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.elementary import DEGREE, sincos
-from evoexp.records import FloatArray
+from evoexp.numeric.rotations import rotation_matrix
 from evoexp.validation import Positive, Settings
 
 Point3 = tuple[float, float, float]
@@ -93,12 +92,4 @@ def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
 
 def placed(position: Point3, angles: Point3) -> Any:
     """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes."""
-    (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
-    rotation: FloatArray = np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-    return pin.SE3(rotation, np.array(position))
+    return pin.SE3(rotation_matrix(angles), np.array(position))

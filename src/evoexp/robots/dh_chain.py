@@ -11,7 +11,7 @@ from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Chain, Link, Tool
 from evoexp.robots.bodies import AnyBody, Point3, body_geometry, placed
-from evoexp.validation import Settings
+from evoexp.validation import Settings, check_range
 
 
 class DhJoint(Settings):
@@ -66,12 +66,7 @@ class DhChain(Chain):
     @model_validator(mode="after")
     def _bodies_fit(self) -> Self:
         for k, joint in enumerate(self.joints):
-            if not joint.limits[0] < joint.limits[1]:
-                raise SettingError(
-                    f"joints[{k}].limits",
-                    "[least, greatest] with least < greatest",
-                    list(joint.limits),
-                )
+            check_range(f"joints[{k}].limits", joint.limits)
         names = [body.name for body in self.bodies]
         for k, body in enumerate(self.bodies):
             if body.joint > len(self.joints):

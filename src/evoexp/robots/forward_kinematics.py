@@ -4,7 +4,7 @@ Eight neighbours are read where they stand in a batch; the last ones, if they ar
 to a batch of eight first (`eight_of`).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from evoexp.robots.kinematics import (
     PLANAR_ROWS,
     SPATIAL_ROWS,
     KinematicChain,
-    KinematicTable,
     U,
 )
 
@@ -26,54 +25,11 @@ PLANAR_FRAME, SPATIAL_FRAME = U(PLANAR_ROWS * LANES), U(SPATIAL_ROWS * LANES)
 
 
 class Eight(NamedTuple):
-    """Eight neighbours of a batch of configurations.
+    """Eight neighbours of a batch of configurations."""
 
-    Attributes:
-        q: The batch, flat: coordinate k of the first one stands at k · stride + place.
-        place: Of the first one.
-        stride: From one coordinate to the next.
-    """
-
-    q: FloatArray
-    place: np.uint64
-    stride: np.uint64
-
-
-def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the frames of all joints for a batch of configurations.
-
-    Args:
-        table: The kinematic table.
-        q: (nq, configurations) [rad], lengths for prismatic joints.
-
-    Returns:
-        Rotations (joints, 3, 3, configurations) and origins (joints, 3, configurations) in the
-        world. The rotations are those of the table's frames; times `alignment` transposed they are
-        Pinocchio's.
-
-    Raises:
-        ValueError: If q has not as many rows as the model has coordinates.
-    """
-    num_joints, nq = len(table.parent), table.num_coordinates
-    q = np.ascontiguousarray(q, dtype=np.float64)
-    if q.ndim != 2 or q.shape[0] != nq:
-        raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
-    out = np.empty((num_joints, SPATIAL_ROWS, q.shape[1]))
-    _forward_kinematics(tuple(table.chain), q, out)
-    return out[:, :9].reshape(num_joints, 3, 3, -1), out[:, 9:]
-
-
-@kernel
-def _forward_kinematics(fields: tuple[Any, ...], q: FloatArray, out: FloatArray) -> None:
-    """Run the kernel of `forward_kinematics`; fields of a `KinematicChain` as a plain tuple."""
-    chain, count = KinematicChain(*fields), q.shape[1]
-    frames, padded = np.empty(U(len(chain.parent)) * SPATIAL_FRAME), np.zeros(q.shape[0] * LANES)
-    flat, target = q.reshape(-1), out.reshape(-1)
-    for first in range(0, count, LANES):
-        lanes = min(LANES, count - first)
-        copy_lanes(flat, first, count, lanes, padded, 0, LANES)
-        spatial_frames(chain, Eight(padded, U(0), VECTOR), 1.0, frames)
-        copy_lanes(frames, 0, LANES, lanes, target, first, count)
+    q: FloatArray  # the batch, flat: coordinate k of the first one stands at k · stride + place
+    place: np.uint64  # of the first one
+    stride: np.uint64  # from one coordinate to the next
 
 
 @kernel

@@ -1,5 +1,6 @@
 """Spheres that somebody else put in the place of a robot's bodies: a URDF with spheres per link."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ def with_spheres(root: Any, other: Any, field: str) -> Any:
     """Put the spheres of one URDF in the place of the collision bodies of another, link by link.
 
     Args:
-        root: The robot, that `read_urdf` returned; it is changed.
+        root: The robot, that `read_urdf` returned.
         other: The spheres, likewise.
         field: That names them, for errors.
 
@@ -22,6 +23,7 @@ def with_spheres(root: Any, other: Any, field: str) -> Any:
     Raises:
         SettingError: If the other has no spheres, other bodies, or links that the robot has not.
     """
+    root = copy.deepcopy(root)
     links = {link.get("name"): link for link in root.iterfind("link")}
     for link in links.values():
         link[:] = []

@@ -9,18 +9,13 @@ from evoexp.robots.urdf_text import JointText, Mimic
 
 
 class JointRoles(NamedTuple):
-    """The roles of the joints of a URDF.
+    """The roles of the joints of a URDF."""
 
-    Attributes:
-        arms: Names of the coordinates that move of their own, of each arm.
-        rules: Of joints that follow others, by their names; the source is one that moves of its
-            own, or that stands.
-        tips: The link at the end of each arm, empty where nothing names one.
-    """
-
-    arms: tuple[frozenset[str], ...]
+    arms: tuple[frozenset[str], ...]  # names of the coordinates that move of their own, of each arm
+    # of joints that follow others, by their names; the source is one that moves of its own, or that
+    # stands
     rules: dict[str, Mimic]
-    tips: tuple[str, ...]
+    tips: tuple[str, ...]  # the link at the end of each arm, empty where nothing names one
 
 
 def joint_roles(

@@ -30,59 +30,37 @@ class UnsupportedJoint(EvoexpError):
 
 
 class KinematicChain(NamedTuple):
-    """The part of a kinematic table that kernels read.
+    """The part of a kinematic table that kernels read."""
 
-    Attributes:
-        parent: (joints,) index into the table, −1 for the world.
-        index_q: (joints,) the joint's place in q.
-        prismatic: (joints,) true for a joint that slides along its z axis, false for one that turns
-            about it.
-        turned: (joints,) true where the placement's rotation is not the identity.
-        rotation: (joints, 9) placement in the parent's frame, row by row.
-        translation: (joints, 3) [length unit].
-        rule: (joints, 2) the joint's value is the first times its coordinate plus the second: 1 and
-            0, unless it follows another joint, whose coordinate it shares.
-    """
-
-    parent: IntArray
-    index_q: IntArray
+    parent: IntArray  # (joints,) index into the table, −1 for the world
+    index_q: IntArray  # (joints,) the joint's place in q
+    # (joints,) true for a joint that slides along its z axis, false for one that turns about it
     prismatic: BoolArray
-    turned: BoolArray
-    rotation: FloatArray
-    translation: FloatArray
+    turned: BoolArray  # (joints,) true where the placement's rotation is not the identity
+    rotation: FloatArray  # (joints, 9) placement in the parent's frame, row by row
+    translation: FloatArray  # (joints, 3) [length unit]
+    # (joints, 2) the joint's value is the first times its coordinate plus the second: 1 and 0,
+    # unless it follows another joint, whose coordinate it shares
     rule: FloatArray
 
 
 class KinematicTable(NamedTuple):
-    """Joints in the order of the model, without the universe; parents come before their children.
+    """Joints in the order of the model, without the universe; parents before their children."""
 
-    Attributes:
-        parent: See `KinematicChain`, as for the next six.
-        index_q: See there.
-        prismatic: See there.
-        turned: See there.
-        rotation: See there.
-        translation: See there.
-        rule: See there.
-        alignment: (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the
-            table's axes.
-        planar: Whether every joint turns about the world's z, so that everything moves in parallel
-            planes; not if a joint follows another.
-        free: (joints,) whether a joint has a coordinate of its own, and follows no other.
-        num_coordinates: Number of values of a configuration.
-    """
-
-    parent: IntArray
+    parent: IntArray  # the first seven are those of `KinematicChain`
     index_q: IntArray
     prismatic: BoolArray
     turned: BoolArray
     rotation: FloatArray
     translation: FloatArray
     rule: FloatArray
+    # (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the table's axes
     alignment: FloatArray
+    # whether every joint turns about the world's z, so that everything moves in parallel planes;
+    # not if a joint follows another
     planar: bool
-    free: BoolArray
-    num_coordinates: int
+    free: BoolArray  # (joints,) whether a joint has a coordinate of its own, and follows no other
+    num_coordinates: int  # number of values of a configuration
 
     @property
     def chain(self) -> KinematicChain:

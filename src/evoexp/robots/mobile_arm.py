@@ -12,7 +12,7 @@ from pydantic import model_validator
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Chain, Link, link_capsule
-from evoexp.validation import NonNegative, Positive
+from evoexp.validation import NonNegative, Positive, check_range
 
 Range = tuple[float, float]
 Point2 = tuple[float, float]
@@ -44,11 +44,8 @@ class MobileArm(Chain):
     @model_validator(mode="after")
     def _limits_have_an_inside(self) -> Self:
         for name in ("joint_limits", "torque_limits"):
-            for k, (least, greatest) in enumerate(getattr(self, name) or ()):
-                if not least < greatest:
-                    raise SettingError(
-                        f"{name}[{k}]", "[least, greatest] with least < greatest", [least, greatest]
-                    )
+            for k, limits in enumerate(getattr(self, name) or ()):
+                check_range(f"{name}[{k}]", limits)
         length, height = self.platform_size
         if length <= height:
             raise SettingError(

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.robots.assembly import Chain, Link
-from evoexp.validation import NonNegative, Positive
+from evoexp.validation import NonNegative, Positive, check_range
 
 Point2 = tuple[float, float]
 
@@ -46,13 +46,8 @@ class PlanarChain(Chain):
                 f"one pair per link ({len(self.link_lengths)})",
                 len(self.joint_limits),
             )
-        for k, (least, greatest) in enumerate(self.joint_limits):
-            if not least < greatest:
-                raise SettingError(
-                    f"joint_limits[{k}]",
-                    "[least, greatest] with least < greatest",
-                    [least, greatest],
-                )
+        for k, limits in enumerate(self.joint_limits):
+            check_range(f"joint_limits[{k}]", limits)
         return self
 
     def append_to(self, model: Any, arm: int) -> list[Link]:

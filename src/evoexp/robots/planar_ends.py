@@ -19,19 +19,12 @@ VECTOR = U(LANES)
 
 
 class PlanarArm(NamedTuple):
-    """One arm of revolute joints in the plane z = 0, its links straight from joint to joint.
+    """One arm of revolute joints in the plane z = 0, its links straight from joint to joint."""
 
-    Attributes:
-        lengths: (N,) of the links [length unit].
-        base_x: Of the first joint.
-        base_y: Likewise.
-        base_angle: Direction of the first link at angle 0 [rad].
-    """
-
-    lengths: FloatArray
-    base_x: float
-    base_y: float
-    base_angle: float
+    lengths: FloatArray  # (N,) of the links [length unit]
+    base_x: float  # of the first joint
+    base_y: float  # likewise
+    base_angle: float  # direction of the first link at angle 0 [rad]
 
 
 def planar_arm(assembly: Assembly) -> PlanarArm:

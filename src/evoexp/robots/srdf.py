@@ -9,17 +9,11 @@ MOST_GROUPS = 300  # nested in one another
 
 
 class NamedState(NamedTuple):
-    """A configuration that the SRDF names.
+    """A configuration that the SRDF names."""
 
-    Attributes:
-        name: Its name.
-        group: The group that it is of.
-        values: Of joints by their names [rad, m].
-    """
-
-    name: str
-    group: str
-    values: dict[str, float]
+    name: str  # its name
+    group: str  # the group that it is of
+    values: dict[str, float]  # of joints by their names [rad, m]
 
 
 class Srdf:

@@ -37,9 +37,9 @@ from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
 from evoexp.robots.urdf_bodies import built_bodies
 from evoexp.robots.urdf_notes import check_room, urdf_notes
-from evoexp.robots.urdf_reading import check_tree, read_urdf
+from evoexp.robots.urdf_reading import UrdfFile, read_urdf, urdf_file
 from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
-from evoexp.robots.urdf_text import JointText, file_content, parsed_xml, read_joints
+from evoexp.robots.urdf_text import file_content, parsed_xml
 from evoexp.validation import Positive, Settings
 
 MESH = "collision/geometry/mesh"  # of a link
@@ -139,7 +139,7 @@ class Urdf(Chain):
     @property
     def robot_name(self) -> str:
         """The robot's name in the URDF."""
-        return str(self._model().name)
+        return str(self._file.root.get("name", ""))
 
     def build(self) -> Assembly:
         """Return the robot with its derived pairs, given spheres and the frames of its links."""
@@ -164,9 +164,7 @@ class Urdf(Chain):
         content = file_content(path, f"{field}.path")
         file = Path(located(str(path)))
         with _named(file):
-            root = read_urdf(content, f"{field}.path")
-            check_tree(root, f"{field}.path")
-            read_joints(root, f"{field}.path")
+            root = urdf_file(content, f"{field}.path").root
         found: dict[str, bytes] = {}
         for link in root.iterfind("link"):
             for name in (mesh.get("filename") for mesh in link.iterfind(MESH)):
@@ -176,45 +174,34 @@ class Urdf(Chain):
                         found[name] = whole_mesh(data, name, f"{field}.path")
         settings["urdf"] = {SHA256: keep(content)}
         if found:
+            how: Any = settings.get("decomposition")
             settings["meshes"] = [
                 {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
             ]
-            how: Any = settings.get("decomposition")
-            if how in get_args(Decomposition):
-                for mesh, (name, data) in zip(settings["meshes"], found.items(), strict=True):
+            for mesh, (name, data) in zip(settings["meshes"], found.items(), strict=True):
+                if how in get_args(Decomposition):
                     cut = mesh_pieces(data, Path(name).suffix, how, f"{field}.decomposition")
                     mesh["pieces"] = {SHA256: keep(cut)}
-        if (spheres := settings.pop("spheres", None)) is not None:
-            content = file_content(spheres, f"{field}.spheres")
-            with _named(spheres):
-                read_urdf(content, f"{field}.spheres")
-            settings["spheres"] = {SHA256: keep(content)}
-        if srdf is not None:
-            content = file_content(srdf, f"{field}.srdf")
-            with _named(srdf):
-                parsed_xml(content, f"{field}.srdf", "robot")
-            settings["srdf"] = {SHA256: keep(content)}
+        others = {"spheres": settings.pop("spheres", None), "srdf": srdf}
+        for name, path in others.items():
+            if path is None:
+                continue
+            content = file_content(path, f"{field}.{name}")
+            with _named(path):
+                if name == "spheres":
+                    read_urdf(content, f"{field}.spheres")
+                else:
+                    parsed_xml(content, f"{field}.srdf", "robot")
+            settings[name] = {SHA256: keep(content)}
         return settings
 
     def chains(self) -> tuple[Arm, ...]:
         """Return the arms: one, or one per group."""
-        root = self._root()
-        check_tree(root, "robot.path")
-        joints = read_joints(root, "robot.path")
-        srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
-        roles = self._roles(joints, srdf)
+        (root, joints), roles, model = self._file, self._roles(), self._model()
         check_room(root, roles, "robot.path")
-        values = standing_values(self.fixed, joints, roles)
-        model = self._model()
-        tree = UrdfTree(
-            model,
-            self._geometry(model),
-            self._base(model),
-            roles,
-            values,
-            self._tips(roles.tips),
-            srdf,
-        )
+        values, tips = standing_values(self.fixed, joints, roles), self._tips(roles.tips)
+        bodies, base = self._geometry(model), self._base(model)
+        tree = UrdfTree(model, bodies, base, roles, values, tips, self._srdf)
         return tuple(UrdfArm(tree, k) for k in range(len(roles.arms)))
 
     def states(self) -> tuple[ArmStates, ...]:
@@ -223,15 +210,25 @@ class Urdf(Chain):
 
     def notes(self) -> list[str]:
         """Remark on what the URDF leaves open: bodies, limits, units."""
-        root = self._root()
-        joints = read_joints(root, "robot.path")
-        srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
         meshes = {mesh.name: mesh.file.content for mesh in self.meshes}
-        return list(urdf_notes(root, self._roles(joints, srdf), self._rules(), meshes))
+        return list(urdf_notes(self._file.root, self._roles(), self._rules, meshes))
 
-    def _roles(self, joints: dict[str, JointText], srdf: Srdf | None) -> JointRoles:
-        groups = self.groups or ((self.group,) if self.group else ())
-        return joint_roles(joints, srdf, self.joints, groups, self.base, several=bool(self.groups))
+    @property
+    def _file(self) -> UrdfFile:
+        return urdf_file(self.urdf.content)
+
+    @property
+    def _srdf(self) -> Srdf | None:
+        return None if self.srdf is None else Srdf(self.srdf.content, self._file.joints)
+
+    @property
+    def _rules(self) -> JointRules:
+        return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)
+
+    def _roles(self) -> JointRoles:
+        groups, joints = self.groups or ((self.group,) if self.group else ()), self._file.joints
+        several = bool(self.groups)
+        return joint_roles(joints, self._srdf, self.joints, groups, self.base, several=several)
 
     def _tips(self, found: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
         """Return the frame of each arm's tool, empty if none is named, and the field that chose it.
@@ -259,18 +256,12 @@ class Urdf(Chain):
             (name, tuple(pose_of(pose.rotation, pose.translation).tolist())) for name, pose in poses
         )
         moving = frozenset(str(link.name) for link in links if link.parentJoint)
-        ground = "" if self.srdf is None else Srdf(self.srdf.content, {}).ground()
+        ground = "" if self._srdf is None else self._srdf.ground()
         return LinkFrames(str(links[0].name), standing, moving, ground)
-
-    def _rules(self) -> JointRules:
-        return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)
-
-    def _root(self) -> Any:
-        return read_urdf(self.urdf.content, "robot.path")
 
     def _model(self) -> Any:
         try:
-            return pin.buildModelFromXML(plain_urdf(self._root(), self._rules()))
+            return pin.buildModelFromXML(plain_urdf(self._file.root, self._rules))
         except (ValueError, RuntimeError) as error:
             reason = str(error).strip().splitlines()[0]
             raise SettingError("robot.path", "a URDF that Pinocchio reads", reason) from None
@@ -285,15 +276,15 @@ class Urdf(Chain):
                     raise SettingError(f"robot.meshes[{k}].name", must, mesh.name)
                 places[mesh.name] = Path(directory) / f"mesh_{k}{ending}"
                 places[mesh.name].write_bytes(mesh.file.content)
-            bodies = built_bodies(model, self._root(), self._rules(), places, "robot.path")
+            bodies = built_bodies(model, self._file.root, self._rules, places, "robot.path")
         return bodies if self.decomposition is None else self._in_pieces(bodies, places)
 
     def _given_spheres(self) -> dict[str, FloatArray]:
         """Return the given spheres of each body by its name: middles in its frame, and radii."""
         assert self.spheres is not None
         model = self._model()
-        root = with_spheres(self._root(), read_urdf(self.spheres.content, SPHERES), SPHERES)
-        spheres = built_bodies(model, root, self._rules(), {}, SPHERES)
+        root = with_spheres(self._file.root, read_urdf(self.spheres.content, SPHERES), SPHERES)
+        spheres = built_bodies(model, root, self._rules, {}, SPHERES)
         bodies = list(self._geometry(model).geometryObjects)
         found = spheres_of_bodies(bodies, list(spheres.geometryObjects))
         return dict(zip(body_names(bodies), found, strict=True))

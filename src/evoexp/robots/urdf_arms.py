@@ -9,7 +9,7 @@ from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import ArmStates, Follower, Link, Tool
+from evoexp.robots.assembly import Arm, ArmStates, Follower, Link, Tool
 from evoexp.robots.joint_choice import JointRoles
 from evoexp.robots.srdf import Srdf
 
@@ -18,14 +18,9 @@ AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
 class Carrier(NamedTuple):
-    """The joint of the robot that carries the frame of a joint of the URDF.
+    """The joint of the robot that carries the frame of a joint of the URDF."""
 
-    Attributes:
-        joint: Index of the robot's joint, 0: the world.
-        placement: The frame's place in the joint's frame; None: it is the joint's.
-    """
-
-    joint: int
+    joint: int  # index of the robot's joint, 0: the world
     placement: Any  # pin.SE3 or None
 
     def place(self, local: Any) -> Any:
@@ -34,19 +29,7 @@ class Carrier(NamedTuple):
 
 
 class UrdfTree:
-    """A URDF as Pinocchio reads it, and which of its joints move, in which arm.
-
-    Attributes:
-        model: Of all joints.
-        items: Collision bodies, with the joints of that model.
-        names: Of the bodies.
-        base: `pin.SE3` of the root in the world.
-        order: Joints of each arm, in the order in which they are added.
-        rules: Joints that follow: index of the source, multiplier, offset.
-        disabled: Pairs of bodies' names that are never judged.
-        tips: The link at the end of each arm, or the frame that is chosen.
-        states: That the SRDF names.
-    """
+    """A URDF as Pinocchio reads it, and which of its joints move, in which arm."""
 
     def __init__(
         self,
@@ -71,7 +54,7 @@ class UrdfTree:
         """
         self.model, self.base, self.tips = model, base, tips
         self.states = [] if srdf is None else srdf.states()
-        self.items = list(geometry.geometryObjects)
+        self.items = list(geometry.geometryObjects)  # with the joints of this model
         stems = [item.name.rpartition("_")[0] for item in self.items]
         self.names = body_names(self.items)
         of_link: dict[str, set[str]] = {}
@@ -84,6 +67,7 @@ class UrdfTree:
             for b in of_link.get(two, ())
         }
         index = {str(name): k for k, name in enumerate(model.names)}
+        # joints that follow: index of the source, multiplier, offset
         self.rules = {
             # a source that is fixed stands at 0, as the universe does
             index[name]: (index.get(rule.source, 0), rule.multiplier, rule.offset)
@@ -95,7 +79,7 @@ class UrdfTree:
             must = "a URDF whose joints all hang on its root"
             raise SettingError("robot.path", must, f"joint '{lost[0]}' that does not")
         self._arms = [{index[name] for name in arm} for arm in roles.arms]
-        self.order = self._ordered()
+        self.order = self._ordered()  # joints of each arm, in the order in which they are added
         moving = [joint for arm in self.order for joint in arm]
         self._values = self._standing(moving, {index[n]: v for n, v in values.items()})
         self._place_in = {joint: k for k, joint in enumerate(moving)}
@@ -254,7 +238,7 @@ def body_names(items: list[Any]) -> list[str]:
     ]
 
 
-class UrdfArm:
+class UrdfArm(Arm):
     """One arm of a URDF; bodies that stand still belong to the first arm."""
 
     def __init__(self, tree: UrdfTree, index: int) -> None:

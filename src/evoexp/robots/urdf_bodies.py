@@ -42,7 +42,7 @@ def built_bodies(
 
     Args:
         model: Pinocchio's, of the same URDF.
-        root: That `read_urdf` returned; it is changed.
+        root: That `read_urdf` returned.
         rules: Of the joints.
         places: Where each mesh lies.
         field: That names the URDF, for errors.

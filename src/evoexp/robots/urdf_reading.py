@@ -5,15 +5,16 @@ of the link. It is given nothing of the kind: elements that are not used are dro
 written anew, and whatever it would pass over is refused here, by link or joint.
 """
 
+import functools
 import re
 import xml.etree.ElementTree as ET
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_text import parsed_xml
+from evoexp.robots.urdf_text import JointText, parsed_xml, read_joints
 
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
@@ -60,6 +61,29 @@ UNBOUNDED = {"lower", "upper", "velocity"}  # may be infinite
 WORDS = {1: "one number", 3: "three numbers"}
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
+
+
+class UrdfFile(NamedTuple):
+    """A URDF of one tree of links, read and checked once; shared, so not to be changed."""
+
+    root: Any  # of the elements and attributes that are used, see `read_urdf`
+    joints: dict[str, JointText]  # by their names, in the file's order
+
+
+@functools.lru_cache(maxsize=32)
+def urdf_file(content: bytes, field: str = "robot.path") -> UrdfFile:
+    """Read a URDF whose links form one tree.
+
+    Args:
+        content: Of the file.
+        field: That names it, for errors.
+
+    Raises:
+        SettingError: If it cannot be, by link or joint.
+    """
+    root = read_urdf(content, field)
+    check_tree(root, field)
+    return UrdfFile(root, read_joints(root, field))
 
 
 def read_urdf(content: bytes, field: str) -> Any:

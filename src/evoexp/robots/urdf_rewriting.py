@@ -1,5 +1,6 @@
 """A URDF rewritten for Pinocchio: every joint that moves has one coordinate between limits."""
 
+import copy
 import xml.etree.ElementTree as ET
 from typing import Any, NamedTuple
 
@@ -21,19 +22,13 @@ BASE = "base"  # what the coordinates of a base that moves are called: base_x, b
 
 
 class JointRules(NamedTuple):
-    """How joints are taken that have no limits, or several coordinates.
+    """How joints are taken that have no limits, or several coordinates."""
 
-    Attributes:
-        continuous_turns: Turns of a continuous joint to either side.
-        turn_limit: Limit to either side of a turning joint that has none [deg].
-        slide_limit: The same of a sliding joint [m].
-        base: Whether planar and floating joints stand still (fixed) or move (free), or the root
-            moves besides (planar, floating).
-    """
-
-    continuous_turns: float
-    turn_limit: float
-    slide_limit: float
+    continuous_turns: float  # turns of a continuous joint to either side
+    turn_limit: float  # limit to either side of a turning joint that has none [deg]
+    slide_limit: float  # the same of a sliding joint [m]
+    # whether planar and floating joints stand still (fixed) or move (free), or the root moves
+    # besides (planar, floating)
     base: str
 
 
@@ -43,10 +38,11 @@ def plain_urdf(root: Any, rules: JointRules, places: dict[str, str] | None = Non
     Cylinders stand in the place of capsules, which urdfdom leaves out.
 
     Args:
-        root: That `read_urdf` returned; it is changed.
+        root: That `read_urdf` returned.
         rules: For joints without limits, or of several coordinates.
         places: Where each mesh lies; None: collision bodies are left out.
     """
+    root = copy.deepcopy(root)
     for link in root.iterfind("link"):
         for collision in link.findall("collision"):
             (shape,) = collision.find("geometry")

@@ -20,21 +20,13 @@ class Mimic(NamedTuple):
 
 
 class JointText(NamedTuple):
-    """A joint as the URDF names it.
+    """A joint as the URDF names it."""
 
-    Attributes:
-        name: Its name.
-        kind: Its type.
-        parent: The link that carries it.
-        child: The link that it carries.
-        mimic: The rule by which it follows another joint; None: it moves of its own.
-    """
-
-    name: str
-    kind: str
-    parent: str
-    child: str
-    mimic: Mimic | None
+    name: str  # its name
+    kind: str  # its type
+    parent: str  # the link that carries it
+    child: str  # the link that it carries
+    mimic: Mimic | None  # the rule by which it follows another joint; None: it moves of its own
 
 
 def file_content(path: Any, field: str) -> bytes:

@@ -59,17 +59,11 @@ class SceneMesh(Settings):
 
 
 class Joints(NamedTuple):
-    """The joints of a robot that move.
+    """The joints of a robot that move."""
 
-    Attributes:
-        names: In the order of q.
-        slides: (nq,) whether each slides.
-        slices: (arms, 2) of q.
-    """
-
-    names: tuple[str, ...]
-    slides: BoolArray
-    slices: IntArray
+    names: tuple[str, ...]  # in the order of q
+    slides: BoolArray  # (nq,) whether each slides
+    slices: IntArray  # (arms, 2) of q
 
     def typed(self, q: FloatArray) -> FloatArray:
         """Return q (nq,) [rad, m] as scenarios give it [deg, m]."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, atan2
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 from evoexp.scenarios.moveit_messages import check_message
 
@@ -15,29 +16,24 @@ KINDS = ("", "box", "sphere", "cylinder", "cone", "prism")  # numbered as in Sol
 
 
 class Pose(NamedTuple):
-    """A place and an orientation.
+    """A place and an orientation."""
 
-    Attributes:
-        rotation: (3, 3).
-        position: (3,) [m].
-    """
-
-    rotation: FloatArray
-    position: FloatArray
+    rotation: FloatArray  # (3, 3)
+    position: FloatArray  # (3,) [m]
 
     def times(self, other: "Pose") -> "Pose":
         """Return a pose that is given in this one's frame."""
-        return Pose(_product(self.rotation, other.rotation), self.of_point(other.position))
+        return Pose(matrix_product(self.rotation, other.rotation), self.of_point(other.position))
 
     def of_point(self, point: FloatArray) -> FloatArray:
         """Return a point (3,) that is given in this one's frame."""
-        return np.asarray(_product(self.rotation, point[:, None])[:, 0] + self.position)
+        return np.asarray(matrix_product(self.rotation, point) + self.position)
 
     @property
     def inverse(self) -> "Pose":
         """The pose of the frame in which this one is given, in this one's frame."""
         turned = self.rotation.T
-        return Pose(turned, -_product(turned, self.position[:, None])[:, 0])
+        return Pose(turned, -matrix_product(turned, self.position))
 
     def is_near(self, other: "Pose", tolerance: float) -> bool:
         """Whether all numbers of two poses agree within a tolerance [m, -]."""
@@ -173,9 +169,3 @@ class Document:
         if not isinstance(value, kind):
             raise SettingError(self.field, f"{name} at {where}", str(value)[:40])
         return value
-
-
-def _product(one: FloatArray, two: FloatArray) -> FloatArray:
-    """Multiply matrices (3, 3) and (3, n), sums in a fixed order."""
-    rows = [one[k, 0] * two[0] + one[k, 1] * two[1] + one[k, 2] * two[2] for k in range(3)]
-    return np.array(rows)

@@ -21,17 +21,11 @@ SAME = 1e-6  # [m, -] by which two descriptions of one frame may differ: they ar
 
 
 class Frames(NamedTuple):
-    """Frames by their names, without a slash before them.
+    """Frames by their names, without a slash before them."""
 
-    Attributes:
-        planning: The planning frame.
-        poses: Frames that stand still → their poses in the world.
-        moving: Links that move.
-    """
-
-    planning: str
-    poses: dict[str, Pose]
-    moving: frozenset[str]
+    planning: str  # the planning frame
+    poses: dict[str, Pose]  # frames that stand still → their poses in the world
+    moving: frozenset[str]  # links that move
 
     def of_header(self, document: Document, header: Any, where: str) -> Pose:
         """Return the pose of the frame that a header names; the planning frame's if it names none.

@@ -12,136 +12,111 @@ SCENE, REQUEST = "PlanningScene", "MotionPlanRequest"
 READ = "read"
 LEFT_OUT = "left out"  # it changes neither the bodies nor the goal
 NOTED = "noted"  # `show` and the report say that it is left out
-_XYZ = dict.fromkeys("xyz", READ)
-_HEADER = {"frame_id": READ, "stamp": LEFT_OUT, "seq": LEFT_OUT}
+
+
+def _fields(read: str = "", left_out: str = "", noted: str = "", **parts: str) -> dict[str, str]:
+    """Return fields and their uses: the message in each of `parts`, names that blanks divide."""
+    uses = ((READ, read), (LEFT_OUT, left_out), (NOTED, noted))
+    return {name: use for use, names in uses for name in names.split()} | parts
+
 
 # message → field → the message in it, or what is done with its value
 FIELDS: dict[str, dict[str, str]] = {
-    SCENE: {
-        "name": LEFT_OUT,
-        "robot_state": "RobotState",
-        "robot_model_name": NOTED,
-        "fixed_frame_transforms": "TransformStamped",
-        "allowed_collision_matrix": "AllowedCollisionMatrix",
-        "link_padding": "LinkPadding",
-        "link_scale": "LinkScale",
-        "object_colors": LEFT_OUT,
-        "world": "PlanningSceneWorld",
-        "is_diff": NOTED,
-    },
-    "PlanningSceneWorld": {"collision_objects": "CollisionObject", "octomap": "OctomapWithPose"},
-    "OctomapWithPose": {"header": LEFT_OUT, "origin": LEFT_OUT, "octomap": "Octomap"},
-    "Octomap": dict.fromkeys(("header", "binary", "id", "resolution"), LEFT_OUT)
-    | {"data": "refused: octomaps"},
-    "CollisionObject": {
-        "header": "Header",
-        "pose": "Pose",
-        "id": READ,
-        "type": LEFT_OUT,
-        "primitives": "SolidPrimitive",
-        "primitive_poses": "Pose",
-        "meshes": "Mesh",
-        "mesh_poses": "Pose",
-        "planes": "Plane",
-        "plane_poses": "Pose",
-        "subframe_names": LEFT_OUT,
-        "subframe_poses": LEFT_OUT,
-        "operation": READ,
-    },
-    "SolidPrimitive": {"type": READ, "dimensions": READ, "polygon": LEFT_OUT},  # prisms are refused
-    "Mesh": dict.fromkeys(("triangles", "vertices", "resource", "dimensions"), READ),
-    "Plane": {"coef": READ},
-    "AllowedCollisionMatrix": {
-        "entry_names": READ,
-        "entry_values": "AllowedCollisionEntry",
-        "default_entry_names": READ,
-        "default_entry_values": READ,
-    },
-    "AllowedCollisionEntry": {"enabled": READ},
-    "LinkPadding": {"link_name": READ, "padding": READ},
-    "LinkScale": {"link_name": READ, "scale": READ},
-    "RobotState": {
-        "joint_state": "JointState",
-        "multi_dof_joint_state": "MultiDOFJointState",
-        "attached_collision_objects": "refused: attached objects",
-        "is_diff": LEFT_OUT,  # the request's values come before the scene's, as in MoveIt
-    },
-    "JointState": {
-        "header": LEFT_OUT,
-        "name": READ,
-        "position": READ,
-        "velocity": LEFT_OUT,
-        "effort": LEFT_OUT,
-    },
-    "MultiDOFJointState": {
-        "header": "Header",
-        "joint_names": READ,
-        "transforms": "Transform",
-        "twist": LEFT_OUT,
-        "wrench": LEFT_OUT,
-    },
-    REQUEST: {
-        "start_state": "RobotState",
-        "goal_constraints": "Constraints",
-        "path_constraints": "refused: path constraints",
-        "trajectory_constraints": "refused: trajectory constraints",
-        "group_name": READ,
-        "workspace_parameters": LEFT_OUT,  # bounds of planar and floating joints
-        "reference_trajectories": LEFT_OUT,  # where MoveIt's optimisers begin
-        "pipeline_id": LEFT_OUT,
-        "planner_id": LEFT_OUT,
-        "num_planning_attempts": LEFT_OUT,
-        "allowed_planning_time": LEFT_OUT,
-        "max_velocity_scaling_factor": NOTED,
-        "max_acceleration_scaling_factor": NOTED,
-        "max_cartesian_speed": NOTED,
-        "cartesian_speed_limited_link": LEFT_OUT,
-        "cartesian_speed_end_effector_link": LEFT_OUT,  # its name in ROS 1
-    },
-    "Constraints": {
-        "name": LEFT_OUT,
-        "joint_constraints": "JointConstraint",
-        "position_constraints": "PositionConstraint",
-        "orientation_constraints": "OrientationConstraint",
-        "visibility_constraints": "refused: visibility constraints",
-    },
-    "JointConstraint": {
-        "joint_name": READ,
-        "position": READ,
-        "tolerance_above": LEFT_OUT,  # the middle is planned to
-        "tolerance_below": LEFT_OUT,
-        "weight": LEFT_OUT,
-    },
-    "PositionConstraint": {
-        "header": "Header",
-        "link_name": READ,
-        "target_point_offset": "Vector3",
-        "constraint_region": "BoundingVolume",
-        "weight": LEFT_OUT,
-    },
-    "BoundingVolume": {
-        "primitives": "SolidPrimitive",
-        "primitive_poses": "Pose",
-        "meshes": "refused: goals within meshes",
-        "mesh_poses": LEFT_OUT,
-    },
-    "OrientationConstraint": {
-        "header": "Header",
-        "link_name": READ,
-        "orientation": "Quaternion",
-        "absolute_x_axis_tolerance": READ,
-        "absolute_y_axis_tolerance": READ,
-        "absolute_z_axis_tolerance": READ,
-        "parameterization": LEFT_OUT,  # the least tolerance bounds the angle of either
-        "weight": LEFT_OUT,
-    },
-    "Header": _HEADER,
-    "TransformStamped": {"header": "Header", "child_frame_id": READ, "transform": "Transform"},
-    "Transform": {"translation": "Vector3", "rotation": "Quaternion"},
-    "Pose": {"position": "Point", "orientation": "Quaternion"},
-    "Point": _XYZ,
-    "Vector3": _XYZ,
-    "Quaternion": dict.fromkeys("xyzw", READ),
+    SCENE: _fields(
+        left_out="name object_colors",
+        noted="robot_model_name is_diff",
+        robot_state="RobotState",
+        fixed_frame_transforms="TransformStamped",
+        allowed_collision_matrix="AllowedCollisionMatrix",
+        link_padding="LinkPadding",
+        link_scale="LinkScale",
+        world="PlanningSceneWorld",
+    ),
+    "PlanningSceneWorld": _fields(collision_objects="CollisionObject", octomap="OctomapWithPose"),
+    "OctomapWithPose": _fields(left_out="header origin", octomap="Octomap"),
+    "Octomap": _fields(left_out="header binary id resolution", data="refused: octomaps"),
+    "CollisionObject": _fields(
+        read="id operation",
+        left_out="type subframe_names subframe_poses",
+        header="Header",
+        pose="Pose",
+        primitives="SolidPrimitive",
+        primitive_poses="Pose",
+        meshes="Mesh",
+        mesh_poses="Pose",
+        planes="Plane",
+        plane_poses="Pose",
+    ),
+    "SolidPrimitive": _fields("type dimensions", left_out="polygon"),  # prisms are refused
+    "Mesh": _fields("triangles vertices resource dimensions"),
+    "Plane": _fields("coef"),
+    "AllowedCollisionMatrix": _fields(
+        "entry_names default_entry_names default_entry_values", entry_values="AllowedCollisionEntry"
+    ),
+    "AllowedCollisionEntry": _fields("enabled"),
+    "LinkPadding": _fields("link_name padding"),
+    "LinkScale": _fields("link_name scale"),
+    "RobotState": _fields(
+        left_out="is_diff",  # the request's values come before the scene's, as in MoveIt
+        joint_state="JointState",
+        multi_dof_joint_state="MultiDOFJointState",
+        attached_collision_objects="refused: attached objects",
+    ),
+    "JointState": _fields("name position", left_out="header velocity effort"),
+    "MultiDOFJointState": _fields(
+        "joint_names", left_out="twist wrench", header="Header", transforms="Transform"
+    ),
+    # left out: the workspace bounds planar and floating joints, where MoveIt's optimisers begin;
+    # cartesian_speed_end_effector_link is the name in ROS 1
+    REQUEST: _fields(
+        "group_name",
+        left_out="workspace_parameters reference_trajectories pipeline_id planner_id "
+        "num_planning_attempts allowed_planning_time cartesian_speed_limited_link "
+        "cartesian_speed_end_effector_link",
+        noted="max_velocity_scaling_factor max_acceleration_scaling_factor max_cartesian_speed",
+        start_state="RobotState",
+        goal_constraints="Constraints",
+        path_constraints="refused: path constraints",
+        trajectory_constraints="refused: trajectory constraints",
+    ),
+    "Constraints": _fields(
+        left_out="name",
+        joint_constraints="JointConstraint",
+        position_constraints="PositionConstraint",
+        orientation_constraints="OrientationConstraint",
+        visibility_constraints="refused: visibility constraints",
+    ),
+    # the middle is planned to
+    "JointConstraint": _fields(
+        "joint_name position", left_out="tolerance_above tolerance_below weight"
+    ),
+    "PositionConstraint": _fields(
+        "link_name",
+        left_out="weight",
+        header="Header",
+        target_point_offset="Vector3",
+        constraint_region="BoundingVolume",
+    ),
+    "BoundingVolume": _fields(
+        left_out="mesh_poses",
+        primitives="SolidPrimitive",
+        primitive_poses="Pose",
+        meshes="refused: goals within meshes",
+    ),
+    # the least tolerance bounds the angle of either parameterization
+    "OrientationConstraint": _fields(
+        "link_name absolute_x_axis_tolerance absolute_y_axis_tolerance absolute_z_axis_tolerance",
+        left_out="parameterization weight",
+        header="Header",
+        orientation="Quaternion",
+    ),
+    "Header": _fields("frame_id", left_out="stamp seq"),
+    "TransformStamped": _fields("child_frame_id", header="Header", transform="Transform"),
+    "Transform": _fields(translation="Vector3", rotation="Quaternion"),
+    "Pose": _fields(position="Point", orientation="Quaternion"),
+    "Point": _fields("x y z"),
+    "Vector3": _fields("x y z"),
+    "Quaternion": _fields("x y z w"),
 }
 
 

@@ -14,35 +14,21 @@ HALF_TURN = 180.0  # [deg] an orientation within which is any orientation
 
 
 class LinkGoal(NamedTuple):
-    """Where a link shall be.
+    """Where a link shall be."""
 
-    Attributes:
-        link: Its name.
-        pose: In the root frame; of a goal without orientation only the position counts.
-        distance: Tolerance [m].
-        angle: Tolerance [deg]; None: any orientation will do.
-    """
-
-    link: str
-    pose: Pose
-    distance: float
-    angle: float | None
+    link: str  # its name
+    pose: Pose  # in the root frame; of a goal without orientation only the position counts
+    distance: float  # tolerance [m]
+    angle: float | None  # tolerance [deg]; None: any orientation will do
 
 
 class Request(NamedTuple):
-    """A motion plan request.
+    """A motion plan request."""
 
-    Attributes:
-        group: The planning group; empty: not given.
-        start: Joint names → positions [rad, m].
-        joint_goal: Joint names → positions [rad, m]; empty: the goal is a link's.
-        link: The link whose pose is the goal; empty: the goal is one of joints.
-    """
-
-    group: str
-    start: dict[str, float]
-    joint_goal: dict[str, float]
-    link: str
+    group: str  # the planning group; empty: not given
+    start: dict[str, float]  # joint names → positions [rad, m]
+    joint_goal: dict[str, float]  # joint names → positions [rad, m]; empty: the goal is a link's
+    link: str  # the link whose pose is the goal; empty: the goal is one of joints
 
 
 def read_request(request: Document) -> Request:

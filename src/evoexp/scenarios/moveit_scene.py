@@ -37,15 +37,10 @@ OPERATIONS = {
 
 
 class AllowedPairs(NamedTuple):
-    """The allowed-collision matrix.
+    """The allowed-collision matrix."""
 
-    Attributes:
-        entries: Pairs of names → whether they may touch.
-        defaults: Names → whether they may touch whatever no entry names.
-    """
-
-    entries: dict[frozenset[str], bool]
-    defaults: dict[str, bool]
+    entries: dict[frozenset[str], bool]  # pairs of names → whether they may touch
+    defaults: dict[str, bool]  # names → whether they may touch whatever no entry names
 
     @property
     def names(self) -> set[str]:
@@ -62,17 +57,11 @@ class AllowedPairs(NamedTuple):
 
 
 class World(NamedTuple):
-    """The objects that stand around the robot.
+    """The objects that stand around the robot."""
 
-    Attributes:
-        obstacles: Its bodies, in the world [m].
-        objects: (obstacles) the object that each belongs to.
-        frames: In which places are given.
-    """
-
-    obstacles: tuple[Obstacle, ...]
-    objects: tuple[str, ...]
-    frames: Frames
+    obstacles: tuple[Obstacle, ...]  # its bodies, in the world [m]
+    objects: tuple[str, ...]  # (obstacles) the object that each belongs to
+    frames: Frames  # in which places are given
 
 
 def read_world(scene: Document, links: "LinkFrames | None", meshes: Mapping[str, Mesh]) -> World:

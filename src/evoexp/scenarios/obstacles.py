@@ -6,8 +6,8 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.rotations import rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 
@@ -135,21 +135,16 @@ Obstacle = Annotated[
 
 
 class ObstacleTable(NamedTuple):
-    """Obstacles as arrays.
+    """Obstacles as arrays."""
 
-    Attributes:
-        kind: (obstacles,) SPHERE, BOX (of a hull, too), CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE.
-        center: (obstacles, 3); of a half-space a point of its boundary.
-        rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and
-            cylinders lie along their z axis, a half-space is all points with z ≤ 0.
-        size: (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and
-            cylinders; the length of a capsule is that of its segment) | unused (half-spaces) |
-            semi-axes.
-    """
-
+    # (obstacles,) SPHERE, BOX (of a hull, too), CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE
     kind: np.ndarray
-    center: FloatArray
+    center: FloatArray  # (obstacles, 3); of a half-space a point of its boundary
+    # (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and cylinders lie
+    # along their z axis, a half-space is all points with z ≤ 0
     rotation: FloatArray
+    # (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and cylinders;
+    # the length of a capsule is that of its segment) | unused (half-spaces) | semi-axes
     size: FloatArray
 
     def without_ellipses(self) -> "ObstacleTable":
@@ -173,54 +168,43 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
     Raises:
         SettingError: If the ends of a capsule or cylinder coincide, or a normal is zero.
     """
-    table = ObstacleTable(
-        np.zeros(len(obstacles), dtype=np.int64),
-        np.zeros((len(obstacles), 3)),
-        np.tile(np.eye(3).ravel(), (len(obstacles), 1)),
-        np.zeros((len(obstacles), 3)),
+    rows = [_row(obstacle, f"scenario.obstacles[{k}]") for k, obstacle in enumerate(obstacles)]
+    kinds, *columns = zip(*rows, strict=True) if rows else ((), (), (), ())
+    center, rotation, size = (
+        np.array(column, dtype=np.float64).reshape(len(rows), width)
+        for column, width in zip(columns, (3, 9, 3), strict=True)
     )
-    for k, obstacle in enumerate(obstacles):
-        if isinstance(obstacle, SphereObstacle):
-            table.kind[k], table.center[k], table.size[k, 0] = (
-                SPHERE,
-                _point(obstacle.center),
-                obstacle.radius,
-            )
-        elif isinstance(obstacle, BoxObstacle):
-            table.kind[k], table.center[k] = BOX, _point(obstacle.center)
-            table.size[k] = 0.5 * np.array([*obstacle.size, 1.0][:3])
-            table.rotation[k] = rotation_matrix(obstacle.rotation).ravel()
-        elif isinstance(obstacle, EllipseObstacle):
-            table.kind[k], table.center[k] = ELLIPSE, _point(obstacle.center)
-            table.size[k] = *obstacle.semi_axes, obstacle.semi_axes[1]
-            table.rotation[k] = rotation_matrix((0.0, 0.0, obstacle.angle)).ravel()
-        elif isinstance(obstacle, HullObstacle):
-            rotation, (middle, half) = rotation_matrix(obstacle.rotation), obstacle.box
+    return ObstacleTable(np.array(kinds, dtype=np.int64), center, rotation, size)
+
+
+def _row(obstacle: Any, field: str) -> tuple[int, FloatArray, FloatArray, Any]:
+    """Return kind, center, rotation and size of an obstacle, see `ObstacleTable`."""
+    match obstacle:
+        case SphereObstacle():
+            return SPHERE, _point(obstacle.center), np.eye(3), (obstacle.radius, 0.0, 0.0)
+        case BoxObstacle():
+            half = 0.5 * np.array([*obstacle.size, 1.0][:3])
+            return BOX, _point(obstacle.center), rotation_matrix(obstacle.rotation), half
+        case EllipseObstacle():
+            turn, (one, two) = rotation_matrix((0.0, 0.0, obstacle.angle)), obstacle.semi_axes
+            return ELLIPSE, _point(obstacle.center), turn, (one, two, two)
+        case HullObstacle():
+            turn, (middle, half) = rotation_matrix(obstacle.rotation), obstacle.box
             if not half.min() > 0.0:
                 must = "points that lie in no plane"
-                raise SettingError(f"scenario.obstacles[{k}].points", must, list(2.0 * half))
-            table.kind[k], table.size[k], table.rotation[k] = BOX, half, rotation.ravel()
-            table.center[k] = _point(obstacle.center) + matrix_product(rotation, middle)
-        elif isinstance(obstacle, HalfSpaceObstacle):
+                raise SettingError(f"{field}.points", must, list(2.0 * half))
+            return BOX, _point(obstacle.center) + matrix_product(turn, middle), turn, half
+        case HalfSpaceObstacle():
             axis, length = _direction(_point(obstacle.normal))
             if length == 0.0:
-                raise SettingError(
-                    f"scenario.obstacles[{k}].normal", "a direction", list(obstacle.normal)
-                )
-            table.kind[k], table.center[k] = HALF_SPACE, _point(obstacle.point)
-            table.rotation[k] = _z_along(axis).ravel()
-        else:
-            start, end = _point(obstacle.start), _point(obstacle.end)
-            axis, length = _direction(end - start)
-            if length == 0.0:
-                raise SettingError(
-                    f"scenario.obstacles[{k}].end", "another point than start", list(obstacle.end)
-                )
-            table.kind[k] = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE
-            table.center[k] = 0.5 * (start + end)
-            table.size[k, :2] = obstacle.radius, 0.5 * length
-            table.rotation[k] = _z_along(axis).ravel()
-    return table
+                raise SettingError(f"{field}.normal", "a direction", list(obstacle.normal))
+            return HALF_SPACE, _point(obstacle.point), _z_along(axis), (0.0, 0.0, 0.0)
+    start, end = _point(obstacle.start), _point(obstacle.end)
+    axis, length = _direction(end - start)
+    if length == 0.0:
+        raise SettingError(f"{field}.end", "another point than start", list(obstacle.end))
+    kind = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE
+    return kind, 0.5 * (start + end), _z_along(axis), (obstacle.radius, 0.5 * length, 0.0)
 
 
 def obstacle_hulls(obstacles: tuple[Any, ...]) -> dict[int, FloatArray]:
@@ -233,18 +217,6 @@ def obstacle_hulls(obstacles: tuple[Any, ...]) -> dict[int, FloatArray]:
         for k, obstacle in enumerate(obstacles)
         if isinstance(obstacle, HullObstacle)
     }
-
-
-def rotation_matrix(angles: Angles) -> FloatArray:
-    """Return the rotation of roll, pitch, yaw [deg]: Rz(yaw) Ry(pitch) Rx(roll), (3, 3)."""
-    (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 def _point(coordinates: tuple[float, ...]) -> FloatArray:

@@ -4,9 +4,8 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from evoexp.errors import SettingError
 from evoexp.scenarios.obstacles import Obstacle, ObstacleTable, obstacle_table
-from evoexp.validation import Component, NonNegative, Vector
+from evoexp.validation import Component, NonNegative, Vector, check_range
 
 Point2 = tuple[float, float]
 
@@ -42,11 +41,7 @@ class PickAndPlace(Component):
     @model_validator(mode="after")
     def _box_has_an_inside(self) -> Self:
         for name in ("box_x", "box_y"):
-            least, greatest = getattr(self, name)
-            if not least < greatest:
-                raise SettingError(
-                    name, "[least, greatest] with least < greatest", [least, greatest]
-                )
+            check_range(name, getattr(self, name))
         return self
 
     @property

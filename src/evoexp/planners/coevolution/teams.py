@@ -16,7 +16,7 @@ from evoexp.evolution.best_team import (
     find_best_team,
     pair_index,
 )
-from evoexp.evolution.cost_statistics import CostStatistics, summarise
+from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
 
@@ -169,7 +169,7 @@ def survey(
         for k in range(own.shape[1]):
             teamable[r, k] = np.inf if blocked[r, k] > 0 else own[r, k]
     cost = find_best_team(collisions, teamable, own.shape[1], team)
-    best, mean, std = summarise(costs.reshape(-1))
+    best, mean, std = cost_statistics(costs.reshape(-1))
     return cost, count_partnered(collisions, blocked), best, mean, std
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
+from evoexp.paths.grid_choices import Choices
 from evoexp.paths.grid_measures import POSITIVE, Tolls, length_and_mean
 from evoexp.paths.grid_walks import walk_to_exits
 from evoexp.paths.grids import NodeArray
@@ -161,7 +162,8 @@ def climb_by_pieces(
         two += two >= one
         low, high = min(one, two), max(one, two)
         ends = (path[low], path[high])
-        walk_to_exits(draws, entries[ends[1]], slots, ends, ledger.exits)
+        target = np.int64(ends[1])
+        walk_to_exits(draws, Choices(entries[target : target + 1], slots), ends, ledger.exits)
         if used_up(draws):
             draws.taken[0] = before
             return trial

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import summarise
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
@@ -140,7 +140,7 @@ def note(population: Population, place: int, found: Population, summaries: Float
     """
     results, own = population.results, summaries[place]
     found.results[place] = results
-    own[0], own[1], own[2] = summarise(results[COST])
+    own[0], own[1], own[2] = cost_statistics(results[COST])
     own[3] = results.shape[1]
     copy_path(population.paths[int(own[0])], found.paths[place])
 

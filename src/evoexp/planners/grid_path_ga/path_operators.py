@@ -11,7 +11,7 @@ from evoexp.numeric.compilation import copy_part, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_choices import Choices
 from evoexp.paths.grid_measures import Tolls
-from evoexp.paths.grid_walks import erase_loops, walk, walk_by_choices
+from evoexp.paths.grid_walks import erase_loops, walk
 from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
 from evoexp.records import FloatArray, IntArray
 
@@ -357,16 +357,17 @@ def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Sc
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
     # a walk from one to the other
-    choices = world.choices
-    if len(choices.entries) > 0:
-        own = choices.entries[ends[1]]
-        walk_by_choices(draws, own, choices.slots, ends, erase, walked, place)
-    elif len(fronts) > 0:
-        walk(draws, Moves(neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
+    target = np.int64(ends[1])
+    choices = Choices(world.choices.entries[target : target + 1], world.choices.slots)
+    if len(choices.entries) == 0 and len(fronts) > 0:
+        moves = Moves(neighbours, potentials, fronts[target])
+        walk(draws, moves, choices, ends, erase, walked, place)
     else:
-        target = path[high : high + 1]
-        spread_front(neighbours, world.num_moves, target, scratch.steps, scratch.queue)
-        walk(draws, Moves(neighbours, potentials, scratch.steps), ends, erase, walked, place)
+        if len(choices.entries) == 0:
+            sources = path[high : high + 1]
+            spread_front(neighbours, world.num_moves, sources, scratch.steps, scratch.queue)
+        near = Moves(neighbours, potentials, scratch.steps)
+        walk(draws, near, choices, ends, erase, walked, place)
     if used_up(draws):
         return
     # head, walk and tail

@@ -22,12 +22,12 @@ from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_choices import Choices, choices_of
+from evoexp.paths.grid_choices import Choices, choice_table, choices_of
 from evoexp.paths.grid_measures import Tolls
 from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
-from evoexp.paths.walkers import Walkers, choice_table
+from evoexp.paths.walkers import LANES, WORDS, Walkers
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
@@ -40,12 +40,6 @@ from evoexp.planners.grid_path_ga.kernels import (
     solution_of,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
-from evoexp.planners.grid_path_ga.path_sampling import (
-    FEW_WORDS,
-    PathSampling,
-    RandomPaths,
-    first_words,
-)
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
@@ -61,6 +55,8 @@ MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 KEPT = 2  # generations whose paths are in memory
 PER_CALL = 8  # generations; see `ScaledSearch`: another number needs another revision
+STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
+FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
@@ -70,7 +66,7 @@ class Problem(NamedTuple):
     Attributes:
         fields: Grid, unsafeness, potentials.
         moves: The moves of walks to the goal, and their weights.
-        choices: The same as a table, see `walkers.choice_table`.
+        choices: The same as a table, see `grid_choices.choice_table`.
         ends: Indices of start and goal.
         world: Grid and fields, as the kernels take them.
         scene: The bodies themselves, for the exact verdict on a motion.
@@ -157,8 +153,6 @@ class GridPathGa(PlannerDefaults, Component):
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
-        if not self.revisits and PathSampling.is_fit(problem, rng) and count:
-            return np.ascontiguousarray(PathSampling(problem, rng, count).draw(count))
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
         if len(problem.choices.entries):
             self._fill(problem, rng, paths)
@@ -166,16 +160,11 @@ class GridPathGa(PlannerDefaults, Component):
             self._fill_one_by_one(problem, rng, paths)
         return trimmed(paths)
 
-    def random_run(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block] | None:
-        """Return generations of random paths, see `PlannerDefaults`."""
-        if self.revisits or not PathSampling.is_fit(problem, rng) or not self.ga.num_offspring:
-            return None
-        return RandomPaths(self, problem, rng).blocks(rng)
-
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths."""
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
-        num_words = first_words(len(paths), int(problem.moves.steps[problem.ends[0]]))
+        fewest = int(problem.moves.steps[problem.ends[0]])
+        num_words = WORDS * (int(STEPS_PER_WALK * len(paths) * fewest / LANES) + 1)
         while walkers.complete < len(paths):
             walkers.go(rng.bit_generator.random_raw(num_words))
             num_words = FEW_WORDS
@@ -186,7 +175,7 @@ class GridPathGa(PlannerDefaults, Component):
         """Fill a table of paths where the weights of moves allow no table of choices."""
         draws, complete = Draws(BLOCK), 0
         place = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
-        arguments = problem.moves, problem.ends, not self.revisits
+        arguments = problem.moves, problem.choices, problem.ends, not self.revisits
         while (complete := walk_each(draws.block, *arguments, complete, paths, place)) < len(paths):
             draws.extend(rng)
 

@@ -6,7 +6,7 @@ An individual is two strings of bits, see `evolution.bit_coding`.
 from typing import NamedTuple
 
 from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
-from evoexp.evolution.cost_statistics import summarise
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import Block, draw_many, used_up
@@ -189,7 +189,7 @@ def judge(strings: IntArray, coding: Coding, model: Model, count: int, rows: Flo
 @kernel
 def summarise_rows(rows: FloatArray, out: FloatArray) -> None:
     """Write index of the best, mean and deviation of the costs, number of feasible postures."""
-    out[0], out[1], out[2] = summarise(rows[GENES + COST])
+    out[0], out[1], out[2] = cost_statistics(rows[GENES + COST])
     feasible = 0
     for k in range(rows.shape[1]):
         feasible += rows[ROWS - 1, k] >= 0.0

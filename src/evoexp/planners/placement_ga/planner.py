@@ -33,7 +33,7 @@ from evoexp.records import Block, BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
-from evoexp.validation import Component
+from evoexp.validation import Component, check_range
 
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
@@ -116,9 +116,7 @@ class PlacementGa(PlannerDefaults, Component):
         Raises:
             SettingError: If it cannot, or settings contradict each other.
         """
-        if not self.angle_range[0] < self.angle_range[1]:
-            must = "[least, greatest] with least < greatest"
-            raise SettingError("planner.angle_range", must, list(self.angle_range))
+        check_range("planner.angle_range", self.angle_range)
         reach = sum(robot.link_lengths)
         if abs(scenario.target[1]) > reach:
             must = (

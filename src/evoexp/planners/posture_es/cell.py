@@ -10,6 +10,7 @@ from evoexp.collision.models.body_covers import Cover
 from evoexp.collision.models.body_models import BodyModel, Carried
 from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
+from evoexp.numeric.rotations import rotation_matrix
 from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
@@ -19,7 +20,6 @@ from evoexp.scenarios.obstacles import (
     CYLINDER,
     ObstacleTable,
     obstacle_hulls,
-    rotation_matrix,
 )
 from evoexp.scenarios.posture_task import (
     Phase,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import summarise
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.pcg64 import Words, fill_normals, fill_uniforms
 from evoexp.planners.posture_es.kernels import (
@@ -195,7 +195,7 @@ def settle(
         num_feasible += feasible[n]
         least = n if usable[n] < usable[least] else least
         lowest = min(lowest, costs[n])
-    _, mean, std = summarise(usable)
+    _, mean, std = cost_statistics(usable)
     improved = usable[least] < cycles.costs[before, LEAST]
     # the best so far, whose node is appended behind those of the parents
     best, origin = winner if winner >= 0 else least, -1

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.models.ellipse_kernels import PathChecks, prepare_checks
-from evoexp.evolution.cost_statistics import summarise
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.mutation import GAUSSIAN, NON_UNIFORM, decode_bits, non_uniform_spread
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
@@ -244,7 +244,7 @@ def advance(
 @kernel
 def summarise_costs(costs: FloatArray, out: FloatArray) -> None:
     """Write index of the best, mean and deviation of the finite costs, and how many are finite."""
-    out[0], out[1], out[2] = summarise(costs)
+    out[0], out[1], out[2] = cost_statistics(costs)
     finite = 0
     for k in range(len(costs)):
         finite += np.isfinite(costs[k])

@@ -4,7 +4,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from evoexp.evolution.crossover import Crossover
 from evoexp.evolution.genetic_settings import GeneticSettings
+from evoexp.evolution.mutation import Mutation, Scope
 from evoexp.validation import Count, NonNegative, NonNegativeCount, Positive
 
 
@@ -40,10 +42,10 @@ class RealGenetic(SelectiveSettings):
 
     component: ClassVar[str] = "real_genetic"
 
-    crossover: Literal["one_point", "uniform", "arithmetic", "blx_alpha"]
+    crossover: Crossover
     blend_alpha: NonNegative
-    mutation: Literal["non_uniform", "gaussian", "uniform_reset"]
-    mutation_scope: Literal["gene", "individual"]
+    mutation: Mutation
+    mutation_scope: Scope
     mutation_power: NonNegativeCount
     mutation_std: Positive
 

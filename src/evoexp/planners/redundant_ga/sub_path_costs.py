@@ -12,7 +12,8 @@ from evoexp.collision.models.ellipse_kernels import (
     paths_collide,
 )
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.objectives.reaching import measure_reach, measure_reach_from
+from evoexp.numeric.vectors import LANES
+from evoexp.objectives.reaching import measure_reach
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.planar_ends import PlanarArm
 
@@ -44,10 +45,10 @@ def measure(
     starts: FloatArray, angles: FloatArray, count: int, judging: Judging, table: FloatArray
 ) -> None:
     """Write Eq. 4 without collisions, and its parts, for the first `count` individuals."""
-    start, row = starts[:, 0].copy(), len(table) - RESULTS
+    row, lanes = len(table) - RESULTS, np.arange(count + LANES)
     arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
     results = table[row], table[row + 1], table[row + 2]
-    measure_reach_from(start, angles, count, arm, target, box, weights, *results)
+    measure_reach(starts, angles, lanes, count, arm, target, box, weights, *results)
 
 
 @kernel

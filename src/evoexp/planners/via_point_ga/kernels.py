@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.collision.models.planar_contacts import contacts
-from evoexp.evolution.cost_statistics import summarise
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
 from evoexp.evolution.succession import follow_rows
@@ -230,7 +230,7 @@ def follow(population: Population, scratch: Scratch, count: int, following: Popu
 @kernel
 def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray) -> None:
     """Write index of the best, mean and deviation of the costs, number of free individuals."""
-    out[0], out[1], out[2] = summarise(costs)
+    out[0], out[1], out[2] = cost_statistics(costs)
     free = 0
     for k in range(len(collisions)):
         free += collisions[k] == 0.0

@@ -12,7 +12,7 @@ from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
-from evoexp.paths.walk import num_uniforms, walk
+from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.paths.workspace import Redistribution
 from evoexp.planners.arm_tasks import margins
 from evoexp.planners.table_search import generations_per_call
@@ -207,7 +207,7 @@ class Strings:
         uniforms, lanes = rng.random((count, self.num_uniforms)), np.arange(count)
         step, max_turn = self.breeding.walk_step, self.breeding.max_turn
         ends = problem.start, problem.goal
-        walk(strings, lanes, uniforms, *ends, problem.arm_slices, step, max_turn)
+        walk_strings(strings, lanes, uniforms, *ends, problem.arm_slices, step, max_turn)
         self.smooth(strings, count)
         return strings
 

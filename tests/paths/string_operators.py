@@ -1,0 +1,25 @@
+"""The kernels of strings of via-points, called for arrays of any number of lanes."""
+
+import numpy as np
+
+from evoexp.paths.redistribution import redistribute_arms
+from evoexp.paths.relaxation import relax_points
+from evoexp.paths.workspace import Redistribution
+
+
+def padded(num_lanes: int) -> int:
+    return -(-num_lanes // 8) * 8
+
+
+def redistribute(
+    via_points: np.ndarray, arm_slices: np.ndarray, num_lanes: int, workspace: Redistribution
+) -> None:
+    if via_points.shape[1] > 2:
+        own = workspace
+        settings = own.samples_per_segment, own.pivots, own.floats, own.integers
+        redistribute_arms(via_points, arm_slices, padded(num_lanes), *settings)
+
+
+def relax(via_points: np.ndarray, delta: float, num_lanes: int) -> None:
+    if delta > 0.0:
+        relax_points(via_points, delta, padded(num_lanes))

@@ -1,6 +1,5 @@
 """Replicates that would take more memory than there is are refused before they begin."""
 
-import json
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -9,9 +8,7 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
-from evoexp.registry import component_modules
 from evoexp.store.container import MAX_LOG
-from evoexp.store.kept_facts import kept_fact
 
 GIGABYTE = 1000 * MEGABYTE
 LEAST_RECORD = 250  # [B] of a generation in a log, without the paper's own terms
@@ -69,16 +66,6 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
 
 
 def _needs(condition: Condition) -> tuple[int, float]:
-    """Return the records of a replicate's log, and the planner's estimate of its memory [B].
-
-    Neither depends on the seed.
-    """
-
-    def find() -> list[float]:
-        planner, problem = condition.prepare()
-        return [planner.num_generations + 1, planner.memory(problem)]
-
-    config = json.loads(condition.to_json()) | {"seed": 0}
-    about = json.dumps(config, sort_keys=True).encode()
-    generations, memory = kept_fact("needs", about, component_modules(config), find)
-    return int(generations), float(memory)
+    """Return the records of a replicate's log, and the planner's estimate of its memory [B]."""
+    planner, problem = condition.prepare()
+    return planner.num_generations + 1, planner.memory(problem)

@@ -3,11 +3,11 @@
 import contextlib
 import functools
 import hashlib
+import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from evoexp.attachments import SHA256
-from evoexp.batch.compile_clock import Times, cpu_now, now
 from evoexp.collision.box_support import EXACT
 from evoexp.collision.certifier.certificate import Certificate
 from evoexp.condition import Condition
@@ -23,6 +23,21 @@ GENERATIONS = "generations"  # why a run ended that used all of them up
 BUDGET_SPENT = "collision queries"  # why a run ended whose next generation exceeds the budget
 EXACT_BOXES = "exact_boxes"  # the entry of a log's environment; logs without it are older
 HASHED = f'"{SHA256}"'.encode()  # stands in configurations that refer to files, and only there
+
+
+class Times(NamedTuple):
+    """Processor time and duration of something, or two readings of clocks."""
+
+    cpu_s: float  # [s]
+    wall_s: float  # [s]
+
+    def __sub__(self, earlier: "Times") -> "Times":
+        return Times(self.cpu_s - earlier.cpu_s, self.wall_s - earlier.wall_s)
+
+
+def now() -> Times:
+    """Return processor time and time of this process."""
+    return Times(time.process_time(), time.perf_counter())
 
 
 def run_replicate(
@@ -117,7 +132,7 @@ class _Replicate:
     def _log_together(self, run: Run, begun_s: float) -> "_Evolved":
         """Log generations many at a time; those of the last stretch wait."""
         first_feasible: int | None = None
-        for stretch in run.stretches(lambda: cpu_now() - begun_s):
+        for stretch in run.stretches(lambda: time.process_time() - begun_s):
             if self._waiting is not None:
                 self._log.write_stretch(self._waiting)
             self._waiting = stretch
@@ -206,7 +221,7 @@ def _log_each(
             ended = BUDGET_SPENT
             break
         last = generation
-        log.write(last, cpu_now() - begun_s)  # the planner knows nothing of files
+        log.write(last, time.process_time() - begun_s)  # the planner knows nothing of files
         if hear is not None:
             hear(last)
         if first_feasible is None and last.num_feasible > 0:

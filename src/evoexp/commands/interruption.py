@@ -7,7 +7,8 @@ The exception can be lost: Python drops those that are raised within callbacks o
 collector and of its imports, and a library may catch it with a bare `except:`. Closing can wait for
 somebody who is gone. A timer therefore raises it again where it is not under way any more, or where
 closing takes longer than `PATIENCE_S`; after `CLOSING_S` the signal ends the process as if nobody
-heard it. Nothing is lost by that: finished files are whole at any moment.
+heard it, which a shell tells by the same exit code. Nothing is lost by that: finished files are
+whole at any moment.
 """
 
 import os
@@ -19,7 +20,8 @@ from types import FrameType
 from typing import NoReturn
 
 PATIENCE_S = 3.0  # [s] that closing may take before what it waits for is interrupted, too
-CLOSING_S = 15.0  # [s] that closing may take at all, the end of the interpreter included
+CLOSING_S = 15.0  # [s] that closing may take at all
+ENDING_S = 3.0  # [s] that the interpreter may take to end: an interrupted thread may never do
 AGAIN_S = 0.25  # [s] between two looks whether the exception is still under way
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some systems lack the last one
 
@@ -68,7 +70,7 @@ class Interruption:
         if self.number is not None:
             for number in self._numbers:
                 signal.signal(number, signal.SIG_IGN)
-            signal.setitimer(signal.ITIMER_REAL, CLOSING_S)
+            signal.setitimer(signal.ITIMER_REAL, ENDING_S)
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
         if self.number is None and not self._has_ended:

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from evoexp.cli import main
-from evoexp.configuration import expansions
 from evoexp.configuration.search_path import find, options, origin
 from evoexp.store.log_reader import read_log
 from guests import on_path, write_distribution
@@ -110,24 +109,3 @@ def test_a_guests_planner_is_run_reproduced_and_reported(
     assert capsys.readouterr().err == (
         f"evoexp: {log}: needs my-planner 0.3, which is not installed\n"
     )
-
-
-def test_kept_expansions_follow_the_options_and_code_of_guests(
-    installed: Callable[..., int], site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
-    kept = tmp_path / "cache" / "expansions"
-
-    def count() -> int:
-        expansions.expand(RUN[1:])
-        return len(list(kept.iterdir()))
-
-    assert [count(), count()] == [1, 1]
-    option = site / "my_planner" / "conf" / "planner" / "my_planner.yaml"
-    option.write_text(option.read_text().replace("num_via_points: 20", "num_via_points: 21"))
-    assert [count(), count()] == [2, 2]
-    (site / "my_planner" / "planner.py").write_text(f"{PLANNER}\n# another\n")
-    assert [count(), count()] == [3, 3]
-    write_distribution(site, "other-guest", components={"other_guest": "other_guest:Other"})
-    with on_path(site):
-        assert [count(), count()] == [4, 4]

@@ -22,7 +22,6 @@ SHIPPED = "evoexp:"  # of paths
 PREFIX = "files/"  # of the names of such attachments in a log
 
 _contents: dict[str, bytes] = {}
-_origins: dict[str, set[str]] = {}  # SHA-256 → the paths that the content was read from, as given
 
 
 class MissingFile(EvoexpError):
@@ -111,14 +110,7 @@ def read(path: str, folders: Sequence[Path]) -> str:
     """
     places = [Path(path), *(folder / path for folder in folders)]
     found = next((place for place in places if place.exists()), Path(path))
-    sha256 = keep(read_bounded(found))
-    _origins.setdefault(sha256, set()).add(path)
-    return sha256
-
-
-def origins(sha256: str) -> list[str]:
-    """Return the paths from which `read` took a content; none if it came another way."""
-    return sorted(_origins.get(sha256, ()))
+    return keep(read_bounded(found))
 
 
 def attached(config: Any) -> dict[str, bytes]:

@@ -12,21 +12,14 @@ from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
-from evoexp.commands.frame_memory import called_in_one_piece
 from evoexp.commands.interruption import Interrupted, Interruption
 from evoexp.commands.memory_shortage import refuse_too_little, shortage
-from evoexp.commands.quick_end import leave, leave_at_once
-from evoexp.commands.standard_streams import (
-    OUTPUT,
-    complain,
-    open_streams,
-    settle_streams,
-    silence_output,
-)
+from evoexp.commands.standard_streams import OUTPUT, complain, open_streams, settle_streams
 from evoexp.errors import EvoexpError
 
 KEPT = "finished replicates are kept, the same command runs the others"
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  # full, or defective
+_OUTPUT_ERRORS = _DISK_ERRORS | {errno.EPIPE}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,33 +30,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signals, its standard streams and its temporary files are then ours.
     """
     interruption, is_process = Interruption(), arguments is None
-    if is_process:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
-        os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
-        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looked for in all packages
-        open_streams()
-        interruption.hear()
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        try:
-            code = called_in_one_piece(lambda: _run(words, is_process))
-        finally:
-            sys.stdout.flush()  # here, where an error is explained
         if is_process:
-            settle_streams()
-            interruption.end()
-            leave(code)
+            os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
+            os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
+            os.environ.setdefault(
+                "PYDANTIC_DISABLE_PLUGINS", "__all__"
+            )  # looked for in all packages
+            open_streams()
+            interruption.hear()
+        code = _run(words, is_process)
+        sys.stdout.flush()  # here, where an error is explained
         return code
     except BaseException as error:
         interruption.end()
-        try:
-            code = _explain(error, words, interruption)
-        finally:
-            interruption.leave()
-        if is_process and interruption.number is not None:
-            settle_streams()
-            leave_at_once(code)
-        return code
+        return _explain(error, words, interruption)
     finally:
         interruption.end()
         if is_process:
@@ -113,11 +95,10 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
         return 2
     if not isinstance(error, OSError) or error.errno is None:
         raise error
-    path = error.filename2 or error.filename
-    if path == OUTPUT:
-        silence_output()
-        if isinstance(error, BrokenPipeError):
-            return 0
+    is_output = error.errno in _OUTPUT_ERRORS and error.filename is None  # files are named
+    if is_output and isinstance(error, BrokenPipeError):
+        return 0
+    path = OUTPUT if is_output else error.filename2 or error.filename
     if error.errno not in _DISK_ERRORS:
         kept = ""
     complain(f"{path or 'the system refused a request'}: {error.strerror}{kept}")

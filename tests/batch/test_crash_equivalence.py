@@ -57,7 +57,7 @@ def strike(words: list[str], directory: Path, num_blows: int) -> None:
 
 
 def test_one_blow_of_each_kind(tmp_path: Path) -> None:
-    strike(command(FEW, 8), tmp_path, len(VICTIMS))
+    strike(command(FEW, 6), tmp_path, len(VICTIMS))
 
 
 @pytest.mark.matrix

@@ -6,7 +6,6 @@ killed. `EVOEXP_KILLS` names a file for a line about each.
 
 import os
 import random
-import signal
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -51,22 +50,20 @@ class Retried:
 
 
 @pytest.fixture
-def deaths(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int | None, int]]:
-    """Return the workers that died: number of the task, or None, and bytes received of its end."""
-    found: list[tuple[int | None, int]] = []
-    bury: Callable[[Workers, workers_module._Worker], None] = Workers._bury
+def deaths(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the bytes that were received of the result of each worker that died."""
+    found: list[int] = []
+    forget: Callable[[Workers, workers_module._Worker], None] = Workers._forget
 
     def noted(self: Workers, worker: workers_module._Worker) -> None:
-        found.append((worker.process, len(worker._received)))
-        bury(self, worker)
+        found.append(len(worker._received))
+        forget(self, worker)
 
-    monkeypatch.setattr(Workers, "_bury", noted)
+    monkeypatch.setattr(Workers, "_forget", noted)
     return found
 
 
-def test_every_batch_ends_and_nothing_differs(
-    deaths: list[tuple[int | None, int]], tmp_path: Path
-) -> None:
+def test_every_batch_ends_and_nothing_differs(deaths: list[int], tmp_path: Path) -> None:
     rng, lines, number = random.Random(SEED), list[str](), 0
     while len(deaths) < NUM_KILLS:
         before = len(deaths)
@@ -78,10 +75,10 @@ def test_every_batch_ends_and_nothing_differs(
         for task, (_, computed, digest) in zip(tasks, ended, strict=True):
             assert computed == content(task.number, task.size)
             lines.append(f"task {task.number}: {task.size} B, kill at {task.delay_s} s, {digest}")
-        new = [size for _, size in deaths[before:]]
+        new = deaths[before:]
         halves = ", ".join(f"{size} B" for size in new if size) or "none"
         lines.append(f"batch ended: {len(new)} kills, of half a message: {halves}")
-    halves = sum(1 for _, size in deaths if size)
+    halves = sum(1 for size in deaths if size)
     lines.append(
         f"{len(deaths)} kills, {halves} after half a message; all batches ended, no result differs"
     )
@@ -91,18 +88,17 @@ def test_every_batch_ends_and_nothing_differs(
 
 def test_half_a_message_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each worker is killed when the first bytes of its result have arrived."""
-    receive = workers_module._Worker.receive
+    messages = workers_module._Worker.messages
     struck = set[int]()
 
-    def receive_and_kill(worker: workers_module._Worker) -> bool:
-        has_said = receive(worker)
+    def receive_and_kill(worker: workers_module._Worker) -> list[Any]:
+        received = list(messages(worker))
         if worker.task is not None and (number := worker.task[1][0].number) not in struck:
             struck.add(number)
-            assert worker.process is not None
-            os.kill(worker.process, signal.SIGKILL)
-        return has_said
+            worker.kill()
+        return received
 
-    monkeypatch.setattr(workers_module._Worker, "receive", receive_and_kill)
+    monkeypatch.setattr(workers_module._Worker, "messages", receive_and_kill)
     tasks = [(Struck(number, 20 * MEGABYTE, None, None),) for number in range(4)]
     with Workers(2) as workers:
         ended = [(number, computed) for number, computed, _ in in_order(workers, work, tasks)]

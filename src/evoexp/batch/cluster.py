@@ -9,17 +9,17 @@ import hashlib
 import logging
 import socket
 import threading
-from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from evoexp.batch.fan_out import Bundles
+from evoexp.batch.fan_out import Replicates
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.batch.workers import Died
 from evoexp.errors import EvoexpError, printable
 from evoexp.version import __version__
 
@@ -41,8 +41,8 @@ def cluster_fan_out(
 ) -> Iterator[list[Outcome]]:
     """Run jobs on a cluster; yield outcomes as they come.
 
-    A worker that dies costs its own replicate one retry; so does a replicate that takes too long or
-    too much memory.
+    Replicates are run again as in `fan_out`. A scheduler blames whatever waits on a worker that
+    dies: the last time, a replicate runs beside no other.
 
     Args:
         jobs: The replicates.
@@ -58,93 +58,38 @@ def cluster_fan_out(
         must = "runner=dask needs distributed: pip install 'evoexp[cluster]'"
         raise ClusterError(must) from None
     with _client(distributed, settings) as client:
-        yield from _Spread(distributed, client, jobs, limits).outcomes()
+        yield from _outcomes(distributed, client, jobs, limits)
 
 
-class _Spread:
-    """Jobs on their way through a cluster."""
-
-    def __init__(
-        self, distributed: Any, client: Any, jobs: Sequence[Job], limits: ReplicateLimits
-    ) -> None:
-        self._distributed, self._client, self._limits = distributed, client, limits
-        self._waiting, self._in_flight = deque(jobs), dict[tuple[str, int], Job]()
-        self._num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-        self._bundles = Bundles(self._waiting, self._in_flight, self._num_workers)
-        self._sent: dict[str, list[Job]] = {}  # by the key of the task
-        self._alone: deque[Job] = deque()  # those that run once more, one per task
-        self._tried: set[tuple[str, int]] = set()
-        # A scheduler blames whatever waits on a worker that dies: whoever is blamed when it ran in
-        # a task of its own runs a last time, beside nothing.
-        self._blamed: deque[Job] = deque()
-        self._judged: set[tuple[str, int]] = set()
-        self._running: Any = distributed.as_completed(loop=client.loop)
-
-    def outcomes(self) -> Iterator[list[Outcome]]:
-        """Send tasks, and yield their outcomes."""
-        while self._send():
-            future = next(self._running)
-            bundle = self._sent.pop(future.key)
-            try:
-                done = future.result()
-            except self._distributed.scheduler.KilledWorker as error:
-                yield list(self._after_death(bundle, str(error).splitlines()[0]))
-                continue
-            except OtherCode as error:
-                raise ClusterError(str(error)) from None
-            except (ModuleNotFoundError, self._distributed.CancelledError) as error:
-                reason = printable(str(error).splitlines()[0])
-                raise ClusterError(
-                    f"runner.address: a worker cannot run evoexp: {reason}"
-                ) from None
-            finally:
-                future.release()
-            if len(bundle) > 1 or bundle[0].key not in self._tried:
-                self._bundles.took(done)
-            yield list(self._final(done, {job.key: job for job in bundle}))
-
-    def _send(self) -> bool:
-        """Keep every worker busy; return whether anything runs."""
-        while len(self._sent) < AHEAD * self._num_workers:
-            bundle = next(iter(self._bundles), None)
-            if bundle is None and self._alone:
-                bundle = [self._alone.popleft()]
-            if bundle is None and self._blamed and not self._sent:
-                bundle = [self._blamed.popleft()]
-                self._judged.add(bundle[0].key)
-            if bundle is None:
-                break
-            future = self._client.submit(
-                run_checked, code_identity(), bundle, self._limits, pure=False, retries=0
-            )
-            self._sent[future.key] = bundle
-            self._running.add(future)
-        return bool(self._sent)
-
-    def _final(
-        self, done: Sequence[Outcome], jobs: dict[tuple[str, int], Job]
-    ) -> Iterator[Outcome]:
-        """Yield the outcomes that stand; what may pass another time waits for it."""
-        for outcome in done:
-            if outcome.may_pass and outcome.key not in self._tried:
-                self._tried.add(outcome.key)
-                self._alone.append(jobs[outcome.key])
-            else:
-                yield outcome
-
-    def _after_death(self, bundle: list[Job], reason: str) -> Iterator[Outcome]:
-        """Let the jobs of a task whose workers died run alone; yield the one that killed them."""
-        if bundle[0].key not in self._tried:
-            self._bundles.lost(bundle)
-        for job in bundle:
-            if job.key in self._tried and job.key not in self._judged:
-                self._blamed.append(job)
-            elif job.key in self._judged:
-                text = "worker process died twice"
-                yield Outcome(job.condition_id, job.replicate, text, reason, b"", 0.0)
-            else:
-                self._tried.add(job.key)
-                self._alone.append(job)
+def _outcomes(
+    distributed: Any, client: Any, jobs: Sequence[Job], limits: ReplicateLimits
+) -> Iterator[list[Outcome]]:
+    num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+    replicates = Replicates(jobs, num_workers, limits)
+    sent: dict[str, tuple[list[Job]]] = {}  # by the key of the task
+    running: Any = distributed.as_completed(loop=client.loop)
+    while True:
+        while len(sent) < AHEAD * num_workers and (task := replicates.next_task(len(sent))):
+            arguments = (code_identity(), *task, limits)
+            future = client.submit(run_checked, *arguments, pure=False, retries=0)
+            sent[future.key] = task
+            running.add(future)
+        if not sent:
+            return
+        future = next(running)
+        try:
+            end = future.result()
+        except distributed.scheduler.KilledWorker:
+            end = Died(0.0)  # the scheduler does not tell when it began
+        except OtherCode as error:
+            raise ClusterError(str(error)) from None
+        except (ModuleNotFoundError, distributed.CancelledError) as error:
+            reason = printable(str(error).splitlines()[0])
+            raise ClusterError(f"runner.address: a worker cannot run evoexp: {reason}") from None
+        finally:
+            future.release()
+        if outcomes := replicates.end_task(sent.pop(future.key), end):
+            yield outcomes
 
 
 def run_checked(code: str, jobs: Sequence[Job], limits: ReplicateLimits) -> list[Outcome]:

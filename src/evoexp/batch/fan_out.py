@@ -39,15 +39,22 @@ def fan_out(
             yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
     run = partial(run_jobs, limits=limits, in_worker=True, curves=curves)
-    yield from workers.results(run, _Replicates(jobs, workers.number, limits))
+    yield from workers.results(run, Replicates(jobs, workers.number, limits))
 
 
-class _Replicates:
-    """Jobs on their way through workers."""
+class Replicates:
+    """Jobs on their way through workers, of this machine or of a cluster."""
 
     def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
+        """Let all of them wait.
+
+        Args:
+            jobs: The replicates.
+            num_workers: Tasks that are done at the same time.
+            limits: Of each replicate.
+        """
         self._limits, self._waiting = limits, deque(jobs)
-        self._bundles = Bundles(self._waiting, {}, num_workers)
+        self._bundles = Bundles(self._waiting, num_workers)
         self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
         self._last: deque[Job] = deque()  # to be run a last time
         self._bundled_no_more: set[tuple[str, int]] = set()  # suspects, and those of a last time
@@ -66,11 +73,9 @@ class _Replicates:
         (jobs,) = task
         is_bundle = jobs[0].key not in self._bundled_no_more
         if isinstance(end, Died):
-            if is_bundle:
-                self._bundles.lost(jobs)
             return self._after_death(jobs, end.seconds)
         if is_bundle:
-            self._bundles.took(end)
+            self._bundles.took(jobs, end)
         final = []
         for job, outcome in zip(jobs, end, strict=False):  # the other jobs have not begun
             if outcome.may_pass and job.key not in self._tried_last:
@@ -108,11 +113,14 @@ class Bundles:
     same library stand together, and are best run where it is loaded.
     """
 
-    def __init__(
-        self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int
-    ) -> None:
-        self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
-        self._bundles: dict[tuple[str, int], list[Job]] = {}  # those in flight, by their first jobs
+    def __init__(self, waiting: deque[Job], num_workers: int) -> None:
+        """Begin without times.
+
+        Args:
+            waiting: The jobs; those of a bundle are taken out.
+            num_workers: Tasks that are done at the same time.
+        """
+        self._waiting, self._num_workers = waiting, num_workers
         self._seconds, self._count = 0.0, 0.0
 
     def __iter__(self) -> Iterator[list[Job]]:
@@ -120,29 +128,13 @@ class Bundles:
             mean = self._seconds / self._count if self._count else 0.0
             fair = -(-len(self._waiting) // (2 * self._num_workers))
             size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
-            bundle = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
-            for job in bundle:
-                self._in_flight[job.key] = job
-            self._bundles[bundle[0].key] = bundle
-            yield bundle
+            yield [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
 
-    def took(self, outcomes: Sequence[Outcome]) -> None:
+    def took(self, bundle: Sequence[Job], outcomes: Sequence[Outcome]) -> None:
         """Note the outcomes of a task; jobs that it did not begin wait again.
 
         Earlier times count half from now on, so that slow first jobs are soon forgotten.
         """
-        left = self._bundles.pop((outcomes[0].condition_id, outcomes[0].replicate))[len(outcomes) :]
-        for job in reversed(left):
-            del self._in_flight[job.key]
-            self._waiting.appendleft(job)
-        self._seconds, self._count = self._seconds / 2.0, self._count / 2.0
-        for outcome in outcomes:
-            self._seconds += outcome.wall_s
-            self._count += 1
-            self._in_flight.pop((outcome.condition_id, outcome.replicate), None)
-
-    def lost(self, bundle: Sequence[Job]) -> None:
-        """Forget a task whose jobs are run in another way."""
-        self._bundles.pop(bundle[0].key)
-        for job in bundle:
-            self._in_flight.pop(job.key, None)
+        self._waiting.extendleft(reversed(bundle[len(outcomes) :]))
+        self._seconds = self._seconds / 2.0 + sum(outcome.wall_s for outcome in outcomes)
+        self._count = self._count / 2.0 + len(outcomes)

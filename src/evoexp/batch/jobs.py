@@ -1,6 +1,5 @@
 """Replicates as tasks of worker processes: a `Job` goes out, an `Outcome` comes back."""
 
-import contextlib
 import functools
 import time
 import traceback
@@ -128,14 +127,6 @@ def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | 
 
 def _heard(curves: Path | None, job: Job) -> Callable[[Block], None] | None:
     return None if curves is None else CurveFile(curves, *job.key).hear
-
-
-def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
-    """Load the code and the compiled kernels of conditions; their jobs report what fails."""
-    keep_all(files)
-    for config_json in config_jsons:
-        with contextlib.suppress(Exception):
-            _condition(config_json).prepare()
 
 
 @functools.lru_cache(maxsize=64)

@@ -84,10 +84,11 @@ def _in_time(limits: ReplicateLimits, in_worker: bool) -> Iterator[None]:
         try:
             yield
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            if signal.getsignal(signal.SIGALRM) is tell:  # else an interruption has the timer now
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
+                signal.signal(signal.SIGALRM, before)
             if in_worker:
                 faulthandler.cancel_dump_traceback_later()
-            signal.signal(signal.SIGALRM, before)
 
 
 @contextlib.contextmanager

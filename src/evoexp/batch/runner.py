@@ -5,19 +5,18 @@ mark of completion, so an interrupted batch is resumed by asking for it again.
 """
 
 import contextlib
-import json
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from evoexp.batch.jobs import Job, Outcome
-from evoexp.batch.known_times import LongestTimes, are_short
 from evoexp.batch.memory_limit import GIGABYTE, allowed_memory, refuse_large
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.batch.warm_kernels import warm_kernels
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
-from evoexp.registry import component_modules, guests
+from evoexp.registry import guests
 from evoexp.store.identity import MANIFEST, restored_manifest
 from evoexp.store.integrity import lost_replicates, mend, needs_mending
 from evoexp.store.manifest import manifest
@@ -59,7 +58,6 @@ class Batch:
             curves: Folder for the convergence of replicates while they run; None: it is not told.
         """
         self._curves = curves
-        self._workers: Workers | None = None
         self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
@@ -101,35 +99,21 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
-        from evoexp.batch.first_compilation import compile_all, load_and_compile
-
-        with lock_all(self.runs.values()), contextlib.ExitStack() as stack:
+        with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
             for key, run in self.runs.items():
                 condition, count, _ = self._wanted[key]
                 mend(run, condition.to_json(), lost[key] | set(range(count)))
             self.jobs = self._missing(lost)
-            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
-            files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
-            workers = self._workers or stack.enter_context(self.workers())
-            if workers is not None:
-                workers.start(load_and_compile, config_jsons, files)
-            wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
-            create_all(
-                (run, text, _manifest(run, text) | notes, own.files())
-                for run, own, _, notes in wanted
-                for text in (own.to_json(),)
-            )
-            for key in dict.fromkeys(job.condition_id for job in self.jobs):
-                self.runs[key].note_plan(self._wanted[key][1])
-            if self._settings.address is None:  # else the workers are elsewhere
-                compile_all(config_jsons)
-            times = LongestTimes()
             try:
-                for outcomes in self._spread(workers):
-                    times.add(outcomes)
-                    yield from self._store(outcomes)
-                times.keep({key: each[0].to_json() for key, each in self._wanted.items()})
+                with self._workers() as workers:  # they end first of all, however the body ends
+                    self._create_runs()
+                    if self._settings.address is None:  # else the workers are elsewhere
+                        missing = dict.fromkeys(job.condition_id for job in self.jobs)
+                        conditions = (self._wanted[key][0] for key in missing)
+                        warm_kernels(conditions, self._limits())
+                    for outcomes in self._spread(workers):
+                        yield from self._store(outcomes)
             except OSError:  # a full disk: the table can be built from the logs at any time
                 raise
             except BaseException:
@@ -138,27 +122,24 @@ class Batch:
                 raise
             self._summarise_all()
 
-    @contextlib.contextmanager
-    def workers(self) -> Iterator["Workers | None"]:
-        """Have worker processes for `run` while the body runs: they load libraries meanwhile.
-
-        None where there is one worker, or where a cluster starts them.
-        """
+    def _workers(self) -> "contextlib.AbstractContextManager[Workers | None]":
+        """Return worker processes; None where there is one, or where a cluster starts them."""
         if self.num_workers == 1 or self._settings.backend == "dask":
-            yield None
-            return
+            return contextlib.nullcontext()
         from evoexp.batch.workers import Workers
 
-        texts = dict.fromkeys(job.condition_json for job in self.jobs)
-        modules = dict.fromkeys(
-            name for text in texts for name in component_modules(json.loads(text))
+        return Workers(self.num_workers)
+
+    def _create_runs(self) -> None:
+        """Write the directories of new runs, and the number of replicates that is planned."""
+        wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
+        create_all(
+            (run, text, _manifest(run, text) | notes, own.files())
+            for run, own, _, notes in wanted
+            for text in (own.to_json(),)
         )
-        ours = [name for name in modules if name.startswith("evoexp.")]  # none of a guest's
-        with Workers(self.num_workers, ours) as self._workers:
-            try:
-                yield self._workers
-            finally:
-                self._workers = None
+        for key in dict.fromkeys(job.condition_id for job in self.jobs):
+            self.runs[key].note_plan(self._wanted[key][1])
 
     def _spread(self, workers: "Workers | None") -> Iterator[list[Outcome]]:
         """Run the jobs where the settings say."""
@@ -174,12 +155,9 @@ class Batch:
     @property
     def num_workers(self) -> int:
         """Number of worker processes; 1: the replicates are run by this process."""
-        asked = self._settings.num_workers
-        if asked is None and self._settings.backend == "loky" and are_short(self.jobs):
-            return 1
         from evoexp.batch.workers import num_cores  # and joblib
 
-        return max(1, min(asked or num_cores(), len(self.jobs)))
+        return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
 
     @property
     def num_left_failed(self) -> int:

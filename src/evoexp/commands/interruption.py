@@ -1,16 +1,16 @@
 """Ctrl-C, SIGTERM and a terminal that closes: each ends a command in the same orderly way.
 
 The first signal raises `Interrupted`, by which everything is closed that a command has open. While
-that lasts, further signals do nothing: whoever presses Ctrl-C again disturbs nothing. If it takes
-longer than `PATIENCE_S`, the next one ends the process at once; if it takes longer than
-`CLOSING_S`, as where a library waits for a task that never ends, no further one is needed. Nothing
-is lost by that: finished files are whole at any moment.
+that lasts, further signals do nothing: whoever presses Ctrl-C again disturbs nothing.
 
-A library may catch the exception with a bare `except:` and go on. A timer therefore looks whether
-the exception is still under way, and raises another one if not.
+The exception can be lost: Python drops those that are raised within callbacks of its garbage
+collector and of its imports, and a library may catch it with a bare `except:`. Closing can wait for
+somebody who is gone. A timer therefore raises it again where it is not under way any more, or where
+closing takes longer than `PATIENCE_S`; after `CLOSING_S` the signal ends the process as if nobody
+heard it, which a shell tells by the same exit code. Nothing is lost by that: finished files are
+whole at any moment.
 """
 
-import contextlib
 import os
 import signal
 import sys
@@ -19,8 +19,9 @@ import time
 from types import FrameType
 from typing import NoReturn
 
-PATIENCE_S = 5.0  # [s] that closing may take before a further signal ends the process at once
+PATIENCE_S = 3.0  # [s] that closing may take before what it waits for is interrupted, too
 CLOSING_S = 15.0  # [s] that closing may take at all
+ENDING_S = 3.0  # [s] that the interpreter may take to end: an interrupted thread may never do
 AGAIN_S = 0.25  # [s] between two looks whether the exception is still under way
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some systems lack the last one
 
@@ -39,8 +40,8 @@ class Interruption:
     def __init__(self) -> None:
         """Hear nothing yet."""
         self.number: int | None = None
-        self._since = 0.0  # when it was heard
-        self._ended = False  # whether the command did
+        self._since = self._raised = 0.0  # when it was heard, and `Interrupted` raised last [s]
+        self._has_ended = False  # whether the command did
         self._numbers: list[int] = []
 
     @property
@@ -53,60 +54,49 @@ class Interruption:
         for name in _NAMES:
             number = getattr(signal, name, None)
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-                signal.signal(number, self._heard)
+                signal.signal(number, self._hear)
                 self._numbers.append(number)
-        # What a callback cannot raise is printed elsewhere; this is raised again instead, and what
-        # a library's destructors and threads say of their interrupted work helps nobody.
-        unraised, printed, told = sys.unraisablehook, sys.excepthook, threading.excepthook
-        sys.unraisablehook = lambda it: None if self.number is not None else unraised(it)
-        threading.excepthook = lambda it: None if self.number is not None else told(it)
-        sys.excepthook = lambda *it: None if it[0] is Interrupted else printed(*it)
+        # what callbacks and threads of libraries say of their interrupted work helps nobody
+        in_callback, in_thread = sys.unraisablehook, threading.excepthook
+        sys.unraisablehook = lambda it: None if self.number is not None else in_callback(it)
+        threading.excepthook = lambda it: None if self.number is not None else in_thread(it)
 
     def end(self) -> None:
-        """Raise nothing any more: the command has ended, and the process soon will."""
-        if self._ended:
-            return
-        self._ended = True
-        if self.number is not None and hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        """Raise nothing any more: the command has ended, and the process soon will.
 
-    def leave(self) -> None:
-        """Ignore signals while the interpreter ends: one more would change the exit code.
-
-        After a signal it may take `CLOSING_S` at most, whatever libraries wait for.
+        After a signal, further ones are ignored: they would change the exit code.
         """
-        for number in self._numbers:
-            signal.signal(number, signal.SIG_IGN)
-        if self.number is not None and hasattr(signal, "setitimer"):
-            signal.signal(signal.SIGALRM, lambda number, frame: self._leave_at_once())
-            signal.setitimer(signal.ITIMER_REAL, CLOSING_S)
+        self._has_ended = True
+        if self.number is not None:
+            for number in self._numbers:
+                signal.signal(number, signal.SIG_IGN)
+            signal.setitimer(signal.ITIMER_REAL, ENDING_S)
 
-    def _heard(self, number: int, frame: FrameType | None) -> None:
-        if self.number is None and not self._ended:
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        if self.number is None and not self._has_ended:
             self.number, self._since = number, time.monotonic()
-            if hasattr(signal, "setitimer"):
-                signal.signal(signal.SIGALRM, self._look)
-                signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
-            raise Interrupted
-        if self._since and time.monotonic() - self._since > PATIENCE_S:
-            self._leave_at_once()
-        self._look(number, frame)
-
-    def _leave_at_once(self) -> NoReturn:
-        """End the process; its workers end with it."""
-        shown_cursor = "\x1b[?25h" if sys.stderr.isatty() else ""
-        with contextlib.suppress(OSError):
-            os.write(2, f"{shown_cursor}\nevoexp: interrupted\n".encode())
-        os._exit(self.exit_code)
+            signal.signal(signal.SIGALRM, self._look)
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+            self._raise()
 
     def _look(self, number: int, frame: FrameType | None) -> None:
-        """Raise again if the exception was caught somewhere and the command goes on."""
-        if self.number is None or self._ended:
-            return
-        if time.monotonic() - self._since > CLOSING_S:
-            self._leave_at_once()
-        error = sys.exception()
-        while error is not None and not isinstance(error, Interrupted):
-            error = error.__context__
-        if error is None:
-            raise Interrupted
+        """Raise again if the exception was lost, or if closing takes too long."""
+        assert self.number is not None, "the timer runs after a signal"
+        now = time.monotonic()
+        if self._has_ended or now - self._since > CLOSING_S:
+            signal.signal(self.number, signal.SIG_DFL)
+            os.kill(os.getpid(), self.number)
+        elif now - self._raised > PATIENCE_S or not _is_under_way():
+            self._raise()
+
+    def _raise(self) -> NoReturn:
+        self._raised = time.monotonic()
+        raise Interrupted
+
+
+def _is_under_way() -> bool:
+    """Return whether the exception, or one that was raised while it was handled, is handled now."""
+    error = sys.exception()
+    while error is not None and not isinstance(error, Interrupted):
+        error = error.__context__
+    return error is not None

@@ -74,10 +74,9 @@ def main(arguments: argparse.Namespace) -> int:
         batch = Batch(
             wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
         )
-        with batch.workers():
-            batch.prepare()
-            left = batch.num_left_failed
-            failures = _run(batch, wanted, console, curves)
+        batch.prepare()
+        left = batch.num_left_failed
+        failures = _run(batch, wanted, console, curves)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         console.print(

@@ -1,0 +1,40 @@
+"""Compiles the kernels of conditions, or loads them, before their replicates are timed.
+
+Each kind of condition searches for two generations and judges a motion. The workers, which start
+meanwhile, find the compiled kernels in the user's cache.
+"""
+
+import contextlib
+import itertools
+import re
+from collections.abc import Iterable
+
+from evoexp.batch.replicate_limits import ReplicateLimits, limited
+from evoexp.condition import Condition
+
+_NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+
+
+def warm_kernels(conditions: Iterable[Condition], limits: ReplicateLimits) -> None:
+    """Run every kernel that some conditions need; errors are left to the replicates."""
+    # conditions that differ in numbers only need the same kernels
+    kinds = {_NUMBER.sub("0", each.to_json().decode()): each for each in conditions}
+    for condition in kinds.values():
+        with contextlib.suppress(Exception), limited(limits, in_worker=False):
+            _warm(condition)
+
+
+def _warm(condition: Condition) -> None:
+    from evoexp.paths.motion import Motion  # and numba
+    from evoexp.planners.proofs import judge_motion
+
+    planner, problem = condition.prepare()
+    # a reference takes long; it needs the kernels of the planner beside it
+    searching = planner.planner if condition.is_reference else planner
+    generations = itertools.islice(searching.evolve(problem, condition.rng(0)), 2)
+    *_, solution = [generation.best.copy() for generation in generations]
+    searching.evaluate(problem, solution)
+    motion = searching.motion(problem, solution)
+    judge_motion(searching, problem, motion)
+    if motion is not None:  # one that touches nothing needs the kernels of the closest approach
+        judge_motion(searching, problem, Motion(motion.q[[0, 0]]))

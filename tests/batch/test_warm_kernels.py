@@ -1,0 +1,33 @@
+"""Kernels are warmed once per kind of condition, and what fails is left to the replicates."""
+
+import time
+
+import pytest
+from faulty_planner import Faulty
+
+from evoexp.batch.replicate_limits import ReplicateLimits
+from evoexp.batch.warm_kernels import warm_kernels
+from evoexp.condition import Condition
+
+
+def test_conditions_that_differ_in_numbers_are_one_kind(
+    faulty: Condition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched = []
+    evolve = Faulty.evolve
+    monkeypatch.setattr(
+        Faulty, "evolve", lambda *given: (searched.append(given), evolve(*given))[1]
+    )
+    others = [faulty._replace(seed=seed) for seed in range(1, 4)]
+    warm_kernels([faulty, *others], ReplicateLimits())
+    assert len(searched) == 1
+
+
+@pytest.mark.parametrize("fault", ["raise:0", "slow:0"])
+def test_what_fails_or_takes_too_long_is_left_to_the_replicates(
+    fault: str, faulty: Condition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAULTY", fault)
+    begun = time.monotonic()
+    warm_kernels([faulty], ReplicateLimits(timeout_s=1.0))
+    assert time.monotonic() - begun < 60.0

@@ -20,39 +20,26 @@ HALVINGS = 8  # of a parabola, before the motion stops at its corner
 
 
 class BlendedMotion(NamedTuple):
-    """A motion without corners, or with fewer.
+    """A motion without corners, or with fewer."""
 
-    Attributes:
-        motion: Lines and parabolas.
-        lengths: (segments,) way along each, measured in times at the joints' greatest speeds [s];
-            the derivative of q with respect to this way is continuous except at `stops`.
-        stops: Instants, between the first and the last, at which the motion has to stop.
-        parts: Pieces with bodies of their own, in instants of `motion`.
-        num_corners: Corners that were rounded.
-        verdict: Of the rounded motion.
-    """
-
-    motion: Motion
+    motion: Motion  # lines and parabolas
+    # (segments,) way along each, measured in times at the joints' greatest speeds [s]; the
+    # derivative of q with respect to this way is continuous except at `stops`
     lengths: FloatArray
+    # Instants, between the first and the last, at which the motion has to stop
     stops: tuple[int, ...]
-    parts: tuple[Part, ...]
-    num_corners: int
-    verdict: Certificate
+    parts: tuple[Part, ...]  # pieces with bodies of their own, in instants of `motion`
+    num_corners: int  # corners that were rounded
+    verdict: Certificate  # of the rounded motion
 
 
 class _Corners(NamedTuple):
-    """A motion of straight lines that all have a length.
+    """A motion of straight lines that all have a length."""
 
-    Attributes:
-        q: (instants, nq).
-        lengths: (segments,) of the lines, in units of greatest speeds [s].
-        instants: (instants,) numbers in the motion that was given.
-        rounded: (instants,) half of the way that each parabola replaces [s]; 0 at ends and stops.
-    """
-
-    q: FloatArray
-    lengths: FloatArray
-    instants: list[int]
+    q: FloatArray  # (instants, nq)
+    lengths: FloatArray  # (segments,) of the lines, in units of greatest speeds [s]
+    instants: list[int]  # (instants,) numbers in the motion that was given
+    # (instants,) half of the way that each parabola replaces [s]; 0 at ends and stops
     rounded: FloatArray
 
 

@@ -24,31 +24,19 @@ class LimitsFileError(EvoexpError):
 
 
 class JointLimits(NamedTuple):
-    """Greatest rates of every joint; inf: none.
+    """Greatest rates of every joint; inf: none."""
 
-    Attributes:
-        velocity: (nq,) [rad/s or length unit/s].
-        acceleration: (nq,) [rad/s² or length unit/s²].
-        jerk: (nq,) [rad/s³ or length unit/s³].
-    """
-
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
+    velocity: FloatArray  # (nq,) [rad/s or length unit/s]
+    acceleration: FloatArray  # (nq,) [rad/s² or length unit/s²]
+    jerk: FloatArray  # (nq,) [rad/s³ or length unit/s³]
 
 
 class Defaults(NamedTuple):
-    """Limits of the joints that neither the file nor the robot limits.
+    """Limits of the joints that neither the file nor the robot limits."""
 
-    Attributes:
-        velocity: (nq,) greatest |dq/dt| [rad/s or length unit/s].
-        robot: (nq,) the robot's own velocity limits; inf where it has none.
-        ramp: Time from rest to the greatest speed [s], which limits accelerations.
-    """
-
-    velocity: FloatArray
-    robot: FloatArray
-    ramp: float
+    velocity: FloatArray  # (nq,) greatest |dq/dt| [rad/s or length unit/s]
+    robot: FloatArray  # (nq,) the robot's own velocity limits; inf where it has none
+    ramp: float  # time from rest to the greatest speed [s], which limits accelerations
 
 
 def joint_limits(names: tuple[str, ...], path: Path | None, defaults: Defaults) -> JointLimits:

@@ -9,15 +9,10 @@ from evoexp.records import FloatArray
 
 
 class SpeedLimits(NamedTuple):
-    """Speed limits of joints, which no paper prints.
+    """Speed limits of joints, which no paper prints."""
 
-    Attributes:
-        turn: Limit of revolute joints [rad/s].
-        slide: Limit of prismatic joints [length unit/s]; None: a quarter of the scene's size per
-            second.
-    """
-
-    turn: float = np.pi / 4.0
+    turn: float = np.pi / 4.0  # limit of revolute joints [rad/s]
+    # Limit of prismatic joints [length unit/s]; None: a quarter of the scene's size per second
     slide: float | None = None
 
     def of(self, prismatic: np.ndarray, size: float) -> FloatArray:

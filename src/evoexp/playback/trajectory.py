@@ -41,28 +41,18 @@ class BadTiming(EvoexpError):
 
 
 class Trajectory(NamedTuple):
-    """The points of a motion in time.
+    """The points of a motion in time."""
 
-    Attributes:
-        joints: (nq) names of the joints.
-        units: (nq) units of the coordinates: rad, or the scene's unit of length.
-        times: (points,) from the start [s].
-        positions: (points, nq) [rad or length unit].
-        velocities: (points, nq) per second; None: straight from point to point.
-        interpolation: Degree of the polynomials that a controller puts between the points; quintic:
-            accelerations are 0 at every point.
-        verdict: The certifier's, on the motion that is executed.
-        num_corners: Corners that were rounded.
-    """
-
-    joints: tuple[str, ...]
-    units: tuple[str, ...]
-    times: FloatArray
-    positions: FloatArray
-    velocities: FloatArray | None
+    joints: tuple[str, ...]  # (nq) names of the joints
+    units: tuple[str, ...]  # (nq) units of the coordinates: rad, or the scene's unit of length
+    times: FloatArray  # (points,) from the start [s]
+    positions: FloatArray  # (points, nq) [rad or length unit]
+    velocities: FloatArray | None  # (points, nq) per second; None: straight from point to point
+    # Degree of the polynomials that a controller puts between the points; quintic: accelerations
+    # are 0 at every point
     interpolation: Interpolation
-    verdict: Certificate
-    num_corners: int = 0
+    verdict: Certificate  # the certifier's, on the motion that is executed
+    num_corners: int = 0  # corners that were rounded
 
     def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the greatest speed, acceleration and jerk of every joint, each (nq,).

@@ -37,43 +37,26 @@ _WORD = re.compile(r"[A-Za-z]+|°")
 
 
 class Values(NamedTuple):
-    """Positions or velocities of one joint, or the numbers of a column.
+    """Positions or velocities of one joint, or the numbers of a column."""
 
-    Attributes:
-        numbers: (points,) in the unit, of velocities per second.
-        unit: As the file has it; empty: it names none.
-    """
-
-    numbers: FloatArray
-    unit: str = ""
+    numbers: FloatArray  # (points,) in the unit, of velocities per second
+    unit: str = ""  # as the file has it; empty: it names none
 
 
 class JointTrajectory(NamedTuple):
-    """A joint trajectory as a file has it.
+    """A joint trajectory as a file has it."""
 
-    Attributes:
-        positions: By joint.
-        velocities: By joint; none if the file has none.
-        times: (points,) [s]; None: the file has none.
-        unread: Names of what is not read.
-    """
-
-    positions: dict[str, Values]
-    velocities: dict[str, Values]
-    times: FloatArray | None
-    unread: tuple[str, ...] = ()
+    positions: dict[str, Values]  # by joint
+    velocities: dict[str, Values]  # by joint; none if the file has none
+    times: FloatArray | None  # (points,) [s]; None: the file has none
+    unread: tuple[str, ...] = ()  # names of what is not read
 
 
 class Columns(NamedTuple):
-    """The columns of a table, which a robot's joints turn into a trajectory.
+    """The columns of a table, which a robot's joints turn into a trajectory."""
 
-    Attributes:
-        numbers: (points,) by head.
-        times: (points,) [s]; None: the file has none.
-    """
-
-    numbers: dict[str, FloatArray]
-    times: FloatArray | None
+    numbers: dict[str, FloatArray]  # (points,) by head
+    times: FloatArray | None  # (points,) [s]; None: the file has none
 
 
 def read_columns(content: bytes) -> Columns:

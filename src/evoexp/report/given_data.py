@@ -24,37 +24,22 @@ MOST = 10**18  # seeds and queries stay below
 
 
 class GivenAnswer(NamedTuple):
-    """A row of the file.
+    """A row of the file."""
 
-    Attributes:
-        line: Number of the line in the file, from 1.
-        planner: Its name.
-        problem: Name of the problem.
-        seed: Of the run.
-        queries: Configurations that the run had judged for collision so far.
-        cost: Length of the path [rad, m]; NaN: no answer, the whole run has spent that much.
-    """
-
-    line: int
-    planner: str
-    problem: str
-    seed: int
-    queries: int
-    cost: float
+    line: int  # number of the line in the file, from 1
+    planner: str  # its name
+    problem: str  # name of the problem
+    seed: int  # of the run
+    queries: int  # configurations that the run had judged for collision so far
+    cost: float  # length of the path [rad, m]; NaN: no answer, the whole run has spent that much
 
 
 class GivenData(NamedTuple):
-    """A file's content.
+    """A file's content."""
 
-    Attributes:
-        name: Of the file.
-        sha256: Of its bytes, 64 hex digits.
-        answers: Its rows, in order.
-    """
-
-    name: str
-    sha256: str
-    answers: tuple[GivenAnswer, ...]
+    name: str  # of the file
+    sha256: str  # of its bytes, 64 hex digits
+    answers: tuple[GivenAnswer, ...]  # its rows, in order
 
 
 def read_given(path: str) -> GivenData:

@@ -17,17 +17,11 @@ ONLY_CONTROLS = "only a control was run"
 
 
 class Hearing(NamedTuple):
-    """One claim before its judge: each method judges it by one kind of rule.
+    """One claim before its judge: each method judges it by one kind of rule."""
 
-    Attributes:
-        rule: Of the claim, its words filled in.
-        reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
-        significance: Below this adjusted p-value a difference counts.
-    """
-
-    rule: Rule
-    reason: str
-    significance: float
+    rule: Rule  # of the claim, its words filled in
+    reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
+    significance: float  # below this adjusted p-value a difference counts
 
     def every(self, evidence: str, holds: int, done: int, planned: int) -> Claim:
         """Judge a claim about every run; see `verdicts.judge_all`."""
@@ -118,17 +112,11 @@ def _seeds(rows: Sequence[Comparison]) -> str:
 
 
 class Judge(NamedTuple):
-    """Opens the hearings of claims; where nothing is judged, each claim names the reason instead.
+    """Opens the hearings of claims; where nothing is judged, each claim names the reason."""
 
-    Attributes:
-        reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
-        significance: Below this adjusted p-value a difference counts.
-        rules: Of the paper's claims, by name.
-    """
-
-    reason: str
-    significance: float
-    rules: Rules = NO_RULES
+    reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
+    significance: float  # below this adjusted p-value a difference counts
+    rules: Rules = NO_RULES  # of the paper's claims, by name
 
     def on(self, name: str, **words: object) -> Hearing:
         """Open the hearing of a claim.

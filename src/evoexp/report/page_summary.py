@@ -18,31 +18,19 @@ _MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
 
 
 class ReportSummary(NamedTuple):
-    """A report that is there.
+    """A report that is there."""
 
-    Attributes:
-        folder: Its name under `reports`.
-        file: Its page in the folder.
-        title: Heading.
-        command: That draws it, without `evoexp`; empty where it is not known.
-        partial: The remark that results are missing; empty if none is.
-        failed: Number of failed replicates.
-        headings: (text, place on the page) of its sections and figures.
-        claims: (text, verdict).
-        runs: (hash, label) of its conditions, twelve hex digits.
-        picture: File of the figure that shows best what it is about; empty if there is none.
-    """
-
-    folder: str
-    file: str
-    title: str
-    command: str = ""
-    partial: str = ""
-    failed: int = 0
+    folder: str  # its name under `reports`
+    file: str  # its page in the folder
+    title: str  # heading
+    command: str = ""  # that draws it, without `evoexp`; empty where it is not known
+    partial: str = ""  # the remark that results are missing; empty if none is
+    failed: int = 0  # number of failed replicates
+    # (text, place on the page) of its sections and figures
     headings: tuple[tuple[str, str], ...] = ()
-    claims: tuple[tuple[str, str], ...] = ()
-    runs: tuple[tuple[str, str], ...] = ()
-    picture: str = ""
+    claims: tuple[tuple[str, str], ...] = ()  # (text, verdict)
+    runs: tuple[tuple[str, str], ...] = ()  # (hash, label) of its conditions, twelve hex digits
+    picture: str = ""  # file of the figure that shows best what it is about; empty if there is none
 
     @property
     def experiment(self) -> str:

@@ -23,17 +23,11 @@ _PACKAGE = Path(__file__).parents[1]
 
 
 class StandingReport(NamedTuple):
-    """A report that may stand.
+    """A report that may stand."""
 
-    Attributes:
-        directory: Its folder.
-        asked: What it was asked for in, words and identities that it follows from.
-        inputs: Hash of all else that it follows from, as it was before it was drawn.
-    """
-
-    directory: Path
-    asked: tuple[str, ...]
-    inputs: bytes
+    directory: Path  # its folder
+    asked: tuple[str, ...]  # what it was asked for in, words and identities that it follows from
+    inputs: bytes  # hash of all else that it follows from, as it was before it was drawn
 
     def stands(self) -> bool:
         """Whether it would be drawn as it is."""

@@ -30,33 +30,20 @@ class Interval(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Median and quartiles of some values.
+    """Median and quartiles of some values."""
 
-    Attributes:
-        median: NaN without values.
-        lower: First quartile.
-        upper: Third quartile.
-        num_values: Values that are not NaN.
-    """
-
-    median: float
-    lower: float
-    upper: float
-    num_values: int
+    median: float  # NaN without values
+    lower: float  # first quartile
+    upper: float  # third quartile
+    num_values: int  # values that are not NaN
 
 
 class SignedRank(NamedTuple):
-    """Wilcoxon's signed-rank test of paired values.
+    """Wilcoxon's signed-rank test of paired values."""
 
-    Attributes:
-        num_pairs: Pairs that differ; equal ones say nothing.
-        positive_ranks: W+, the sum of ranks of the positive differences.
-        p_value: Two-sided.
-    """
-
-    num_pairs: int
-    positive_ranks: float
-    p_value: float
+    num_pairs: int  # pairs that differ; equal ones say nothing
+    positive_ranks: float  # W+, the sum of ranks of the positive differences
+    p_value: float  # two-sided
 
     @property
     def share(self) -> float:
@@ -71,15 +58,10 @@ class SignedRank(NamedTuple):
 
 
 class RankSum(NamedTuple):
-    """Mann and Whitney's test of two independent samples.
+    """Mann and Whitney's test of two independent samples."""
 
-    Attributes:
-        u: Pairs (x, y) with x > y, and half of those with x = y.
-        p_value: Two-sided.
-    """
-
-    u: float
-    p_value: float
+    u: float  # pairs (x, y) with x > y, and half of those with x = y
+    p_value: float  # two-sided
 
 
 class Effect(NamedTuple):

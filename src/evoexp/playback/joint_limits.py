@@ -1,7 +1,8 @@
 """Limits of joints that an exported trajectory keeps: from a file, the robot, or the command line.
 
 The file is MoveIt's `joint_limits.yaml`. What it does not name comes from the robot (the `velocity`
-of a URDF's joints), else from the command line: no paper prints speeds. Effort is left aside.
+of a URDF's joints), else from the command line: no paper prints speeds. Jerk and effort are left
+aside.
 """
 
 import math
@@ -16,7 +17,7 @@ from evoexp.input_files import read_bounded
 from evoexp.records import FloatArray
 
 LARGEST_FILE = 1_000_000  # [B]
-KINDS = ("velocity", "acceleration", "jerk")
+KINDS = ("velocity", "acceleration")
 
 
 class LimitsFileError(EvoexpError):
@@ -24,11 +25,10 @@ class LimitsFileError(EvoexpError):
 
 
 class JointLimits(NamedTuple):
-    """Greatest rates of every joint; inf: none."""
+    """Greatest rates of every joint."""
 
     velocity: FloatArray  # (nq,) [rad/s or length unit/s]
     acceleration: FloatArray  # (nq,) [rad/s² or length unit/s²]
-    jerk: FloatArray  # (nq,) [rad/s³ or length unit/s³]
 
 
 class Defaults(NamedTuple):
@@ -54,11 +54,11 @@ def joint_limits(names: tuple[str, ...], path: Path | None, defaults: Defaults) 
     found = np.array(
         [[given.get(name, {}).get(kind, math.nan) for kind in KINDS] for name in names]
     )
-    velocity, acceleration, jerk = found.T
+    velocity, acceleration = found.T
     from_robot = np.where(np.isfinite(defaults.robot), defaults.robot, defaults.velocity)
     velocity = np.where(np.isnan(velocity), from_robot, velocity)
     acceleration = np.where(np.isnan(acceleration), velocity / defaults.ramp, acceleration)
-    return JointLimits(velocity, acceleration, np.where(np.isnan(jerk), math.inf, jerk))
+    return JointLimits(velocity, acceleration)
 
 
 def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:

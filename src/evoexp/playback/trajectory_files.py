@@ -19,8 +19,8 @@ from evoexp.errors import printable
 from evoexp.input_files import NUMBER, TableError, read_table
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.playback.optimal_timing import hermite_motion
 from evoexp.playback.recording import Joint
+from evoexp.playback.timing import hermite_motion
 from evoexp.records import FloatArray
 
 TURNS = {"rad": 1.0, "radian": 1.0, "radians": 1.0}

@@ -98,7 +98,7 @@ def test_a_motion_that_stands_still_takes_a_second() -> None:
 def test_a_curve_is_followed_without_a_stop() -> None:
     pytest.importorskip("toppra", reason="needs toppra, from evoexp[timing]")
     motion = clamped_cubic(PATH[[0, 1, 4]])
-    times, positions, velocities = fastest(motion, np.full(2, 0.5), np.full(2, 1.0))
+    _, positions, velocities = fastest(motion, np.full(2, 0.5), np.full(2, 1.0))
     assert not velocities[[0, -1]].any() and velocities[5:-5].any(axis=1).all()
     truth = np.array([motion.at(t) for t in np.linspace(0.0, 2.0, 4001)])
     assert max(np.linalg.norm(truth - point, axis=1).min() for point in positions) < 1e-3

@@ -88,12 +88,6 @@ def record(
 ) -> Recording:
     """Return the recording of a solution's motion.
 
-    Args:
-        condition: The condition of the solution.
-        solution: Flat, of the planner's documented shape.
-        heading: Title and origin.
-        limits: Speed limits of the joints, for the timing.
-
     Raises:
         NoMotion: If the planner gives no motion for the solution, or no bodies.
     """

@@ -158,11 +158,6 @@ def fitted(
 ) -> tuple[Motion, tuple[str, ...]]:
     """Return a trajectory as a motion of a robot's joints, and remarks on how it was read.
 
-    Args:
-        given: The trajectory.
-        joints: Of the robot, in the order of its coordinates.
-        length_unit: Of the scene.
-
     Raises:
         ValueError: If a joint is missing, or a unit, a time or a number cannot be.
     """

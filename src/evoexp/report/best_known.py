@@ -60,10 +60,6 @@ def read_best_known(path: str | Path) -> dict[str, BestKnown]:
 def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
     """Return a file's content by the keys of problems.
 
-    Args:
-        content: Of the file.
-        name: Of the file, for errors.
-
     Raises:
         SettingError: If something in it cannot be.
     """

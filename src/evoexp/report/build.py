@@ -107,14 +107,7 @@ def derived(
 def page_files(
     request: Request, page: Page, found: Results, settings: ReportSettings
 ) -> ReportFiles:
-    """Draw a page's figures and return all its files.
-
-    Args:
-        request: Names the folder, and the command.
-        page: The parts.
-        found: The results that it was made from.
-        settings: Formats and levels.
-    """
+    """Draw a page's figures and return all its files."""
     files: dict[str, bytes] = {}
     for drawing in page.drawings:
         files |= _drawn(drawing, settings)

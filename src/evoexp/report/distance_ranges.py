@@ -67,10 +67,5 @@ def extremes(
 
 
 def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:
-    """Return a quick measure of a scene's least distance; coal itself where it alone knows bodies.
-
-    Args:
-        scene: With the pairs that are looked at.
-        exact: The same pairs, by coal.
-    """
+    """Return a quick measure of a scene's least distance; coal where it alone knows bodies."""
     return LeastDistance(scene) if known(scene) else exact

@@ -138,10 +138,6 @@ def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
 
     A problem is one of ours if the file calls it as the page does, or by a label of one of its
     conditions, or by its key; else it is a problem of its own, where any answer is the only target.
-
-    Args:
-        data: The file.
-        ours: Runs of stored conditions.
     """
     known = _known(ours)
     cells: dict[tuple[str, str], dict[int, list[GivenAnswer]]] = {}

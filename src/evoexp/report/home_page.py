@@ -102,13 +102,7 @@ def summaries(reports: Path) -> list[ReportSummary]:
 def home_page(
     found: Sequence[ReportSummary], papers: Sequence[Paper], runs: Sequence[StoredRun]
 ) -> bytes:
-    """Return the home page; the same reports and runs give the same bytes.
-
-    Args:
-        found: The reports.
-        papers: In the order of their cards.
-        runs: In the order of their table.
-    """
+    """Return the home page; the same reports and runs give the same bytes."""
     content = site(found, papers, runs)
     return written("home_page.html", site=content, search=script_json(list(_search(found))))
 

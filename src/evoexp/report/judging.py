@@ -67,14 +67,7 @@ class Hearing(NamedTuple):
     def same_share(
         self, evidence: str, own: Proportion, printed: Proportion, p_adjusted: float
     ) -> Claim:
-        """Judge a claim that gives a share, a sample itself, by Fisher's exact test.
-
-        Args:
-            evidence: The numbers.
-            own: Our share.
-            printed: The paper's.
-            p_adjusted: Of the test of both, adjusted over all shares that are judged together.
-        """
+        """Judge a claim that gives a share, a sample itself, by Fisher's exact test."""
         verdict = verdicts.judged(p_adjusted >= self.significance if own.total else None)
         return self._claim("same share", evidence, f"{own.total} and {printed.total}", verdict)
 
@@ -159,12 +152,7 @@ def not_judged(results: Results) -> str:
 
 
 def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
-    """Yield the claims that an experiment judges on conditions which are not among its results.
-
-    Args:
-        results: Of the experiment.
-        judged: The claims that its page judges.
-    """
+    """Yield the claims that an experiment judges on conditions which are not among its results."""
     budget = results.budget if results.budget == "smoke" else "paper"
     rows = [r for r in shipped() if (r.experiment, r.budget) == (results.experiment, budget)]
     missing = {row.label for row in rows} - {c.label for c in results.conditions}

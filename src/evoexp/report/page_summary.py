@@ -39,12 +39,7 @@ class ReportSummary(NamedTuple):
 
 
 def summary_of(document: Document, places: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return the summary of a page as plain data.
-
-    Args:
-        document: Its text.
-        places: Heading and address of its sections and figures.
-    """
+    """Return the summary of a page as plain data."""
     claims = document.section(CLAIMS)
     figures = [figure for section in document.sections for figure in section.figures]
     names = [name for each in figures if (name := each.picture("svg", "png"))]

@@ -140,13 +140,7 @@ def friedman(lengths: FloatArray) -> Friedman:
 
 
 def critical_difference(num_planners: int, num_problems: int, significance: float) -> float:
-    """Return the difference of mean ranks that Nemenyi's test calls significant (Demšar 2006).
-
-    Args:
-        num_planners: That are compared, each with each other.
-        num_problems: That ranks are means over.
-        significance: Level of the test.
-    """
+    """Return the difference of mean ranks that Nemenyi's test calls significant (Demšar 2006)."""
     q = float(stats.studentized_range.ppf(1.0 - significance, num_planners, np.inf)) / np.sqrt(2.0)
     return float(q * np.sqrt(num_planners * (num_planners + 1) / (6.0 * num_problems)))
 

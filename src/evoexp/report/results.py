@@ -254,9 +254,6 @@ class Results(NamedTuple):
         """Return the stored results of another shipped experiment at the paper's budget.
 
         Conditions are found by their hashes, those that were never run are missing.
-
-        Args:
-            experiment: Its name.
         """
         rows = [row for row in shipped() if (row.experiment, row.budget) == (experiment, "paper")]
         runs = {row.label: RunDirectory(self.outputs, row.condition_id) for row in rows}

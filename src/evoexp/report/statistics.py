@@ -78,14 +78,7 @@ def quantile(values: FloatArray, share: float) -> float:
         values: (n,); NaN is ignored, ±inf is a value.
         share: In [0, 1].
     """
-    ordered = np.sort(values[~np.isnan(values)])
-    if not len(ordered):
-        return math.nan
-    position = share * (len(ordered) - 1)
-    below = math.floor(position)
-    low, high = float(ordered[below]), float(ordered[min(below + 1, len(ordered) - 1)])
-    fraction = position - below
-    return low if fraction == 0.0 or low == high else low + fraction * (high - low)
+    return float(quantiles(values[None], (share,))[0, 0])
 
 
 def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
@@ -123,16 +116,8 @@ def wilson(successes: int, trials: int, confidence: float) -> Interval:
     """Return Wilson's score interval of a proportion; [0, 1] without trials."""
     if trials == 0:
         return Interval(0.0, 1.0)
-    found = _binomial_result()(
-        k=successes, n=trials, alternative="two-sided", statistic=successes / trials, pvalue=np.nan
-    ).proportion_ci(confidence, method="wilson")
-    return Interval(float(found.low), float(found.high))
-
-
-@functools.cache
-def _binomial_result() -> type[Any]:
-    """Return scipy's class of results: its intervals want no p-value, which takes long to find."""
-    return type(stats.binomtest(0, 1))
+    low, high = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return Interval(float(low), float(high))
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:

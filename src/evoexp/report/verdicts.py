@@ -69,11 +69,6 @@ def judged(holds: bool | None) -> str:
 def judge_all(holds: int, done: int, planned: int) -> str:
     """Judge a claim about every run.
 
-    Args:
-        holds: Finished runs in which it holds.
-        done: Finished runs.
-        planned: Runs that were planned.
-
     Returns:
         One counter-example contradicts; all planned runs are needed to reproduce.
     """
@@ -96,10 +91,6 @@ def judge_better(comparison: Comparison | None, significance: float) -> str:
 
 def judge_better_than_all(comparisons: Sequence[Comparison], significance: float) -> str:
     """Judge a claim that a condition is better than each of several others.
-
-    Args:
-        comparisons: Of that condition with each other one.
-        significance: Below this adjusted p-value a difference counts.
 
     Returns:
         Contradicted by one that is significantly better, reproduced if all are significantly worse.

@@ -21,11 +21,6 @@ def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
     """Name the curves of some axes: many of them at their ends, few in a legend below.
 
     In a figure for a column there is no room beside the axes: there is a legend, too.
-
-    Args:
-        figure: Of the axes.
-        axes: Their curves have labels, and limits are set.
-        columns: Of a legend, at most.
     """
     curves: list[tuple[Any, str]] = list(zip(*axes.get_legend_handles_labels(), strict=True))
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:

@@ -120,12 +120,6 @@ def page_of_runs(
 ) -> Page:
     """Build the page from runs that are judged already.
 
-    Args:
-        runs: Stored ones, and given ones.
-        results: The stored ones come from.
-        settings: Levels.
-        given: The file that the given ones come from.
-
     Raises:
         NothingStored: If there are none.
     """

@@ -5,7 +5,9 @@ import json
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field, TypeAdapter
 
 from evoexp.report.index import CLAIMS
 from evoexp.report.page_text import Document, Verdict
@@ -15,6 +17,10 @@ TELLING = ("snapshot", "scene", "motion", "stages", "operational", "posture", "p
 """Parts of the names of figures that show what an experiment is about, the best one first."""
 _SUMMARY = re.compile(r'<script type="application/json" id="summary">(.*?)</script>', re.DOTALL)
 _MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
+
+
+Hash = Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
+Picture = Annotated[str, Field(pattern=r"^([\w.-]+\.(svg|png))?$")]  # in the report's own folder
 
 
 class ReportSummary(NamedTuple):
@@ -29,13 +35,18 @@ class ReportSummary(NamedTuple):
     # (text, place on the page) of its sections and figures
     headings: tuple[tuple[str, str], ...] = ()
     claims: tuple[tuple[str, str], ...] = ()  # (text, verdict)
-    runs: tuple[tuple[str, str], ...] = ()  # (hash, label) of its conditions, twelve hex digits
-    picture: str = ""  # file of the figure that shows best what it is about; empty if there is none
+    runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
+    picture: Picture = (
+        ""  # file of the figure that shows best what it is about; empty if there is none
+    )
 
     @property
     def experiment(self) -> str:
         """Name of the experiment in its folder's name: without budget and overrides."""
         return re.split("[@+]", self.folder)[0]
+
+
+_REPORT = TypeAdapter(ReportSummary)
 
 
 def summary_of(document: Document, places: Iterable[tuple[str, str]]) -> dict[str, Any]:
@@ -75,8 +86,9 @@ def read_summary(folder: Path) -> ReportSummary | None:
     try:
         found = _SUMMARY.search((folder / HTML).read_text(encoding="utf-8"))
         if found:
-            return _checked(folder.name, json.loads(found[1]))
-    except (OSError, ValueError, KeyError, TypeError):
+            named = {"folder": folder.name, "file": HTML, **json.loads(found[1])}
+            return _REPORT.validate_python(named)
+    except (OSError, ValueError, TypeError):
         pass  # nobody's page, or no page of ours
     try:
         text = (folder / MARKDOWN).read_text(encoding="utf-8")
@@ -86,31 +98,3 @@ def read_summary(folder: Path) -> ReportSummary | None:
     made = _MADE_BY.search(text)
     command = html.unescape(made[1]) if made else ""
     return ReportSummary(folder.name, MARKDOWN, html.unescape(title) or folder.name, command)
-
-
-def _checked(folder: str, data: Any) -> ReportSummary:
-    """Return a summary from plain data.
-
-    Raises:
-        ValueError, KeyError, TypeError: If it is none.
-    """
-    texts = [data[name] for name in ("title", "command", "partial", "picture")]
-    pairs = [tuple(pair) for name in ("claims", "runs", "headings") for pair in data[name]]
-    words = [*texts, *(word for pair in pairs for word in pair)]
-    if not all(isinstance(word, str) for word in words) or any(len(pair) != 2 for pair in pairs):
-        raise ValueError(f"{folder}: no summary of a report")
-    title, command, partial, picture = texts
-    if not re.fullmatch(r"([\w.-]+\.(svg|png))?", picture):
-        raise ValueError(f"{folder}: a picture of another folder")
-    return ReportSummary(
-        folder,
-        HTML,
-        title,
-        command,
-        partial,
-        int(data["failed"]),
-        tuple((text, place) for text, place in data["headings"]),
-        tuple((text, verdict) for text, verdict in data["claims"]),
-        tuple((name, label) for name, label in data["runs"] if re.fullmatch("[0-9a-f]{12}", name)),
-        picture,
-    )

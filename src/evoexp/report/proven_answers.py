@@ -16,6 +16,7 @@ import joblib
 import numpy as np
 import pandas as pd
 
+from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.paths.motion import Motion
@@ -72,11 +73,11 @@ def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame
         places[path] = cache_root() / "answers" / key.hexdigest()[:32]
         with contextlib.suppress(FileNotFoundError, Damaged):
             kept[path] = json.loads(read_kept(places[path]))
-    # a worker loads pinocchio before it judges
-    unjudged = [(c.condition, path) for c, _, path in logs if path not in kept]
+    # a log alone is enough for a worker, which loads pinocchio before it judges
+    unjudged = [path for _, _, path in logs if path not in kept]
     parallel = joblib.Parallel(n_jobs=-1 if len(unjudged) >= WORTH_WORKERS else 1)
-    judged = parallel(joblib.delayed(_judged)(*each) for each in unjudged)
-    for (_, path), own in zip(unjudged, judged, strict=True):
+    judged = parallel(joblib.delayed(_judged)(path) for path in unjudged)
+    for path, own in zip(unjudged, judged, strict=True):
         kept[path] = own
         with contextlib.suppress(OSError):
             write_kept(places[path], json.dumps(own).encode())
@@ -144,10 +145,12 @@ def straight_line(table: pd.DataFrame) -> float:
     return float(far[0]) if len(far) and np.ptp(far) < CLOSE else np.nan
 
 
-def _judged(condition: Condition, path: Path) -> list[list[Any]]:
+def _judged(path: Path) -> list[list[Any]]:
     """Judge the answers of a log; they lack the replicate and the CPU time of `Answer`."""
-    planner, problem = condition.prepare()
-    known, log = planner.prior_queries(problem), read_log(path)
+    log = read_log(path)
+    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
+    planner, problem = Condition.from_json(log.config_json).prepare()
+    known = planner.prior_queries(problem)
     found = list[list[Any]]()
     for row in log.solutions:
         if not np.isfinite(row.cost):  # infeasible, as the planner says itself

@@ -1,9 +1,7 @@
-"""Reports that are drawn side by side are named in order, and none is lost with another."""
+"""Reports that are drawn are named in order, and none is lost with another."""
 
-import time
 from collections.abc import Callable
 
-import joblib
 import pytest
 
 from evoexp.commands.console import plain_console
@@ -11,14 +9,8 @@ from evoexp.commands.drawn_reports import name_reports
 from evoexp.errors import NothingStored
 
 
-@pytest.fixture(autouse=True)
-def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joblib, "cpu_count", lambda: 2)
-
-
-def place(name: str, seconds: float = 0.0) -> Callable[[], str]:
+def place(name: str) -> Callable[[], str]:
     def drawn() -> str:
-        time.sleep(seconds)
         return name
 
     return drawn
@@ -32,7 +24,7 @@ def refused(error: Exception) -> Callable[[], str]:
 
 
 def test_they_are_named_in_order(capsys: pytest.CaptureFixture[str]) -> None:
-    draws = [place("one", 0.2), place("two"), place("three")]
+    draws = [place("one"), place("two"), place("three")]
     console = plain_console()
     assert name_reports(draws, console, lambda number: console.print(f"table {number}")) == 0
     said = capsys.readouterr()

@@ -16,7 +16,7 @@ joint_limits:
     has_acceleration_limits: false
     max_acceleration: 9
   finger: {has_velocity_limits: true, max_velocity: 0.1}
-  elbow: {has_acceleration_limits: true, max_acceleration: 4, has_jerk_limits: true, max_jerk: 50}
+  elbow: {has_acceleration_limits: true, max_acceleration: 4}
 """
 
 
@@ -28,7 +28,6 @@ def test_the_file_comes_before_the_robot_and_this_one_before_the_command_line(
     found = joint_limits(NAMES, path, DEFAULTS)
     assert found.velocity.tolist() == [0.7, 3.0]
     assert found.acceleration.tolist() == [1.4, 4.0]
-    assert found.jerk.tolist() == [np.inf, 50.0]
     assert joint_limits(NAMES, None, DEFAULTS).velocity.tolist() == [1.0, 3.0]
 
 
@@ -57,8 +56,8 @@ def test_the_file_comes_before_the_robot_and_this_one_before_the_command_line(
             "joint_limits.elbow.max_velocity must be a number above 0, was -1",
         ),
         (
-            "joint_limits: {elbow: {has_jerk_limits: true}}",
-            "joint_limits.elbow.max_jerk must be a number above 0, was None",
+            "joint_limits: {elbow: {has_acceleration_limits: true}}",
+            "joint_limits.elbow.max_acceleration must be a number above 0, was None",
         ),
         (
             "joint_limits: {elbow: {max_velocity: .nan}}",

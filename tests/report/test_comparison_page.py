@@ -58,7 +58,8 @@ def test_answers_are_the_logged_improvements_judged(results: Results) -> None:
 def test_answers_of_many_runs_are_those_of_each(
     results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(proven_answers, "cache_root", lambda: tmp_path)  # judged anew, on all cores
+    monkeypatch.setattr(proven_answers, "cache_root", lambda: tmp_path)  # judged anew
+    monkeypatch.setattr(proven_answers, "WORTH_WORKERS", 1)
     together = answers_of(results.evolved)
     assert list(together) == [c.label for c in results.evolved]
     kept = {path.name for path in (tmp_path / "answers").iterdir()}
@@ -68,7 +69,7 @@ def test_answers_of_many_runs_are_those_of_each(
         rows = [
             (k, *row, log.cpu_s[row[0]])
             for k, log in logs.items()
-            for row in proven_answers._judged(c, log)
+            for row in proven_answers._judged(c.run.log_path(k))
         ]
         assert together[c.label].to_numpy().tolist() == [list(row) for row in rows]
         assert together[c.label].equals(answers(c))

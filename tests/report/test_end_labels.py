@@ -1,26 +1,9 @@
 """Names of curves at their ends: in order, apart, and a legend where they are few."""
 
-import itertools
-
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from evoexp.report import style
-from evoexp.report.figures.end_labels import MANY, name_curves, spread_out
-
-HEIGHTS = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=16)
-
-
-@given(HEIGHTS, st.floats(0.001, 0.06))
-def test_places_keep_their_order_and_a_gap_within_the_axes(values: list[float], gap: float) -> None:
-    heights = np.sort(values)[::-1]
-    places = spread_out(heights, gap)
-    assert all(a - b >= gap - 1e-12 for a, b in itertools.pairwise(places))
-    assert -1e-12 <= places.min() <= places.max() <= 1.0 + 1e-12
-    if all(a - b >= gap for a, b in itertools.pairwise(heights)):
-        assert places == pytest.approx(heights)
+from evoexp.report.figures.end_labels import MANY, name_curves
 
 
 def names_of(count: int, look: style.Look) -> tuple[list[str], int]:

@@ -16,8 +16,8 @@ from evoexp.cli import main
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import options
 from evoexp.report import style
-from evoexp.report.figures import direct_labels, sweep_curves, sweep_grids
-from evoexp.report.figures.direct_labels import CurveEnd, name_ends
+from evoexp.report.figures import end_labels, sweep_curves, sweep_grids
+from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.report.swept_settings import main_effects, sweep_of
@@ -132,7 +132,7 @@ def test_names_at_the_ends_of_curves_keep_apart() -> None:
     heights = [0.5] * 5 + [0.99, np.nan]
     name_ends(axes, [CurveEnd(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
     places = sorted(text.xyann[1] for text in axes.texts)  # type: ignore[attr-defined]
-    assert len(places) == 6 and np.diff(places).min() >= direct_labels.APART - 1e-9
+    assert len(places) == 6 and np.diff(places).min() >= end_labels.APART - 1e-9
     assert places[0] >= 0.0 and places[-1] <= 1.0
     assert np.mean(places[:5]) == pytest.approx(0.5)  # around their curves
     assert {text.xy for text in axes.texts} == {(0.5, 0.5), (0.5, 0.99)}  # type: ignore[attr-defined]
@@ -141,7 +141,7 @@ def test_names_at_the_ends_of_curves_keep_apart() -> None:
 
 @given(st.lists(st.floats(0.0, 1.0), max_size=40), st.floats(0.01, 0.2))
 def test_places_of_names_are_apart_in_order_and_inside(wanted: list[float], gap: float) -> None:
-    found = direct_labels.apart(np.sort(np.array(wanted)), gap)
+    found = end_labels.apart(np.sort(np.array(wanted)), gap)
     least = min(gap, 1.0 / max(len(wanted) - 1, 1))
     assert len(found) == len(wanted)
     assert (np.diff(found) >= least - 1e-9).all()

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 from evoexp.batch.replicate_limits import ReplicateLimits, limited
 from evoexp.condition import Condition
+from evoexp.records import generations
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
@@ -31,8 +32,8 @@ def _warm(condition: Condition) -> None:
     planner, problem = condition.prepare()
     # a reference takes long; it needs the kernels of the planner beside it
     searching = planner.planner if condition.is_reference else planner
-    generations = itertools.islice(searching.evolve(problem, condition.rng(0)), 2)
-    *_, solution = [generation.best.copy() for generation in generations]
+    first_two = itertools.islice(generations(searching.evolve(problem, condition.rng(0))), 2)
+    *_, solution = [generation.best.copy() for generation in first_two]
     searching.evaluate(problem, solution)
     motion = searching.motion(problem, solution)
     judge_motion(searching, problem, motion)

@@ -29,21 +29,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--timing",
-        choices=("rest", "optimal", "uniform"),
-        default="rest",
-        help="rest: from rest to rest, also where two straight lines meet, within limits of speed, "
-        "acceleration and jerk; optimal: as fast as speeds and accelerations permit, corners of "
-        "certified motions rounded and certified again; uniform: equal times from instant to "
-        "instant, which jumps",
-    )
-    parser.add_argument(
-        "--no-blend", action="store_true", help="optimal: stop at corners instead of rounding them"
+        choices=("optimal", "uniform"),
+        default="optimal",
+        help="optimal: as fast as speeds and accelerations permit, from rest to rest, also where "
+        "two straight lines meet (needs toppra: evoexp[timing]); uniform: equal times from instant "
+        "to instant, whose speed jumps",
     )
     parser.add_argument(
         "--limits",
         type=Path,
         metavar="joint_limits.yaml",
-        help="limits of speed, acceleration and jerk by joint, as MoveIt's file; where it has "
+        help="limits of speed and acceleration by joint, as MoveIt's file; where it has "
         "none, the robot's own speeds, then --turn-speed, --slide-speed",
     )
     parser.add_argument(
@@ -61,7 +57,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise SettingError("--ramp", "greater than 0", arguments.ramp)
     found = single(arguments)
     limits = _limits(found, arguments)
-    timed = trajectory(found, arguments.timing, limits, blend=not arguments.no_blend)
+    timed = trajectory(found, arguments.timing, limits)
     if arguments.format == "ros":
         content = as_ros(timed)
     else:
@@ -82,16 +78,15 @@ def _limits(found: Recording, arguments: argparse.Namespace) -> JointLimits:
 
 def _described(timed: Trajectory, limits: JointLimits) -> str:
     """Say how long the motion takes, how near it comes to the limits, and what is proven of it."""
-    speed, acceleration, _ = (
+    speed, acceleration = (
         float((rate / limit).max()) for rate, limit in zip(timed.rates(), limits, strict=True)
     )
     if timed.interpolation == "linear":
         rates = f"at most {speed:.0%} of a joint's speed, which jumps at every point"
     else:
         rates = f"at most {speed:.0%} of a joint's speed, {acceleration:.0%} of its acceleration"
-    corners = f", {timed.num_corners} corners rounded" if timed.num_corners else ""
     verdict = timed.verdict
     return (
-        f"{timed.times[-1]:.2f} s, {len(timed.times)} points{corners}; {rates}; certified: "
+        f"{timed.times[-1]:.2f} s, {len(timed.times)} points; {rates}; certified: "
         f"{ANSWERS[verdict.certified]}, margin kept: {ANSWERS[verdict.certified_margin]}"
     )

@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import functools
-import importlib
 import shlex
 import sys
 import tempfile
@@ -24,11 +23,10 @@ from evoexp.commands.drawn_reports import name_reports
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment, Labelled
-from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
 from evoexp.report.pages import page_registration
-from evoexp.report.standing_reports import StandingReport, inputs_of_reports
+from evoexp.store.plans import num_planned
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
@@ -107,38 +105,17 @@ def _tell(
         for experiment in experiments:
             console.print(summary_table(experiment))
         return 0
-    inputs = inputs_of_reports(outputs_root(), [folder.path for folder in folders()])
-    standing = [_standing(each, arguments, inputs) for each in experiments]
-    stand = [each.stands() for each in standing]
-    if stand.count(False) > 1:  # what all copies of this process need
-        importlib.import_module("evoexp.commands.report")  # pandas
-        importlib.import_module("evoexp.report.style")  # matplotlib
 
     def drawn(number: int) -> str:
-        page = standing[number].directory / INDEX
-        if stand[number]:
-            return f"{page} (as it was)"
         from evoexp.commands.report import of_experiment
 
-        of_experiment(experiments[number], *_asked(arguments))
-        standing[number].remember()
-        return str(page)
+        return str(of_experiment(experiments[number], *_asked(arguments)))
 
     return name_reports(
         [functools.partial(drawn, number) for number in range(len(experiments))],
         console,
         before=lambda number: console.print(summary_table(experiments[number])),
     )
-
-
-def _standing(
-    experiment: Experiment, arguments: argparse.Namespace, inputs: bytes
-) -> StandingReport:
-    """Return the report of an experiment, which may stand as it would be drawn."""
-    conditions = ((c.label, c.condition.id) for c in experiment.conditions)
-    words = repr((*conditions, experiment.num_replicates, experiment.report, *_asked(arguments)))
-    directory = outputs_root() / "reports" / experiment.report_name
-    return StandingReport(directory, (experiment.name, words), inputs)
 
 
 def _asked(arguments: argparse.Namespace) -> tuple[Any, ...]:

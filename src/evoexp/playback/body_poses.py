@@ -20,27 +20,17 @@ Place = tuple[int, Any]
 
 
 class Frame(NamedTuple):
-    """A frame that moves bodies: of a joint, or of an object that is carried.
+    """A frame that moves bodies: of a joint, or of an object that is carried."""
 
-    Attributes:
-        name: Unique name.
-        parent: Index of the frame that carries it; −1: the world.
-    """
-
-    name: str
-    parent: int
+    name: str  # unique name
+    parent: int  # index of the frame that carries it; −1: the world
 
 
 class Poses(NamedTuple):
-    """Poses of all frames over time.
+    """Poses of all frames over time."""
 
-    Attributes:
-        world: (ticks, frames, 7) position, quaternion x, y, z, w in the world.
-        local: The same in the parent's frame.
-    """
-
-    world: FloatArray
-    local: FloatArray
+    world: FloatArray  # (ticks, frames, 7) position, quaternion x, y, z, w in the world
+    local: FloatArray  # the same in the parent's frame
 
 
 def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:

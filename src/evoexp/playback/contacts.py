@@ -18,33 +18,23 @@ END_RESOLUTION = 1e-6  # [instants] of the end of a contact
 
 
 class Contact(NamedTuple):
-    """A stretch of a motion in which bodies touch.
+    """A stretch of a motion in which bodies touch."""
 
-    Attributes:
-        begin: Begin of the contact [instants].
-        end: End of the contact, to 1e-6 [instants]; bodies that part for less than a tick count as
-            touching all the time.
-        pair: Names of the bodies that touch first.
-    """
-
-    begin: float
+    begin: float  # begin of the contact [instants]
+    # End of the contact, to 1e-6 [instants]; bodies that part for less than a tick count as
+    # touching all the time
     end: float
-    pair: str
+    pair: str  # names of the bodies that touch first
 
 
 class Clearance(NamedTuple):
-    """Exact distances of the watched bodies.
+    """Exact distances of the watched bodies."""
 
-    Attributes:
-        least: (ticks,) least distance of two watched bodies [length unit]; 0 where bodies touch,
-            inf if none is watched.
-        pairs: (ticks,) names of the two nearest bodies; empty if none is watched.
-        contacts: All contacts in the order of time.
-    """
-
+    # (ticks,) least distance of two watched bodies [length unit]; 0 where bodies touch, inf if none
+    # is watched
     least: FloatArray
-    pairs: tuple[str, ...]
-    contacts: tuple[Contact, ...]
+    pairs: tuple[str, ...]  # (ticks,) names of the two nearest bodies; empty if none is watched
+    contacts: tuple[Contact, ...]  # all contacts in the order of time
 
 
 def part_at(parts: list[Part], t: float) -> Part:

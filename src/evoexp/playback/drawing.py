@@ -31,12 +31,7 @@ OPACITY = {"arm": 1.0, "object": 0.9, "obstacle": 0.45, "start": 0.2, "end": 0.3
 
 
 def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
-    """Return one entity per body, in the frame that moves it.
-
-    Args:
-        recording: The motion with its bodies.
-        roles: Roles of the bodies to draw.
-    """
+    """Return one entity per body, in the frame that moves it."""
     chosen, names = set(roles), frame_names(recording)
     return [
         entity(

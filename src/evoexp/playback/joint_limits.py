@@ -1,7 +1,8 @@
 """Limits of joints that an exported trajectory keeps: from a file, the robot, or the command line.
 
 The file is MoveIt's `joint_limits.yaml`. What it does not name comes from the robot (the `velocity`
-of a URDF's joints), else from the command line: no paper prints speeds. Effort is left aside.
+of a URDF's joints), else from the command line: no paper prints speeds. Jerk and effort are left
+aside.
 """
 
 import math
@@ -16,7 +17,7 @@ from evoexp.input_files import read_bounded
 from evoexp.records import FloatArray
 
 LARGEST_FILE = 1_000_000  # [B]
-KINDS = ("velocity", "acceleration", "jerk")
+KINDS = ("velocity", "acceleration")
 
 
 class LimitsFileError(EvoexpError):
@@ -24,31 +25,18 @@ class LimitsFileError(EvoexpError):
 
 
 class JointLimits(NamedTuple):
-    """Greatest rates of every joint; inf: none.
+    """Greatest rates of every joint."""
 
-    Attributes:
-        velocity: (nq,) [rad/s or length unit/s].
-        acceleration: (nq,) [rad/s² or length unit/s²].
-        jerk: (nq,) [rad/s³ or length unit/s³].
-    """
-
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
+    velocity: FloatArray  # (nq,) [rad/s or length unit/s]
+    acceleration: FloatArray  # (nq,) [rad/s² or length unit/s²]
 
 
 class Defaults(NamedTuple):
-    """Limits of the joints that neither the file nor the robot limits.
+    """Limits of the joints that neither the file nor the robot limits."""
 
-    Attributes:
-        velocity: (nq,) greatest |dq/dt| [rad/s or length unit/s].
-        robot: (nq,) the robot's own velocity limits; inf where it has none.
-        ramp: Time from rest to the greatest speed [s], which limits accelerations.
-    """
-
-    velocity: FloatArray
-    robot: FloatArray
-    ramp: float
+    velocity: FloatArray  # (nq,) greatest |dq/dt| [rad/s or length unit/s]
+    robot: FloatArray  # (nq,) the robot's own velocity limits; inf where it has none
+    ramp: float  # time from rest to the greatest speed [s], which limits accelerations
 
 
 def joint_limits(names: tuple[str, ...], path: Path | None, defaults: Defaults) -> JointLimits:
@@ -66,11 +54,11 @@ def joint_limits(names: tuple[str, ...], path: Path | None, defaults: Defaults) 
     found = np.array(
         [[given.get(name, {}).get(kind, math.nan) for kind in KINDS] for name in names]
     )
-    velocity, acceleration, jerk = found.T
+    velocity, acceleration = found.T
     from_robot = np.where(np.isfinite(defaults.robot), defaults.robot, defaults.velocity)
     velocity = np.where(np.isnan(velocity), from_robot, velocity)
     acceleration = np.where(np.isnan(acceleration), velocity / defaults.ramp, acceleration)
-    return JointLimits(velocity, acceleration, np.where(np.isnan(jerk), math.inf, jerk))
+    return JointLimits(velocity, acceleration)
 
 
 def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:

@@ -27,43 +27,27 @@ class NoMotion(EvoexpError):
 
 
 class Heading(NamedTuple):
-    """The title of a recording, and the search that found the motion.
+    """The title of a recording, and the search that found the motion."""
 
-    Attributes:
-        title: One line of text.
-        replicate: Index of the replicate; −1: a motion of the user's own.
-        improvements: (generation, best cost) of every better solution.
-    """
-
-    title: str
-    replicate: int = -1
+    title: str  # one line of text
+    replicate: int = -1  # index of the replicate; −1: a motion of the user's own
+    # (generation, best cost) of every better solution
     improvements: tuple[tuple[int, float], ...] = ()
 
 
 class Joint(NamedTuple):
-    """One coordinate of q.
+    """One coordinate of q."""
 
-    Attributes:
-        name: Name of the joint.
-        prismatic: Whether the coordinate is a length, not an angle.
-    """
-
-    name: str
-    prismatic: bool
+    name: str  # name of the joint
+    prismatic: bool  # whether the coordinate is a length, not an angle
 
 
 class View(NamedTuple):
-    """The room that a picture has to show.
+    """The room that a picture has to show."""
 
-    Attributes:
-        center: (3,) centre of the room that robot and obstacles take [length unit].
-        extent: (3,) half the edges of that room [length unit].
-        planar: Whether all bodies stay in the plane z = 0.
-    """
-
-    center: FloatArray
-    extent: FloatArray
-    planar: bool
+    center: FloatArray  # (3,) centre of the room that robot and obstacles take [length unit]
+    extent: FloatArray  # (3,) half the edges of that room [length unit]
+    planar: bool  # whether all bodies stay in the plane z = 0
 
     @property
     def radius(self) -> float:
@@ -72,54 +56,30 @@ class View(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """A motion with its bodies, distances, contacts and verdict.
+    """A motion with its bodies, distances, contacts and verdict."""
 
-    Attributes:
-        heading: Title and origin.
-        condition_id: Hash of the condition, 64 hex digits.
-        config_json: Canonical form of the condition.
-        length_unit: Unit of every length.
-        joints: (nq) joints of the coordinates.
-        motion: The motion itself.
-        times: (ticks,) instants that are shown.
-        q: (ticks, nq) [rad, length unit].
-        dq: (ticks, nq) [rad/s, length unit/s].
-        seconds: Time from instant to instant [s].
-        size: Size of the scene, by which lengths are judged [length unit].
-        frames: Frames that move bodies.
-        poses: Poses of the frames at the ticks.
-        shapes: The bodies: every coal shape once.
-        traces: (arms, ticks, 3) paths of the tools [length unit].
-        targets: Places that the task names.
-        clearance: Exact distances and contacts.
-        margin: Clearance that the task requires [length unit].
-        verdict: Verdict of the certifier.
-        view: Room that a picture has to show.
-        parts: Pieces of the motion that have bodies of their own.
-        velocity_limits: (nq,) those of the robot itself [rad/s, length unit/s]; inf: it has none.
-    """
-
-    heading: Heading
-    condition_id: str
-    config_json: bytes
-    length_unit: str
-    joints: tuple[Joint, ...]
-    motion: Motion
-    times: FloatArray
-    q: FloatArray
-    dq: FloatArray
-    seconds: float
-    size: float
-    frames: tuple[Frame, ...]
-    poses: Poses
-    shapes: tuple[Shape, ...]
-    traces: FloatArray
-    targets: tuple[Target, ...]
-    clearance: Clearance
-    margin: float
-    verdict: Certificate
-    view: View
-    parts: tuple[Part, ...]
+    heading: Heading  # title and origin
+    condition_id: str  # hash of the condition, 64 hex digits
+    config_json: bytes  # canonical form of the condition
+    length_unit: str  # unit of every length
+    joints: tuple[Joint, ...]  # (nq) joints of the coordinates
+    motion: Motion  # the motion itself
+    times: FloatArray  # (ticks,) instants that are shown
+    q: FloatArray  # (ticks, nq) [rad, length unit]
+    dq: FloatArray  # (ticks, nq) [rad/s, length unit/s]
+    seconds: float  # time from instant to instant [s]
+    size: float  # size of the scene, by which lengths are judged [length unit]
+    frames: tuple[Frame, ...]  # frames that move bodies
+    poses: Poses  # poses of the frames at the ticks
+    shapes: tuple[Shape, ...]  # the bodies: every coal shape once
+    traces: FloatArray  # (arms, ticks, 3) paths of the tools [length unit]
+    targets: tuple[Target, ...]  # places that the task names
+    clearance: Clearance  # exact distances and contacts
+    margin: float  # clearance that the task requires [length unit]
+    verdict: Certificate  # verdict of the certifier
+    view: View  # room that a picture has to show
+    parts: tuple[Part, ...]  # pieces of the motion that have bodies of their own
+    # (nq,) those of the robot itself [rad/s, length unit/s]; inf: it has none
     velocity_limits: FloatArray
 
 
@@ -127,12 +87,6 @@ def record(
     condition: Condition, solution: FloatArray, heading: Heading, limits: SpeedLimits | None = None
 ) -> Recording:
     """Return the recording of a solution's motion.
-
-    Args:
-        condition: The condition of the solution.
-        solution: Flat, of the planner's documented shape.
-        heading: Title and origin.
-        limits: Speed limits of the joints, for the timing.
 
     Raises:
         NoMotion: If the planner gives no motion for the solution, or no bodies.

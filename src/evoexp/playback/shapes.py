@@ -14,21 +14,15 @@ Role = Literal["arm", "obstacle", "object"]
 
 
 class Outline(NamedTuple):
-    """A shape in its own frame; capsules, cylinders and cones lie along z and are centred.
+    """A shape in its own frame; capsules, cylinders and cones lie along z and are centred."""
 
-    Attributes:
-        kind: Kind of the shape.
-        size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone:
-            radius, length (that of a capsule is its segment's) | half-space (all points with z ≤ 0)
-            and mesh: nothing.
-        points: (points, 3) corners of a mesh; None otherwise.
-        triangles: (triangles, 3) indices of corners.
-    """
-
-    kind: Kind
+    kind: Kind  # kind of the shape
+    # box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone: radius,
+    # length (that of a capsule is its segment's) | half-space (all points with z ≤ 0) and mesh:
+    # nothing
     size: tuple[float, ...]
-    points: FloatArray | None = None
-    triangles: np.ndarray | None = None
+    points: FloatArray | None = None  # (points, 3) corners of a mesh; None otherwise
+    triangles: np.ndarray | None = None  # (triangles, 3) indices of corners
 
     @property
     def is_line(self) -> bool:
@@ -50,24 +44,15 @@ class Outline(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """One body.
+    """One body."""
 
-    Attributes:
-        name: Name of the body in verdicts.
-        frame: Index in `Recording.frames` of the frame that moves it; −1: the world.
-        pose: (7,) of the outline in that frame: position, quaternion x, y, z, w.
-        outline: Kind and size.
-        role: A part of an arm, an obstacle, or an object, which is an obstacle that is carried for
-            a while.
-        arm: Index of its arm; −1: none.
-    """
-
-    name: str
-    frame: int
-    pose: FloatArray
-    outline: Outline
+    name: str  # name of the body in verdicts
+    frame: int  # index in `Recording.frames` of the frame that moves it; −1: the world
+    pose: FloatArray  # (7,) of the outline in that frame: position, quaternion x, y, z, w
+    outline: Outline  # kind and size
+    # A part of an arm, an obstacle, or an object, which is an obstacle that is carried for a while
     role: Role
-    arm: int
+    arm: int  # index of its arm; −1: none
 
 
 def outline(shape: Any) -> tuple[Outline, Any]:

@@ -8,15 +8,10 @@ from evoexp.records import FloatArray
 
 
 class Target(NamedTuple):
-    """A place that a tool or a robot is to reach.
+    """A place that a tool or a robot is to reach."""
 
-    Attributes:
-        name: Name beside the mark.
-        point: (3,) in the world [length unit].
-    """
-
-    name: str
-    point: FloatArray
+    name: str  # name beside the mark
+    point: FloatArray  # (3,) in the world [length unit]
 
 
 def targets(scenario: Any, robot: Any) -> tuple[Target, ...]:

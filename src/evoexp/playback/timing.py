@@ -1,23 +1,34 @@
-"""The time from instant to instant: equal, and as short as the joints' speed limits permit."""
+"""The time along a motion: equal from instant to instant, or as fast as a robot permits.
 
-from typing import NamedTuple
+The fastest timing is toppra's (Pham & Pham 2018), within limits of speed and acceleration, from
+rest to rest; it stops where the direction of the motion jumps, as where two straight lines meet.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion, top_speeds
 from evoexp.records import FloatArray
 
+TICK = 0.01  # [s] between points of the fastest timing, at most
+POINTS_PER_SECTION = 20  # points of the fastest timing between two stops, at least
+GRID = 200  # points per segment at which toppra keeps to the limits
+SMOOTH = 1e-9  # [-] of the greatest derivative, by which it may jump without a stop
+
+
+class BadTiming(EvoexpError):
+    """A timing that is not available."""
+
 
 class SpeedLimits(NamedTuple):
-    """Speed limits of joints, which no paper prints.
+    """Speed limits of joints, which no paper prints."""
 
-    Attributes:
-        turn: Limit of revolute joints [rad/s].
-        slide: Limit of prismatic joints [length unit/s]; None: a quarter of the scene's size per
-            second.
-    """
-
-    turn: float = np.pi / 4.0
+    turn: float = np.pi / 4.0  # limit of revolute joints [rad/s]
+    # limit of prismatic joints [length unit/s]; None: a quarter of the scene's size per second
     slide: float | None = None
 
     def of(self, prismatic: np.ndarray, size: float) -> FloatArray:
@@ -29,6 +40,14 @@ class SpeedLimits(NamedTuple):
         """
         slide = 0.25 * size if self.slide is None else self.slide
         return np.where(prismatic, slide, self.turn)
+
+
+class TimedPoints(NamedTuple):
+    """Points of a motion in time; a controller puts cubics between them."""
+
+    times: FloatArray  # (points,) from the start [s]
+    positions: FloatArray  # (points, nq) [rad or length unit]
+    velocities: FloatArray  # (points, nq) per second
 
 
 def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
@@ -62,3 +81,123 @@ def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
     u = (times - segments)[:, None]
     _, c1, c2, c3 = motion.polynomials[segments].transpose(1, 0, 2)
     return np.asarray((c1 + u * (2.0 * c2 + 3.0 * u * c3)) / seconds)
+
+
+def fastest(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> TimedPoints:
+    """Time a motion as fast as limits permit, from rest to rest.
+
+    Args:
+        motion: The motion.
+        speeds: (nq,) limits [rad/s or length unit/s].
+        accelerations: (nq,) limits [rad/s² or length unit/s²].
+
+    Raises:
+        BadTiming: If toppra is not installed.
+    """
+    try:
+        import toppra
+    except ImportError:
+        raise BadTiming(
+            "--timing optimal needs toppra: pip install 'evoexp[timing]'; --timing uniform does not"
+        ) from None
+    toppra.setup_logging("ERROR")
+    limits = [
+        toppra.constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
+        toppra.constraint.JointAccelerationConstraint(
+            np.stack([-accelerations, accelerations], axis=1),
+            # limits are kept between the points of the grid, too
+            toppra.constraint.DiscretizationType.Interpolation,
+        ),
+    ]
+    polynomials = motion.polynomials[motion.polynomials[:, 1:].any(axis=(1, 2))]
+    if not len(polynomials):  # it stands still
+        return TimedPoints(np.array([0.0, 1.0]), motion.q[[0, 0]], 0.0 * motion.q[[0, 0]])
+    sections = [
+        within(_section(toppra, polynomials[first:last], limits), speeds, accelerations)
+        for first, last in pairwise([0, *_stops(polynomials), len(polynomials)])
+    ]
+    begins = np.concatenate([[0.0], np.cumsum([section.times[-1] for section in sections])])
+    # every section but the first begins at the last point of the one before
+    kept = [slice(None), *[slice(1, None)] * (len(sections) - 1)]
+    parts = [
+        (begin + section.times[own], section.positions[own], section.velocities[own])
+        for begin, section, own in zip(begins, sections, kept, strict=False)
+    ]
+    return TimedPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _stops(polynomials: FloatArray) -> Sequence[int]:
+    """Return the segments, but for the first one, at whose beginning the direction jumps."""
+    _, c1, c2, c3 = polynomials.transpose(1, 0, 2)
+    jumps = np.abs((c1 + 2.0 * c2 + 3.0 * c3)[:-1] - c1[1:]).max(axis=1)
+    return [int(k) + 1 for k in np.flatnonzero(jumps > SMOOTH * np.abs(c1).max())]
+
+
+def _section(toppra: Any, polynomials: FloatArray, limits: list[Any]) -> TimedPoints:
+    """Time cubics without a stop between them from rest to rest.
+
+    Args:
+        toppra: The package.
+        polynomials: (segments, 4, nq), lowest power first.
+        limits: Constraints of toppra.
+    """
+    count = len(polynomials)
+    c0, c1, c2, c3 = polynomials.transpose(1, 0, 2)
+    ends = np.vstack([c0, polynomials[-1].sum(axis=0)])
+    slopes = np.vstack([c1, c1[-1] + 2.0 * c2[-1] + 3.0 * c3[-1]])
+    path = toppra.SimplePath(np.arange(count + 1.0), ends, slopes)
+    solver = toppra.algorithm.TOPPRA(
+        limits,
+        path,
+        gridpoints=np.linspace(0.0, count, GRID * count + 1),
+        parametrizer="ParametrizeConstAccel",
+    )
+    timed = solver.compute_trajectory(0.0, 0.0)
+    duration = float(timed.duration)
+    points = max(POINTS_PER_SECTION, int(np.ceil(duration / TICK)))
+    times = np.linspace(0.0, duration, points + 1)
+    positions, rates = np.asarray(timed(times)), np.asarray(timed(times, 1))
+    positions[[0, -1]], rates[[0, -1]] = ends[[0, -1]], 0.0
+    return TimedPoints(times, positions, rates)
+
+
+def within(timed: TimedPoints, speeds: FloatArray, accelerations: FloatArray) -> TimedPoints:
+    """Stretch a timing until the cubics between its points keep the limits, too."""
+    speed, acceleration = greatest_rates(hermite_motion(*timed), np.diff(timed.times))
+    stretch = max(
+        1.0,
+        float((speed / speeds).max()),
+        float(np.sqrt((acceleration / accelerations).max())),
+    )
+    return TimedPoints(timed.times * stretch, timed.positions, timed.velocities / stretch)
+
+
+def hermite_motion(times: FloatArray, positions: FloatArray, velocities: FloatArray) -> Motion:
+    """Return the cubics that a controller puts between points with velocities.
+
+    Args:
+        times: (points,) [s].
+        positions: (points, nq).
+        velocities: (points, nq) per second.
+    """
+    widths = np.diff(times)[:, None]
+    before, after = widths * velocities[:-1], widths * velocities[1:]
+    way = positions[1:] - positions[:-1]
+    powers = [positions[:-1], before, 3.0 * way - 2.0 * before - after, before + after - 2.0 * way]
+    return Motion(positions, np.stack(powers, axis=1))
+
+
+def greatest_rates(motion: Motion, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the greatest speed and acceleration of every joint, each (nq,).
+
+    Args:
+        motion: Cubic segments.
+        widths: (segments,) their durations [s].
+    """
+    _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
+    w = widths[:, None]
+    u = np.divide(-c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0)
+    instants = np.zeros_like(c1), np.ones_like(c1), np.clip(u, 0.0, 1.0)
+    speeds = [np.abs(c1 + x * (2.0 * c2 + 3.0 * x * c3)) / w for x in instants]
+    accelerations = [np.abs(2.0 * c2 + 6.0 * x * c3) / w**2 for x in instants[:2]]
+    return np.max(speeds, axis=(0, 1)), np.max(accelerations, axis=(0, 1))

@@ -1,101 +1,71 @@
-"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, rates.
+"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, velocities.
 
-A controller that interpolates the points moves as the motion that was judged. Without velocities it
-goes straight from point to point. With velocities it follows the cubics that they determine; with
-accelerations, too, polynomials of fifth degree along straight lines. The motion that is executed is
-certified again wherever it is another curve than the stored one.
+A controller that interpolates the points moves as the motion that was judged: without velocities
+straight from point to point, with velocities on the cubics that they determine. The motion that is
+executed is certified again where it is another curve than the stored one.
 """
 
 import csv
 import io
 import json
-from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from evoexp.collision.certifier.certificate import Certificate, certificate
-from evoexp.collision.scene import Part
-from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
-from evoexp.playback.blending import BlendedMotion, blended
 from evoexp.playback.joint_limits import JointLimits
-from evoexp.playback.optimal_timing import (
-    Timed,
-    along_curve,
-    along_lines,
+from evoexp.playback.recording import Recording
+from evoexp.playback.timing import (
+    BadTiming,
+    TimedPoints,
+    fastest,
     greatest_rates,
     hermite_motion,
+    seconds_per_instant,
+    velocities,
 )
-from evoexp.playback.recording import Recording
-from evoexp.playback.rest_timing import rest_on_curve, rest_on_lines
-from evoexp.playback.timing import seconds_per_instant, velocities
 from evoexp.records import FloatArray
 
-Timing = Literal["rest", "optimal", "uniform"]
-Interpolation = Literal["linear", "cubic", "quintic"]
-
-
-class BadTiming(EvoexpError):
-    """A timing that is not available."""
+Timing = Literal["optimal", "uniform"]
+Interpolation = Literal["linear", "cubic"]
 
 
 class Trajectory(NamedTuple):
-    """The points of a motion in time.
+    """The points of a motion in time."""
 
-    Attributes:
-        joints: (nq) names of the joints.
-        units: (nq) units of the coordinates: rad, or the scene's unit of length.
-        times: (points,) from the start [s].
-        positions: (points, nq) [rad or length unit].
-        velocities: (points, nq) per second; None: straight from point to point.
-        interpolation: Degree of the polynomials that a controller puts between the points; quintic:
-            accelerations are 0 at every point.
-        verdict: The certifier's, on the motion that is executed.
-        num_corners: Corners that were rounded.
-    """
+    joints: tuple[str, ...]  # (nq) names of the joints
+    units: tuple[str, ...]  # (nq) units of the coordinates: rad, or the scene's unit of length
+    times: FloatArray  # (points,) from the start [s]
+    positions: FloatArray  # (points, nq) [rad or length unit]
+    velocities: FloatArray | None  # (points, nq) per second; None: straight from point to point
+    verdict: Certificate  # verdict of the certifier on the motion that is executed
 
-    joints: tuple[str, ...]
-    units: tuple[str, ...]
-    times: FloatArray
-    positions: FloatArray
-    velocities: FloatArray | None
-    interpolation: Interpolation
-    verdict: Certificate
-    num_corners: int = 0
+    @property
+    def interpolation(self) -> Interpolation:
+        """Curves that a controller puts between the points."""
+        return "linear" if self.velocities is None else "cubic"
 
-    def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the greatest speed, acceleration and jerk of every joint, each (nq,).
+    def rates(self) -> tuple[FloatArray, FloatArray]:
+        """Return the greatest speed and acceleration of every joint, each (nq,).
 
         Where the speed of a motion jumps, accelerations are not counted.
         """
-        widths = np.diff(self.times)
-        if self.interpolation == "quintic":
-            ways, w = np.abs(np.diff(self.positions, axis=0)), widths[:, None]
-            factors = (1.875, 10.0 / np.sqrt(3.0), 60.0)  # of s = 10 u³ − 15 u⁴ + 6 u⁵
-            speed, acceleration, jerk = (
-                (factor * ways / w ** (k + 1)).max(axis=0) for k, factor in enumerate(factors)
-            )
-            return speed, acceleration, jerk
-        if self.velocities is None:
-            return greatest_rates(Motion(self.positions), widths)
-        return greatest_rates(hermite_motion(self.times, self.positions, self.velocities), widths)
+        executed = Motion(self.positions)
+        if self.velocities is not None:
+            executed = hermite_motion(self.times, self.positions, self.velocities)
+        return greatest_rates(executed, np.diff(self.times))
 
 
-def trajectory(
-    recording: Recording, timing: Timing, limits: JointLimits, blend: bool = True
-) -> Trajectory:
+def trajectory(recording: Recording, timing: Timing, limits: JointLimits) -> Trajectory:
     """Return the points of a motion in time.
 
     Args:
         recording: The motion.
-        timing: rest: at rest at both ends, and wherever two straight lines meet, within limits of
-            speed, acceleration and jerk | optimal: as fast as limits of speed and acceleration
-            permit | uniform: equal times from instant to instant, as short as the limits of speed
-            permit; its speed jumps.
+        timing: optimal: as fast as limits of speed and acceleration permit, at rest at both ends
+            and wherever two straight lines meet | uniform: equal times from instant to instant, as
+            short as the limits of speed permit; its speed jumps.
         limits: Limits of the joints.
-        blend: Whether the optimal timing rounds the corners of a certified motion, as far as the
-            rounded motion is certified; if not, it stops at each.
 
     Raises:
         BadTiming: If the timing needs a package that is not installed.
@@ -104,62 +74,34 @@ def trajectory(
     names = tuple(joint.name for joint in recording.joints)
     units = tuple(recording.length_unit if joint.prismatic else "rad" for joint in recording.joints)
     straight = motion.coefficients is None or motion.num_segments == 0
-    rounded: BlendedMotion | None = None
     if timing == "uniform":
-        times, positions, speeds = _uniform(motion, limits.velocity)
-        kind: Interpolation = "linear" if straight else "cubic"
-        rates = None if straight else speeds
-        return Trajectory(names, units, times, positions, rates, kind, recording.verdict)
-    if timing == "rest" and straight:
-        return Trajectory(
-            names, units, *rest_on_lines(motion, limits), "quintic", recording.verdict
-        )
-    if timing == "rest":
-        found: Timed | None = rest_on_curve(motion, limits)
-    elif not straight:
-        found = along_curve(motion, limits.velocity, limits.acceleration)
-    elif blend and recording.verdict.certified and (motion.q != motion.q[0]).any():
-        rounded = blended(motion, recording.parts, recording.margin, limits.velocity)
-        found = along_curve(
-            rounded.motion, limits.velocity, limits.acceleration, rounded.lengths, rounded.stops
-        )
-    else:
-        points = along_lines(motion, limits.velocity, limits.acceleration)
-        return Trajectory(names, units, *points, "cubic", recording.verdict)
-    if found is None:
-        must = "--timing optimal of a curve needs toppra: pip install 'evoexp[timing]'"
-        raise BadTiming(must + ("; --no-blend stops at corners, without it" if rounded else ""))
-    parts = recording.parts if rounded is None else rounded.parts
-    path = motion if rounded is None else rounded.motion
-    verdict = _executed_verdict(found, path, parts, recording.margin)
-    corners = 0 if rounded is None else rounded.num_corners
-    return Trajectory(names, units, *found, "cubic", verdict, corners)
+        times, positions, rates = _uniform(motion, limits.velocity)
+        cubic_rates = None if straight else rates
+        return Trajectory(names, units, times, positions, cubic_rates, recording.verdict)
+    timed = fastest(motion, limits.velocity, limits.acceleration)
+    # cubics between points of a line stay on it
+    verdict = recording.verdict if straight else _executed_verdict(timed, recording)
+    return Trajectory(names, units, *timed, verdict)
 
 
-def _uniform(motion: Motion, speeds: FloatArray) -> Timed:
+def _uniform(motion: Motion, speeds: FloatArray) -> TimedPoints:
     """Time a motion by equal times from instant to instant."""
     instants = np.arange(float(motion.num_segments + 1))
     seconds = seconds_per_instant(motion, speeds)
-    return seconds * instants, motion.q, velocities(motion, instants, seconds)
+    return TimedPoints(seconds * instants, motion.q, velocities(motion, instants, seconds))
 
 
-def _executed_verdict(
-    timed: Timed, path: Motion, parts: Sequence[Part], margin: float
-) -> Certificate:
-    """Certify the cubics that a controller puts between points on a path."""
-    executed = hermite_motion(*timed)
-    places = [_point_at(timed[1], path.q[part.last]) for part in parts[:-1]]
-    borders = [0, *places, executed.num_segments]
+def _executed_verdict(timed: TimedPoints, recording: Recording) -> Certificate:
+    """Certify the cubics that a controller puts between points on a curve."""
+    executed, parts = hermite_motion(*timed), recording.parts
+    borders = [recording.motion.q[part.last] for part in parts[:-1]]
+    places = [int(np.argmin(((timed.positions - q) ** 2).sum(axis=1))) for q in borders]
+    instants = [0, *places, executed.num_segments]
     moved = [
         part._replace(first=first, last=last)
-        for part, first, last in zip(parts, borders[:-1], borders[1:], strict=True)
+        for part, first, last in zip(parts, instants[:-1], instants[1:], strict=True)
     ]
-    return certificate(moved, executed, margin)
-
-
-def _point_at(positions: FloatArray, q: FloatArray) -> int:
-    """Return the point at a configuration."""
-    return int(np.argmin(((positions - q) ** 2).sum(axis=1)))
+    return certificate(moved, executed, recording.margin)
 
 
 def as_ros(found: Trajectory) -> bytes:
@@ -171,7 +113,6 @@ def as_ros(found: Trajectory) -> bytes:
     others = sorted(set(found.units) - {"rad", "m"})
     if others:
         raise BadTiming(f"--format ros: joints that slide must do so in m, was {others[0]}")
-    nothing = [0.0] * len(found.joints)
     points = []
     nanoseconds = np.rint(found.times * 1e9).astype(np.int64)
     for k, time in enumerate(nanoseconds.tolist()):
@@ -180,7 +121,7 @@ def as_ros(found: Trajectory) -> bytes:
             {
                 "positions": found.positions[k].tolist(),
                 "velocities": rates,
-                "accelerations": nothing if found.interpolation == "quintic" else [],
+                "accelerations": [],
                 "effort": [],
                 "time_from_start": {"sec": time // 10**9, "nanosec": time % 10**9},
             }

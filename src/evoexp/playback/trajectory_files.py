@@ -19,8 +19,8 @@ from evoexp.errors import printable
 from evoexp.input_files import NUMBER, TableError, read_table
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.playback.optimal_timing import hermite_motion
 from evoexp.playback.recording import Joint
+from evoexp.playback.timing import hermite_motion
 from evoexp.records import FloatArray
 
 TURNS = {"rad": 1.0, "radian": 1.0, "radians": 1.0}
@@ -37,43 +37,26 @@ _WORD = re.compile(r"[A-Za-z]+|°")
 
 
 class Values(NamedTuple):
-    """Positions or velocities of one joint, or the numbers of a column.
+    """Positions or velocities of one joint, or the numbers of a column."""
 
-    Attributes:
-        numbers: (points,) in the unit, of velocities per second.
-        unit: As the file has it; empty: it names none.
-    """
-
-    numbers: FloatArray
-    unit: str = ""
+    numbers: FloatArray  # (points,) in the unit, of velocities per second
+    unit: str = ""  # as the file has it; empty: it names none
 
 
 class JointTrajectory(NamedTuple):
-    """A joint trajectory as a file has it.
+    """A joint trajectory as a file has it."""
 
-    Attributes:
-        positions: By joint.
-        velocities: By joint; none if the file has none.
-        times: (points,) [s]; None: the file has none.
-        unread: Names of what is not read.
-    """
-
-    positions: dict[str, Values]
-    velocities: dict[str, Values]
-    times: FloatArray | None
-    unread: tuple[str, ...] = ()
+    positions: dict[str, Values]  # by joint
+    velocities: dict[str, Values]  # by joint; none if the file has none
+    times: FloatArray | None  # (points,) [s]; None: the file has none
+    unread: tuple[str, ...] = ()  # names of what is not read
 
 
 class Columns(NamedTuple):
-    """The columns of a table, which a robot's joints turn into a trajectory.
+    """The columns of a table, which a robot's joints turn into a trajectory."""
 
-    Attributes:
-        numbers: (points,) by head.
-        times: (points,) [s]; None: the file has none.
-    """
-
-    numbers: dict[str, FloatArray]
-    times: FloatArray | None
+    numbers: dict[str, FloatArray]  # (points,) by head
+    times: FloatArray | None  # (points,) [s]; None: the file has none
 
 
 def read_columns(content: bytes) -> Columns:
@@ -174,11 +157,6 @@ def fitted(
     given: Columns | JointTrajectory, joints: Sequence[Joint], length_unit: str
 ) -> tuple[Motion, tuple[str, ...]]:
     """Return a trajectory as a motion of a robot's joints, and remarks on how it was read.
-
-    Args:
-        given: The trajectory.
-        joints: Of the robot, in the order of its coordinates.
-        length_unit: Of the scene.
 
     Raises:
         ValueError: If a joint is missing, or a unit, a time or a number cannot be.

@@ -33,19 +33,12 @@ _HEAD = """# The shortest proven answer known of each problem, in joint space [r
 
 
 class BestKnown(NamedTuple):
-    """The shortest proven answer known of a problem.
+    """The shortest proven answer known of a problem."""
 
-    Attributes:
-        problem: Its name, for readers.
-        length: Of the joints' path [rad, m].
-        run: Hash of the run that found it, 12 hex digits.
-        replicate: Of that run.
-    """
-
-    problem: str
-    length: float
-    run: str
-    replicate: int
+    problem: str  # its name, for readers
+    length: float  # of the joints' path [rad, m]
+    run: str  # hash of the run that found it, 12 hex digits
+    replicate: int  # of that run
 
 
 def shipped_best_known() -> dict[str, BestKnown]:
@@ -66,10 +59,6 @@ def read_best_known(path: str | Path) -> dict[str, BestKnown]:
 
 def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
     """Return a file's content by the keys of problems.
-
-    Args:
-        content: Of the file.
-        name: Of the file, for errors.
 
     Raises:
         SettingError: If something in it cannot be.

@@ -19,14 +19,7 @@ def refuted(condition: ConditionResults) -> dict[int, tuple[float, str]]:
 def contact(
     prepared: Prepared, solution: FloatArray, instant: float, pair: str
 ) -> tuple[float, float]:
-    """Return the point in the plane, (x, y), at which two bodies touch.
-
-    Args:
-        prepared: Planner and problem.
-        solution: The solution whose motion is refuted.
-        instant: Instant of the first contact.
-        pair: Names of the bodies, as the verdict gives them.
-    """
+    """Return the point in the plane, (x, y), at which two bodies touch."""
     planner, problem = prepared
     motion = planner.motion(problem, solution)
     scene = next(p.scene for p in planner.parts(problem, motion) if p.first <= instant <= p.last)

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from evoexp.condition import Condition
 from evoexp.report import markdown
 from evoexp.report.data_schema import schema
-from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.html_page import html_page
 from evoexp.report.index import document
 from evoexp.report.latex_tables import latex_tables
@@ -28,26 +27,17 @@ INDEX = "index.md"
 
 
 class Request(NamedTuple):
-    """The conditions of a report, and the words that ask for it.
+    """The conditions of a report, and the words that ask for it."""
 
-    Attributes:
-        report_name: Directory under `reports`.
-        experiment: Name of the experiment; empty for runs given by their hashes.
-        budget: Name of the budget; empty for runs given by their hashes.
-        conditions: (label, condition) in the order of the experiment.
-        arguments: What was asked for, as words of the command line: "rana_planar budget=smoke";
-            derived if empty.
-        options: Label → the options that were taken; None: those that the runs' manifests name.
-        command: That draws it.
-    """
-
-    report_name: str
-    experiment: str
-    budget: str
-    conditions: Sequence[tuple[str, Condition]]
+    report_name: str  # directory under `reports`
+    experiment: str  # name of the experiment; empty for runs given by their hashes
+    budget: str  # name of the budget; empty for runs given by their hashes
+    conditions: Sequence[tuple[str, Condition]]  # (label, condition) in the order of the experiment
+    # What was asked for, as words of the command line: "rana_planar budget=smoke"; derived if empty
     arguments: str = ""
+    # Label → the options that were taken; None: those that the runs' manifests name
     options: Mapping[str, tuple[Option, ...]] | None = None
-    command: str = "report"
+    command: str = "report"  # that draws it
 
     @property
     def words(self) -> str:
@@ -71,15 +61,10 @@ class Request(NamedTuple):
 
 
 class ReportFiles(NamedTuple):
-    """A report before it is written.
+    """A report before it is written."""
 
-    Attributes:
-        directory: Its folder.
-        files: Name → content.
-    """
-
-    directory: Path
-    files: dict[str, bytes]
+    directory: Path  # its folder
+    files: dict[str, bytes]  # name → content
 
 
 def report(
@@ -122,17 +107,10 @@ def derived(
 def page_files(
     request: Request, page: Page, found: Results, settings: ReportSettings
 ) -> ReportFiles:
-    """Draw a page's figures and return all its files.
-
-    Args:
-        request: Names the folder, and the command.
-        page: The parts.
-        found: The results that it was made from.
-        settings: Formats and levels.
-    """
+    """Draw a page's figures and return all its files."""
     files: dict[str, bytes] = {}
-    for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
-        files |= drawn
+    for drawing in page.drawings:
+        files |= _drawn(drawing, settings)
     players = players_of(page.drawings, found.experiment)
     command = f"evoexp {request.command} {request.words}"
     text = document(page, found, settings, command, players)

@@ -67,27 +67,16 @@ _KEYS = {"claim", "source", "kind", "reproduced", "contradicted", "limits", "exp
 
 
 class Rule(NamedTuple):
-    """A claim of a paper, and the rule by which it is judged.
+    """A claim of a paper, and the rule by which it is judged."""
 
-    Attributes:
-        name: Of the claim: `free_at_via_points`.
-        claim: The claim in our words; {words} are filled in where it is judged.
-        source: Where the paper makes it.
-        kind: One of `KINDS`.
-        reproduced: When the claim is reproduced, in words.
-        contradicted: When it is contradicted, in words; empty: wherever it is not reproduced.
-        limits: Numbers that the rule needs, by name.
-        experiments: Names of the experiments that judge it.
-    """
-
-    name: str
-    claim: str
-    source: str
-    kind: str
-    reproduced: str
-    contradicted: str
-    limits: Mapping[str, float]
-    experiments: tuple[str, ...]
+    name: str  # of the claim: `free_at_via_points`
+    claim: str  # the claim in our words; {words} are filled in where it is judged
+    source: str  # where the paper makes it
+    kind: str  # one of `KINDS`
+    reproduced: str  # when the claim is reproduced, in words
+    contradicted: str  # when it is contradicted, in words; empty: wherever it is not reproduced
+    limits: Mapping[str, float]  # numbers that the rule needs, by name
+    experiments: tuple[str, ...]  # names of the experiments that judge it
 
     def about(self, **words: object) -> "Rule":
         """Return the rule with its words in braces filled in; limits are known already.

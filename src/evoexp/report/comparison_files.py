@@ -1,28 +1,20 @@
 """The table of a comparison as CSV for spreadsheets, and as LaTeX for papers."""
 
-import csv
-import io
-import math
 from collections.abc import Sequence
 
+import pandas as pd
+
 from evoexp.report import markdown
-from evoexp.report.latex_tables import escaped
+from evoexp.report.latex_tables import escaped, tabular
 from evoexp.report.pages.comparison import Rated, effort_text
 
-COLUMNS = (
+HEADERS = (
     "planner",
     "problem",
-    "n",
+    "$n$",
     "proven",
-    "effort",
-    "effort_low",
-    "effort_high",
-    "length",
-    "length_lower",
-    "length_upper",
-    "body_queries",
-    "evaluations",
-    "cpu_s",
+    r"queries per proven answer ({level}\,\%)",
+    "length [quartiles]",
 )
 
 
@@ -34,47 +26,39 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
     body_queries (the effort in pairs of shapes), evaluations and cpu_s (expected to a proven
     answer, as the effort is), empty where they are not known.
     """
-    file = io.StringIO(newline="")
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for row in rows:
-        others = row.queries * row.body_tests, row.evaluations, row.cpu_s
-        numbers = (row.queries, *row.interval, *row.lengths[:3], *others)
-        cells = ("" if math.isnan(value) else repr(float(value)) for value in numbers)
-        writer.writerow((row.planner, row.problem, row.runs, row.proven, *cells))
-    return file.getvalue().encode()
+    table = pd.DataFrame(
+        {
+            "planner": row.planner,
+            "problem": row.problem,
+            "n": row.runs,
+            "proven": row.proven,
+            "effort": row.queries,
+            "effort_low": row.interval.low,
+            "effort_high": row.interval.high,
+            "length": row.lengths.median,
+            "length_lower": row.lengths.lower,
+            "length_upper": row.lengths.upper,
+            "body_queries": row.queries * row.body_tests,
+            "evaluations": row.evaluations,
+            "cpu_s": row.cpu_s,
+        }
+        for row in rows
+    )
+    return table.to_csv(index=False, lineterminator="\n").encode()
 
 
 def as_latex(rows: Sequence[Rated], command: str, confidence: float) -> bytes:
-    r"""Return the table as LaTeX; it needs `\usepackage{booktabs}`.
-
-    Args:
-        rows: Of the table.
-        command: That makes it, for a comment above it.
-        confidence: Level of the interval.
-    """
-    level = f"{100.0 * confidence:g}"
-    head = (
-        "planner",
-        "problem",
-        "$n$",
-        "proven",
-        rf"queries per proven answer ({level}\,\%)",
-        "length [quartiles]",
-    )
+    r"""Return the table as LaTeX; it needs `\usepackage{booktabs}`."""
     lines = [
         f"% made by {command.replace(chr(10), ' ')}",
         "% queries: expected running time, failed runs included; length: best proven one [rad, m]",
-        r"\begin{tabular}{llrrrr}",
-        r"\toprule",
-        " & ".join(head) + r" \\",
-        r"\midrule",
-        *(" & ".join(_cells(row)) + r" \\" for row in rows),
-        r"\bottomrule",
-        r"\end{tabular}",
-        "",
+        *tabular(
+            (head.format(level=f"{100.0 * confidence:g}") for head in HEADERS),
+            map(_cells, rows),
+            "llrrrr",
+        ),
     ]
-    return "\n".join(lines).encode()
+    return "\n".join([*lines, ""]).encode()
 
 
 def _cells(row: Rated) -> tuple[str, ...]:

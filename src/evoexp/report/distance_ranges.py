@@ -4,7 +4,7 @@ Motions are looked at one after the other and not kept, so that ten thousand tak
 than one.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,37 +12,18 @@ import numpy as np
 from evoexp.collision.certifier.least_distance import LeastDistance, known
 from evoexp.collision.scene import Scene
 from evoexp.records import FloatArray
-from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.motion_geometry import BodyDistance
-
-SHARE = 250  # replicates that are worth another process
 
 Measure = Callable[[FloatArray], FloatArray]  # (nq, configurations) → (configurations,)
 
 
 class Extremes(NamedTuple):
-    """The least and the greatest value at each instant, and the configurations that have them.
+    """The least and the greatest value at each instant, and the configurations that have them."""
 
-    Attributes:
-        lowest: (instants,); inf where nothing was seen.
-        highest: (instants,); −inf where nothing was seen.
-        at_lowest: (nq, instants), of the first replicate of several.
-        at_highest: (nq, instants), of the first replicate of several.
-    """
-
-    lowest: FloatArray
-    highest: FloatArray
-    at_lowest: FloatArray
-    at_highest: FloatArray
-
-    def with_motion(self, values: FloatArray, q: FloatArray) -> "Extremes":
-        """Return the extremes of these and one more motion.
-
-        Args:
-            values: (instants,).
-            q: (nq, instants).
-        """
-        return self.with_others(Extremes(values, values, q, q))
+    lowest: FloatArray  # (instants,); inf where nothing was seen
+    highest: FloatArray  # (instants,); −inf where nothing was seen
+    at_lowest: FloatArray  # (nq, instants), of the first replicate of several
+    at_highest: FloatArray  # (nq, instants), of the first replicate of several
 
     def with_others(self, later: "Extremes") -> "Extremes":
         """Return the extremes of these and others, of which these come first."""
@@ -69,38 +50,22 @@ class Extremes(NamedTuple):
 def extremes(
     replicates: Sequence[int], sampled: Callable[[int], FloatArray], measures: Sequence[Measure]
 ) -> tuple[Extremes, ...]:
-    """Return the extremes over replicates of several quantities, on all cores if there are many.
+    """Return the extremes over replicates of several quantities.
 
     Args:
         replicates: Their numbers, at least one.
         sampled: Gives a replicate's motion, (nq, instants).
         measures: Give the quantities of a motion.
     """
-    shares = [replicates[k : k + SHARE] for k in range(0, len(replicates), SHARE)]
-
-    def of_share(share: Iterable[int]) -> tuple[Extremes, ...]:
-        found: tuple[Extremes, ...] | None = None
-        for replicate in share:
-            q = sampled(replicate)
-            own = [measure(q) for measure in measures]
-            if found is None:
-                found = tuple(Extremes(values, values, q, q) for values in own)
-            else:
-                pairs = zip(found, own, strict=True)
-                found = tuple(seen.with_motion(values, q) for seen, values in pairs)
-        return found or ()
-
-    first, *others = on_all_cores(of_share, shares)
-    for later in others:
-        first = tuple(own.with_others(more) for own, more in zip(first, later, strict=True))
-    return first
+    found: list[Extremes] = []
+    for replicate in replicates:
+        q = sampled(replicate)
+        own = [Extremes(values, values, q, q) for values in (measure(q) for measure in measures)]
+        pairs = zip(found, own, strict=True)
+        found = [seen.with_others(later) for seen, later in pairs] if found else own
+    return tuple(found)
 
 
 def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:
-    """Return a quick measure of a scene's least distance; coal itself where it alone knows bodies.
-
-    Args:
-        scene: With the pairs that are looked at.
-        exact: The same pairs, by coal.
-    """
+    """Return a quick measure of a scene's least distance; coal where it alone knows bodies."""
     return LeastDistance(scene) if known(scene) else exact

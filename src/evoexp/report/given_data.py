@@ -24,37 +24,22 @@ MOST = 10**18  # seeds and queries stay below
 
 
 class GivenAnswer(NamedTuple):
-    """A row of the file.
+    """A row of the file."""
 
-    Attributes:
-        line: Number of the line in the file, from 1.
-        planner: Its name.
-        problem: Name of the problem.
-        seed: Of the run.
-        queries: Configurations that the run had judged for collision so far.
-        cost: Length of the path [rad, m]; NaN: no answer, the whole run has spent that much.
-    """
-
-    line: int
-    planner: str
-    problem: str
-    seed: int
-    queries: int
-    cost: float
+    line: int  # number of the line in the file, from 1
+    planner: str  # its name
+    problem: str  # name of the problem
+    seed: int  # of the run
+    queries: int  # configurations that the run had judged for collision so far
+    cost: float  # length of the path [rad, m]; NaN: no answer, the whole run has spent that much
 
 
 class GivenData(NamedTuple):
-    """A file's content.
+    """A file's content."""
 
-    Attributes:
-        name: Of the file.
-        sha256: Of its bytes, 64 hex digits.
-        answers: Its rows, in order.
-    """
-
-    name: str
-    sha256: str
-    answers: tuple[GivenAnswer, ...]
+    name: str  # of the file
+    sha256: str  # of its bytes, 64 hex digits
+    answers: tuple[GivenAnswer, ...]  # its rows, in order
 
 
 def read_given(path: str) -> GivenData:
@@ -153,10 +138,6 @@ def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
 
     A problem is one of ours if the file calls it as the page does, or by a label of one of its
     conditions, or by its key; else it is a problem of its own, where any answer is the only target.
-
-    Args:
-        data: The file.
-        ours: Runs of stored conditions.
     """
     known = _known(ours)
     cells: dict[tuple[str, str], dict[int, list[GivenAnswer]]] = {}

@@ -17,45 +17,26 @@ USUAL = {"Conditions", "Results", "Claims", "Motions", "Figures", "Parameters", 
 
 
 class Paper(NamedTuple):
-    """A paper that is reproduced.
+    """A paper that is reproduced."""
 
-    Attributes:
-        name: The names of its experiments begin with it.
-        title: Authors and year.
-        subtitle: What it is about.
-        experiments: Names of its experiments.
-        claims: Experiment → number of claims that it judges.
-    """
-
-    name: str
-    title: str
-    subtitle: str
-    experiments: tuple[str, ...]
-    claims: dict[str, int]
+    name: str  # the names of its experiments begin with it
+    title: str  # authors and year
+    subtitle: str  # what it is about
+    experiments: tuple[str, ...]  # names of its experiments
+    claims: dict[str, int]  # experiment → number of claims that it judges
 
 
 class StoredRun(NamedTuple):
-    """A stored run.
+    """A stored run."""
 
-    Attributes:
-        hash12: The twelve hex digits that name it.
-        experiment: That it belongs to; empty if that is not known.
-        label: Of its condition; empty if that is not known.
-        budget: Empty if that is not known.
-        done: Finished replicates.
-        planned: Planned replicates.
-        failed: Failed replicates.
-        damage: What is wrong with it; empty if nothing is.
-    """
-
-    hash12: str
-    experiment: str
-    label: str
-    budget: str
-    done: int
-    planned: int
-    failed: int
-    damage: str = ""
+    hash12: str  # the twelve hex digits that name it
+    experiment: str  # that it belongs to; empty if that is not known
+    label: str  # of its condition; empty if that is not known
+    budget: str  # empty if that is not known
+    done: int  # finished replicates
+    planned: int  # planned replicates
+    failed: int  # failed replicates
+    damage: str = ""  # what is wrong with it; empty if nothing is
 
     @property
     def state(self) -> str:
@@ -70,21 +51,13 @@ class StoredRun(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A link to a report.
+    """A link to a report."""
 
-    Attributes:
-        text: Name of its folder.
-        url: Relative to the home page.
-        partial: Whether results are missing.
-        failed: Number of failed replicates.
-        detail: Its title.
-    """
-
-    text: str
-    url: str
-    partial: bool = False
-    failed: int = 0
-    detail: str = ""
+    text: str  # name of its folder
+    url: str  # relative to the home page
+    partial: bool = False  # whether results are missing
+    failed: int = 0  # number of failed replicates
+    detail: str = ""  # its title
 
 
 class Picture(NamedTuple):
@@ -96,47 +69,28 @@ class Picture(NamedTuple):
 
 
 class PaperCard(NamedTuple):
-    """A paper on the home page.
+    """A paper on the home page."""
 
-    Attributes:
-        title: Authors and year.
-        subtitle: What it is about.
-        picture: Of one of its reports; None if none has any.
-        counts: (verdict, number of claims), over the reports of its experiments.
-        unjudged: Claims of experiments without a report at the paper's budget.
-        links: To its reports.
-        missing: Experiments without a report.
-    """
-
-    title: str
-    subtitle: str
-    picture: Picture | None
+    title: str  # authors and year
+    subtitle: str  # what it is about
+    picture: Picture | None  # of one of its reports; None if none has any
+    # (verdict, number of claims), over the reports of its experiments
     counts: tuple[tuple[str, int], ...]
-    unjudged: int
-    links: tuple[Link, ...]
-    missing: tuple[str, ...]
+    unjudged: int  # claims of experiments without a report at the paper's budget
+    links: tuple[Link, ...]  # to its reports
+    missing: tuple[str, ...]  # experiments without a report
 
 
 class Site(NamedTuple):
-    """The content of the home page.
+    """The content of the home page."""
 
-    Attributes:
-        num_reports: Of all reports.
-        partial: Links to those whose results are not complete.
-        num_earlier: Reports of an earlier version, of which only the title is known.
-        unfinished: Runs of which planned replicates are missing, or failed.
-        papers: One card each.
-        others: (heading, links): reports of no paper.
-        runs: Stored runs with links to reports.
-    """
-
-    num_reports: int
-    partial: tuple[Link, ...]
-    num_earlier: int
-    unfinished: int
-    papers: tuple[PaperCard, ...]
-    others: tuple[tuple[str, tuple[Link, ...]], ...]
-    runs: tuple[tuple[StoredRun, tuple[Link, ...]], ...]
+    num_reports: int  # of all reports
+    partial: tuple[Link, ...]  # links to those whose results are not complete
+    num_earlier: int  # reports of an earlier version, of which only the title is known
+    unfinished: int  # runs of which planned replicates are missing, or failed
+    papers: tuple[PaperCard, ...]  # one card each
+    others: tuple[tuple[str, tuple[Link, ...]], ...]  # (heading, links): reports of no paper
+    runs: tuple[tuple[StoredRun, tuple[Link, ...]], ...]  # stored runs with links to reports
 
 
 def summaries(reports: Path) -> list[ReportSummary]:
@@ -148,13 +102,7 @@ def summaries(reports: Path) -> list[ReportSummary]:
 def home_page(
     found: Sequence[ReportSummary], papers: Sequence[Paper], runs: Sequence[StoredRun]
 ) -> bytes:
-    """Return the home page; the same reports and runs give the same bytes.
-
-    Args:
-        found: The reports.
-        papers: In the order of their cards.
-        runs: In the order of their table.
-    """
+    """Return the home page; the same reports and runs give the same bytes."""
     content = site(found, papers, runs)
     return written("home_page.html", site=content, search=script_json(list(_search(found))))
 

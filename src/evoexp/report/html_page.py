@@ -16,37 +16,22 @@ _SIZE = re.compile(rb'<svg [^>]*?height="([\d.]+)pt"[^>]*? width="([\d.]+)pt"')
 
 
 class FigurePlace(NamedTuple):
-    """A figure on the page.
+    """A figure on the page."""
 
-    Attributes:
-        text: Title, caption, files.
-        anchor: Its address on the page.
-        file: The picture that is shown; empty if there is none.
-        size: Width and height [px]; None: not known.
-    """
-
-    text: FigureText
-    anchor: str
-    file: str
-    size: tuple[int, int] | None
+    text: FigureText  # title, caption, files
+    anchor: str  # its address on the page
+    file: str  # the picture that is shown; empty if there is none
+    size: tuple[int, int] | None  # width and height [px]; None: not known
 
 
 class SectionPlace(NamedTuple):
-    """A section on the page.
+    """A section on the page."""
 
-    Attributes:
-        text: Its content.
-        heading: Above it.
-        anchor: Its address on the page.
-        figures: Those in it.
-        verdicts: (verdict, number of claims); empty where it has none.
-    """
-
-    text: Section
-    heading: str
-    anchor: str
-    figures: tuple[FigurePlace, ...]
-    verdicts: tuple[tuple[str, int], ...]
+    text: Section  # its content
+    heading: str  # above it
+    anchor: str  # its address on the page
+    figures: tuple[FigurePlace, ...]  # those in it
+    verdicts: tuple[tuple[str, int], ...]  # (verdict, number of claims); empty where it has none
 
 
 def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:

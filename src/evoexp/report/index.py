@@ -42,15 +42,7 @@ def document(
     command: str,
     players: Players | None = None,
 ) -> Document:
-    """Return the text of a page; the same results give the same text.
-
-    Args:
-        page: Its parts.
-        results: The results that it was drawn from.
-        settings: Levels and formats.
-        command: The command that makes it.
-        players: Of the motions that its figures show.
-    """
+    """Return the text of a page; the same results give the same text."""
     notices = (_incomplete(results), _damaged(results), _added(results))
     sections = (
         Section("Conditions", table=_conditions(results, settings)),

@@ -75,12 +75,6 @@ def run_rows(own: PlannerRuns, replicate: int, spent: float, nothing: float) -> 
 
     Readers tell runs apart by the first evaluation, so its row is always there, and is the only one
     of that number.
-
-    Args:
-        own: Runs of the planner.
-        replicate: The run.
-        spent: Collision queries of the whole run.
-        nothing: Length that stands for no answer.
     """
     table = own.table[(own.table["replicate"] == replicate) & own.table["certified"]]
     rows, best = [(1, nothing)], nothing

@@ -17,17 +17,11 @@ ONLY_CONTROLS = "only a control was run"
 
 
 class Hearing(NamedTuple):
-    """One claim before its judge: each method judges it by one kind of rule.
+    """One claim before its judge: each method judges it by one kind of rule."""
 
-    Attributes:
-        rule: Of the claim, its words filled in.
-        reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
-        significance: Below this adjusted p-value a difference counts.
-    """
-
-    rule: Rule
-    reason: str
-    significance: float
+    rule: Rule  # of the claim, its words filled in
+    reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
+    significance: float  # below this adjusted p-value a difference counts
 
     def every(self, evidence: str, holds: int, done: int, planned: int) -> Claim:
         """Judge a claim about every run; see `verdicts.judge_all`."""
@@ -73,14 +67,7 @@ class Hearing(NamedTuple):
     def same_share(
         self, evidence: str, own: Proportion, printed: Proportion, p_adjusted: float
     ) -> Claim:
-        """Judge a claim that gives a share, a sample itself, by Fisher's exact test.
-
-        Args:
-            evidence: The numbers.
-            own: Our share.
-            printed: The paper's.
-            p_adjusted: Of the test of both, adjusted over all shares that are judged together.
-        """
+        """Judge a claim that gives a share, a sample itself, by Fisher's exact test."""
         verdict = verdicts.judged(p_adjusted >= self.significance if own.total else None)
         return self._claim("same share", evidence, f"{own.total} and {printed.total}", verdict)
 
@@ -118,17 +105,11 @@ def _seeds(rows: Sequence[Comparison]) -> str:
 
 
 class Judge(NamedTuple):
-    """Opens the hearings of claims; where nothing is judged, each claim names the reason instead.
+    """Opens the hearings of claims; where nothing is judged, each claim names the reason."""
 
-    Attributes:
-        reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
-        significance: Below this adjusted p-value a difference counts.
-        rules: Of the paper's claims, by name.
-    """
-
-    reason: str
-    significance: float
-    rules: Rules = NO_RULES
+    reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
+    significance: float  # below this adjusted p-value a difference counts
+    rules: Rules = NO_RULES  # of the paper's claims, by name
 
     def on(self, name: str, **words: object) -> Hearing:
         """Open the hearing of a claim.
@@ -171,12 +152,7 @@ def not_judged(results: Results) -> str:
 
 
 def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
-    """Yield the claims that an experiment judges on conditions which are not among its results.
-
-    Args:
-        results: Of the experiment.
-        judged: The claims that its page judges.
-    """
+    """Yield the claims that an experiment judges on conditions which are not among its results."""
     budget = results.budget if results.budget == "smoke" else "paper"
     rows = [r for r in shipped() if (r.experiment, r.budget) == (results.experiment, budget)]
     missing = {row.label for row in rows} - {c.label for c in results.conditions}

@@ -13,108 +13,61 @@ protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 - the seed is the unit of all statistics: `spread`, `Proportion`, `fisher_exact`, `holm`, ….
 """
 
-from evoexp.report import (
-    body_contacts,
-    distance_ranges,
-    judging,
-    markdown,
-    motion_geometry,
-    run_measures,
-    style,
-    sweep_figures,
-    verdicts,
-)
-from evoexp.report.claim_rules import read_rules
-from evoexp.report.comparisons import Values, beside, by_column, compared, compared_with_controls
-from evoexp.report.figures import convergence, shares
-from evoexp.report.judging import Judge, evidence
-from evoexp.report.page_parts import Drawing, Page, PlayedRun, Quantity, Table
-from evoexp.report.pages import assumptions, generic
-from evoexp.report.pages.assumptions import Headline
-from evoexp.report.parameters import overridden, parameters, planned_replicates
-from evoexp.report.proportions import Proportion, fisher_exact, newcombe
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, wrapped
-from evoexp.report.rows import groups, records, rounded
-from evoexp.report.run_measures import (
-    counted,
-    grouped,
-    median_replicate,
-    planned_by,
-    search_seconds,
-    solved,
-    success,
-)
-from evoexp.report.statistics import (
-    BOOTSTRAP_SEED,
-    Interval,
-    effort_ratio,
-    expected_effort,
-    expected_interval,
-    holm,
-    quantile,
-    quantiles,
-    spread,
-)
-from evoexp.report.verdicts import Claim, Comparison
-
-__all__ = [
-    "BOOTSTRAP_SEED",
-    "Claim",
-    "Comparison",
-    "ConditionResults",
-    "Drawing",
-    "Headline",
-    "Interval",
-    "Judge",
-    "Page",
-    "PlayedRun",
-    "Proportion",
-    "Quantity",
-    "ReportSettings",
-    "Results",
-    "Table",
-    "Values",
-    "assumptions",
-    "beside",
-    "body_contacts",
-    "by_column",
-    "compared",
-    "compared_with_controls",
-    "convergence",
-    "counted",
-    "distance_ranges",
-    "effort_ratio",
-    "evidence",
-    "expected_effort",
-    "expected_interval",
-    "fisher_exact",
-    "generic",
-    "grouped",
-    "groups",
-    "holm",
-    "judging",
-    "markdown",
-    "median_replicate",
-    "motion_geometry",
-    "newcombe",
-    "overridden",
-    "parameters",
-    "planned_by",
-    "planned_replicates",
-    "quantile",
-    "quantiles",
-    "read_rules",
-    "records",
-    "rounded",
-    "run_measures",
-    "search_seconds",
-    "shares",
-    "solved",
-    "spread",
-    "style",
-    "success",
-    "sweep_figures",
-    "verdicts",
-    "wrapped",
-]
+from evoexp.report import body_contacts as body_contacts
+from evoexp.report import distance_ranges as distance_ranges
+from evoexp.report import judging as judging
+from evoexp.report import markdown as markdown
+from evoexp.report import motion_geometry as motion_geometry
+from evoexp.report import run_measures as run_measures
+from evoexp.report import style as style
+from evoexp.report import sweep_figures as sweep_figures
+from evoexp.report import verdicts as verdicts
+from evoexp.report.claim_rules import read_rules as read_rules
+from evoexp.report.comparisons import Values as Values
+from evoexp.report.comparisons import beside as beside
+from evoexp.report.comparisons import by_column as by_column
+from evoexp.report.comparisons import compared as compared
+from evoexp.report.comparisons import compared_with_controls as compared_with_controls
+from evoexp.report.figures import convergence as convergence
+from evoexp.report.figures import shares as shares
+from evoexp.report.judging import Judge as Judge
+from evoexp.report.judging import evidence as evidence
+from evoexp.report.page_parts import Drawing as Drawing
+from evoexp.report.page_parts import Page as Page
+from evoexp.report.page_parts import PlayedRun as PlayedRun
+from evoexp.report.page_parts import Quantity as Quantity
+from evoexp.report.page_parts import Table as Table
+from evoexp.report.pages import assumptions as assumptions
+from evoexp.report.pages import generic as generic
+from evoexp.report.pages.assumptions import Headline as Headline
+from evoexp.report.parameters import overridden as overridden
+from evoexp.report.parameters import parameters as parameters
+from evoexp.report.parameters import planned_replicates as planned_replicates
+from evoexp.report.proportions import Proportion as Proportion
+from evoexp.report.proportions import fisher_exact as fisher_exact
+from evoexp.report.proportions import newcombe as newcombe
+from evoexp.report.report_settings import ReportSettings as ReportSettings
+from evoexp.report.results import ConditionResults as ConditionResults
+from evoexp.report.results import Results as Results
+from evoexp.report.results import wrapped as wrapped
+from evoexp.report.rows import groups as groups
+from evoexp.report.rows import records as records
+from evoexp.report.rows import rounded as rounded
+from evoexp.report.run_measures import counted as counted
+from evoexp.report.run_measures import grouped as grouped
+from evoexp.report.run_measures import median_replicate as median_replicate
+from evoexp.report.run_measures import planned_by as planned_by
+from evoexp.report.run_measures import search_seconds as search_seconds
+from evoexp.report.run_measures import solved as solved
+from evoexp.report.run_measures import success as success
+from evoexp.report.statistics import BOOTSTRAP_SEED as BOOTSTRAP_SEED
+from evoexp.report.statistics import Interval as Interval
+from evoexp.report.statistics import effort_ratio as effort_ratio
+from evoexp.report.statistics import expected_effort as expected_effort
+from evoexp.report.statistics import expected_interval as expected_interval
+from evoexp.report.statistics import holm as holm
+from evoexp.report.statistics import quantile as quantile
+from evoexp.report.statistics import quantiles as quantiles
+from evoexp.report.statistics import spread as spread
+from evoexp.report.verdicts import Claim as Claim
+from evoexp.report.verdicts import Comparison as Comparison

@@ -1,7 +1,7 @@
 r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs}`."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from evoexp.report.page_text import Document, Section, TableText
 
@@ -42,38 +42,12 @@ _SIGNS = {
     "”": "''",
     "’": "'",
 }
-_GREEK = {
-    "α": "alpha",
-    "β": "beta",
-    "γ": "gamma",
-    "δ": "delta",
-    "ε": "varepsilon",
-    "ζ": "zeta",
-    "η": "eta",
-    "θ": "theta",
-    "ι": "iota",
-    "κ": "kappa",
-    "λ": "lambda",
-    "μ": "mu",
-    "ν": "nu",
-    "ξ": "xi",
-    "π": "pi",
-    "ρ": "rho",
-    "σ": "sigma",
-    "τ": "tau",
-    "φ": "varphi",
-    "χ": "chi",
-    "ψ": "psi",
-    "ω": "omega",
-    "Δ": "Delta",
-    "Θ": "Theta",
-    "Λ": "Lambda",
-    "Σ": "Sigma",
-    "Φ": "Phi",
-    "Ψ": "Psi",
-    "Ω": "Omega",
-}
-_SIGNS |= {letter: rf"$\{name}$" for letter, name in _GREEK.items()}
+_GREEK = "αβγδεζηθικλμνξπρστφχψωΔΘΛΣΦΨΩ"
+_NAMES = (
+    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
+    "varphi chi psi omega Delta Theta Lambda Sigma Phi Psi Omega"
+)
+_SIGNS |= {letter: rf"$\{name}$" for letter, name in zip(_GREEK, _NAMES.split(), strict=True)}
 _SIGNS |= {sign: f"$_{k}$" for k, sign in enumerate("₀₁₂₃₄₅₆₇₈₉")}
 _SIGNS |= {sign: f"$^{k}$" for k, sign in zip("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹", strict=True)}
 
@@ -92,9 +66,29 @@ def latex_tables(document: Document) -> dict[str, bytes]:
     }
 
 
+def tabular(headers: Iterable[str], rows: Iterable[Iterable[str]], columns: str) -> list[str]:
+    """Return the lines of a table without its frame.
+
+    Args:
+        headers: Heads of the columns, in LaTeX.
+        rows: Their cells, in LaTeX.
+        columns: How the columns stand: "lrr".
+    """
+    return [
+        rf"\begin{{tabular}}{{{columns}}}",
+        r"\toprule",
+        " & ".join(headers) + r" \\",
+        r"\midrule",
+        *(" & ".join(row) + r" \\" for row in rows),
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+
+
 def _latex(section: Section, table: TableText, document: Document) -> str:
     size, columns, fits = _layout(table)
-    lines = [
+    lines = tabular(map(_cell, table.headers), (map(_cell, row) for row in table.rows), columns)
+    framed = [
         f"% made by {' '.join(document.command.split())}",
         f"% runs: {', '.join(run.hash12 for run in document.runs)}",
         *([] if fits else [r"% wider than a line, so made smaller: needs \usepackage{graphicx}"]),
@@ -103,17 +97,12 @@ def _latex(section: Section, table: TableText, document: Document) -> str:
         rf"\caption{{{escaped(_caption(section, table, document))}}}",
         rf"\label{{tab:{_label(section, document)}}}",
         *([] if fits else [r"\resizebox{\linewidth}{!}{%"]),
-        rf"\begin{{tabular}}{{{columns}}}",
-        r"\toprule",
-        " & ".join(map(_cell, table.headers)) + r" \\",
-        r"\midrule",
-        *(" & ".join(map(_cell, row)) + r" \\" for row in table.rows),
-        r"\bottomrule",
-        r"\end{tabular}" + "}" * (not fits),
+        *lines[:-1],
+        lines[-1] + "}" * (not fits),
         r"\end{table}",
         "",
     ]
-    return "\n".join(lines)
+    return "\n".join(framed)
 
 
 def _caption(section: Section, table: TableText, document: Document) -> str:

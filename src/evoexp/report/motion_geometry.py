@@ -20,15 +20,10 @@ LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]  # columns of `
 
 
 class Nearest(NamedTuple):
-    """The two nearest points of two bodies.
+    """The two nearest points of two bodies."""
 
-    Attributes:
-        distance: Between them.
-        points: (2, 3).
-    """
-
-    distance: float
-    points: FloatArray
+    distance: float  # between them
+    points: FloatArray  # (2, 3)
 
 
 def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:

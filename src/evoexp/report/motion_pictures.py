@@ -16,15 +16,10 @@ MOST = 4  # conditions whose motions are shown, those with the least best cost
 
 
 class ShownMotion(NamedTuple):
-    """The best motion of a condition.
+    """The best motion of a condition."""
 
-    Attributes:
-        condition: The condition.
-        recording: The motion of its best replicate.
-    """
-
-    condition: ConditionResults
-    recording: Recording
+    condition: ConditionResults  # the condition
+    recording: Recording  # the motion of its best replicate
 
     @property
     def title(self) -> str:

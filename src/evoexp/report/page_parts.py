@@ -21,25 +21,15 @@ class PlayedRun(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """One figure: from results to its table, from its table to a picture.
+    """One figure: from results to its table, from its table to a picture."""
 
-    Attributes:
-        stem: Of its files.
-        title: Heading; names the paper's figure.
-        caption: The statement of the paper, and our finding.
-        table: Gives the data.
-        draw: Draws the data.
-        conditions: Whose results it shows.
-        plays: Runs whose motions it shows.
-    """
-
-    stem: str
-    title: str
-    caption: str
-    table: Callable[[], pd.DataFrame]
-    draw: "Callable[[pd.DataFrame], Figure]"
-    conditions: tuple[ConditionResults, ...]
-    plays: tuple[PlayedRun, ...] = ()
+    stem: str  # of its files
+    title: str  # heading; names the paper's figure
+    caption: str  # the statement of the paper, and our finding
+    table: Callable[[], pd.DataFrame]  # gives the data
+    draw: "Callable[[pd.DataFrame], Figure]"  # draws the data
+    conditions: tuple[ConditionResults, ...]  # whose results it shows
+    plays: tuple[PlayedRun, ...] = ()  # runs whose motions it shows
 
 
 class Quantity(NamedTuple):
@@ -51,40 +41,24 @@ class Quantity(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A table of a page's own.
+    """A table of a page's own."""
 
-    Attributes:
-        heading: Above it.
-        headers: Of its columns.
-        rows: Their cells, as text or numbers.
-        note: Below it.
-    """
-
-    heading: str
-    headers: tuple[str, ...]
-    rows: tuple[tuple[object, ...], ...]
-    note: str = ""
+    heading: str  # above it
+    headers: tuple[str, ...]  # of its columns
+    rows: tuple[tuple[object, ...], ...]  # their cells, as text or numbers
+    note: str = ""  # below it
 
 
 class Page(NamedTuple):
-    """A report before it is written.
+    """A report before it is written."""
 
-    Attributes:
-        title: Heading.
-        introduction: One paragraph.
-        quantities: The table of results.
-        claims: With verdicts; empty where there is no paper to judge.
-        checks: (title, finding): known defects and checks of the scene, shown at every budget.
-        comparisons: Of conditions on common seeds, by heading.
-        drawings: The figures.
-        tables: Of its own, shown behind the table of results.
-    """
-
-    title: str
-    introduction: str
-    quantities: tuple[Quantity, ...] = ()
-    claims: tuple[Claim, ...] = ()
+    title: str  # heading
+    introduction: str  # one paragraph
+    quantities: tuple[Quantity, ...] = ()  # the table of results
+    claims: tuple[Claim, ...] = ()  # with verdicts; empty where there is no paper to judge
+    # (title, finding): known defects and checks of the scene, shown at every budget
     checks: tuple[tuple[str, str], ...] = ()
+    # Of conditions on common seeds, by heading
     comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()
-    drawings: tuple[Drawing, ...] = ()
-    tables: tuple[Table, ...] = ()
+    drawings: tuple[Drawing, ...] = ()  # the figures
+    tables: tuple[Table, ...] = ()  # of its own, shown behind the table of results

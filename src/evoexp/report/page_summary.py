@@ -5,7 +5,9 @@ import json
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field, TypeAdapter
 
 from evoexp.report.index import CLAIMS
 from evoexp.report.page_text import Document, Verdict
@@ -17,32 +19,26 @@ _SUMMARY = re.compile(r'<script type="application/json" id="summary">(.*?)</scri
 _MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
 
 
+Hash = Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
+Picture = Annotated[str, Field(pattern=r"^([\w.-]+\.(svg|png))?$")]  # in the report's own folder
+
+
 class ReportSummary(NamedTuple):
-    """A report that is there.
+    """A report that is there."""
 
-    Attributes:
-        folder: Its name under `reports`.
-        file: Its page in the folder.
-        title: Heading.
-        command: That draws it, without `evoexp`; empty where it is not known.
-        partial: The remark that results are missing; empty if none is.
-        failed: Number of failed replicates.
-        headings: (text, place on the page) of its sections and figures.
-        claims: (text, verdict).
-        runs: (hash, label) of its conditions, twelve hex digits.
-        picture: File of the figure that shows best what it is about; empty if there is none.
-    """
-
-    folder: str
-    file: str
-    title: str
-    command: str = ""
-    partial: str = ""
-    failed: int = 0
+    folder: str  # its name under `reports`
+    file: str  # its page in the folder
+    title: str  # heading
+    command: str = ""  # that draws it, without `evoexp`; empty where it is not known
+    partial: str = ""  # the remark that results are missing; empty if none is
+    failed: int = 0  # number of failed replicates
+    # (text, place on the page) of its sections and figures
     headings: tuple[tuple[str, str], ...] = ()
-    claims: tuple[tuple[str, str], ...] = ()
-    runs: tuple[tuple[str, str], ...] = ()
-    picture: str = ""
+    claims: tuple[tuple[str, str], ...] = ()  # (text, verdict)
+    runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
+    picture: Picture = (
+        ""  # file of the figure that shows best what it is about; empty if there is none
+    )
 
     @property
     def experiment(self) -> str:
@@ -50,13 +46,11 @@ class ReportSummary(NamedTuple):
         return re.split("[@+]", self.folder)[0]
 
 
-def summary_of(document: Document, places: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return the summary of a page as plain data.
+_REPORT = TypeAdapter(ReportSummary)
 
-    Args:
-        document: Its text.
-        places: Heading and address of its sections and figures.
-    """
+
+def summary_of(document: Document, places: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return the summary of a page as plain data."""
     claims = document.section(CLAIMS)
     figures = [figure for section in document.sections for figure in section.figures]
     names = [name for each in figures if (name := each.picture("svg", "png"))]
@@ -92,8 +86,9 @@ def read_summary(folder: Path) -> ReportSummary | None:
     try:
         found = _SUMMARY.search((folder / HTML).read_text(encoding="utf-8"))
         if found:
-            return _checked(folder.name, json.loads(found[1]))
-    except (OSError, ValueError, KeyError, TypeError):
+            named = {"folder": folder.name, "file": HTML, **json.loads(found[1])}
+            return _REPORT.validate_python(named)
+    except (OSError, ValueError, TypeError):
         pass  # nobody's page, or no page of ours
     try:
         text = (folder / MARKDOWN).read_text(encoding="utf-8")
@@ -103,31 +98,3 @@ def read_summary(folder: Path) -> ReportSummary | None:
     made = _MADE_BY.search(text)
     command = html.unescape(made[1]) if made else ""
     return ReportSummary(folder.name, MARKDOWN, html.unescape(title) or folder.name, command)
-
-
-def _checked(folder: str, data: Any) -> ReportSummary:
-    """Return a summary from plain data.
-
-    Raises:
-        ValueError, KeyError, TypeError: If it is none.
-    """
-    texts = [data[name] for name in ("title", "command", "partial", "picture")]
-    pairs = [tuple(pair) for name in ("claims", "runs", "headings") for pair in data[name]]
-    words = [*texts, *(word for pair in pairs for word in pair)]
-    if not all(isinstance(word, str) for word in words) or any(len(pair) != 2 for pair in pairs):
-        raise ValueError(f"{folder}: no summary of a report")
-    title, command, partial, picture = texts
-    if not re.fullmatch(r"([\w.-]+\.(svg|png))?", picture):
-        raise ValueError(f"{folder}: a picture of another folder")
-    return ReportSummary(
-        folder,
-        HTML,
-        title,
-        command,
-        partial,
-        int(data["failed"]),
-        tuple((text, place) for text, place in data["headings"]),
-        tuple((text, verdict) for text, verdict in data["claims"]),
-        tuple((name, label) for name, label in data["runs"] if re.fullmatch("[0-9a-f]{12}", name)),
-        picture,
-    )

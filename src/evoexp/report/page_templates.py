@@ -11,12 +11,13 @@ from evoexp.report.page_text import Verdict
 
 if TYPE_CHECKING:  # loaded only where a page is written
     from jinja2 import Environment
+    from markdown_it import MarkdownIt
     from markupsafe import Markup
 
 NO_VALUE = ("–", "")  # cells of a column of numbers that hold none
 LONGEST_NUMBER = 48  # characters of a cell that is still a number, with its interval and unit
 _NUMBER = re.compile(r"[-−]?(\d[\d.]*(e[-+−]?\d+)?|∞)($|[ \[%°])")
-_HASH = re.compile("[0-9a-f]{12}")
+_HASH = re.compile("<code>([0-9a-f]{12})</code>")
 _COUNT = re.compile(r"\s\(n\s=\s\d+\)")  # behind a condition in the head of a table
 
 
@@ -81,13 +82,20 @@ def inline(text: str, hashes: frozenset[str] = frozenset()) -> "Markup":
         text: Anybody's.
         hashes: Codes that link to the place of their run.
     """
-    from markupsafe import Markup, escape
+    from markupsafe import Markup
 
-    parts = text.split("`")
-    if len(parts) % 2 == 0:  # the last accent begins nothing
-        parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]
-    pieces = [escape(part) if k % 2 == 0 else _code(part, hashes) for k, part in enumerate(parts)]
-    return Markup("").join(pieces)
+    def linked(code: re.Match[str]) -> str:
+        return f'<a href="#run-{code[1]}">{code[0]}</a>' if code[1] in hashes else code[0]
+
+    return Markup(_HASH.sub(linked, _reader().renderInline(text)))
+
+
+@functools.cache
+def _reader() -> "MarkdownIt":
+    """Return a reader of Markdown that knows code alone: all else in a text is as it is."""
+    from markdown_it import MarkdownIt
+
+    return MarkdownIt("zero").enable("backticks")
 
 
 def label(text: str, hashes: frozenset[str], places: Mapping[str, str]) -> "Markup":
@@ -104,15 +112,6 @@ def label(text: str, hashes: frozenset[str], places: Mapping[str, str]) -> "Mark
     if name is None:
         return inline(text, hashes)
     return Markup('<a href="#run-{}">{}</a>').format(name, inline(text))
-
-
-def _code(text: str, hashes: frozenset[str]) -> "Markup":
-    from markupsafe import Markup
-
-    code = Markup("<code>{}</code>").format(text)
-    if _HASH.fullmatch(text) and text in hashes:
-        return Markup('<a href="#run-{}">{}</a>').format(text, code)
-    return code
 
 
 def script_json(value: Any) -> "Markup":

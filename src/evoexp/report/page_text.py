@@ -11,13 +11,9 @@ MOST_NAMED = 4  # runs whose hashes a caption spells out
 
 
 class Verdict(NamedTuple):
-    """A cell of a table that holds the verdict on a claim.
+    """A cell of a table that holds the verdict on a claim."""
 
-    Attributes:
-        text: Such as "reproduced", or "not judged (budget smoke)".
-    """
-
-    text: str
+    text: str  # such as "reproduced", or "not judged (budget smoke)"
 
     def __str__(self) -> str:
         """Return the verdict as Markdown."""
@@ -32,19 +28,12 @@ class Notice(NamedTuple):
 
 
 class TableText(NamedTuple):
-    """A table.
+    """A table."""
 
-    Attributes:
-        headers: Of its columns.
-        rows: Their cells: texts, numbers, verdicts.
-        note: Below it.
-        file: Name of the file that holds it as LaTeX; empty: there is none.
-    """
-
-    headers: tuple[str, ...]
-    rows: tuple[tuple[object, ...], ...]
-    note: str = ""
-    file: str = ""
+    headers: tuple[str, ...]  # of its columns
+    rows: tuple[tuple[object, ...], ...]  # their cells: texts, numbers, verdicts
+    note: str = ""  # below it
+    file: str = ""  # name of the file that holds it as LaTeX; empty: there is none
 
 
 class MotionText(NamedTuple):
@@ -55,21 +44,13 @@ class MotionText(NamedTuple):
 
 
 class FigureText(NamedTuple):
-    """A figure.
+    """A figure."""
 
-    Attributes:
-        stem: Of its files.
-        title: Heading.
-        caption: Below it.
-        formats: Kinds of its pictures.
-        motions: Pages that play the motions that it shows.
-    """
-
-    stem: str
-    title: str
-    caption: str
-    formats: tuple[str, ...]
-    motions: tuple[MotionText, ...] = ()
+    stem: str  # of its files
+    title: str  # heading
+    caption: str  # below it
+    formats: tuple[str, ...]  # kinds of its pictures
+    motions: tuple[MotionText, ...] = ()  # pages that play the motions that it shows
 
     @property
     def files(self) -> tuple[tuple[str, str], ...]:
@@ -82,55 +63,32 @@ class FigureText(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section: one table, or figures.
+    """A section: one table, or figures."""
 
-    Attributes:
-        heading: Above it.
-        introduction: Between heading and content.
-        table: Its table.
-        figures: Its figures.
-    """
-
-    heading: str
-    introduction: str = ""
-    table: TableText | None = None
-    figures: tuple[FigureText, ...] = ()
+    heading: str  # above it
+    introduction: str = ""  # between heading and content
+    table: TableText | None = None  # its table
+    figures: tuple[FigureText, ...] = ()  # its figures
 
 
 class LogText(NamedTuple):
-    """A replicate of a stored run: where its log is, or why there is none.
+    """A replicate of a stored run: where its log is, or why there is none."""
 
-    Attributes:
-        replicate: Its index.
-        file: The log, or the file that tells why it failed, relative to the page.
-        result: Best cost and exact verdict, or "failed".
-    """
-
-    replicate: int
-    file: str
-    result: str
+    replicate: int  # its index
+    file: str  # the log, or the file that tells why it failed, relative to the page
+    result: str  # best cost and exact verdict, or "failed"
 
 
 class RunText(NamedTuple):
-    """A stored run that the page shows.
+    """A stored run that the page shows."""
 
-    Attributes:
-        label: Of the condition.
-        condition_id: Full hash, 64 hex digits.
-        done: Finished replicates.
-        planned: Planned replicates.
-        failed: Failed replicates.
-        is_reference: Whether it is a reference, which has no motion to view.
-        logs: Of every finished or failed replicate, in order.
-    """
-
-    label: str
-    condition_id: str
-    done: int
-    planned: int
-    failed: int
-    is_reference: bool
-    logs: tuple[LogText, ...] = ()
+    label: str  # of the condition
+    condition_id: str  # full hash, 64 hex digits
+    done: int  # finished replicates
+    planned: int  # planned replicates
+    failed: int  # failed replicates
+    is_reference: bool  # whether it is a reference, which has no motion to view
+    logs: tuple[LogText, ...] = ()  # of every finished or failed replicate, in order
 
     @property
     def hash12(self) -> str:
@@ -139,29 +97,17 @@ class RunText(NamedTuple):
 
 
 class Document(NamedTuple):
-    """The whole text of a page.
+    """The whole text of a page."""
 
-    Attributes:
-        title: Heading.
-        command: That makes it.
-        experiment: Name of the experiment; empty for runs given by their hashes.
-        budget: Name of the budget; empty for runs given by their hashes.
-        notices: Remarks on the results as a whole.
-        introduction: One paragraph.
-        sections: Without empty ones.
-        runs: Those that it shows.
-        seeds: Of their conditions, each once.
-    """
-
-    title: str
-    command: str
-    experiment: str
-    budget: str
-    notices: tuple[Notice, ...]
-    introduction: str
-    sections: tuple[Section, ...]
-    runs: tuple[RunText, ...]
-    seeds: tuple[int, ...] = ()
+    title: str  # heading
+    command: str  # that makes it
+    experiment: str  # name of the experiment; empty for runs given by their hashes
+    budget: str  # name of the budget; empty for runs given by their hashes
+    notices: tuple[Notice, ...]  # remarks on the results as a whole
+    introduction: str  # one paragraph
+    sections: tuple[Section, ...]  # without empty ones
+    runs: tuple[RunText, ...]  # those that it shows
+    seeds: tuple[int, ...] = ()  # of their conditions, each once
 
     @property
     def provenance(self) -> str:

@@ -36,19 +36,12 @@ class Entry(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """One setting of a condition.
+    """One setting of a condition."""
 
-    Attributes:
-        name: As one types it: `ga.population_size`.
-        value: As text.
-        unit: Of the value; empty where the option states none.
-        source: "paper: …", "assumed: …", "override", "budget smoke", or the comment as it is.
-    """
-
-    name: str
-    value: str
-    unit: str
-    source: str
+    name: str  # as one types it: `ga.population_size`
+    value: str  # as text
+    unit: str  # of the value; empty where the option states none
+    source: str  # "paper: …", "assumed: …", "override", "budget smoke", or the comment as it is
 
 
 def parameters(results: Results, condition: ConditionResults) -> list[Parameter]:

@@ -19,19 +19,14 @@ _SEPARATORS = re.compile(r" · |: |, | – | - ")  # between the parts of a labe
 
 
 class Problem(NamedTuple):
-    """A task that planners are compared on.
+    """A task that planners are compared on."""
 
-    Attributes:
-        name: That pages show.
-        key: Of robot and scenario, 12 hex digits, see `problem_key`; empty where nobody knows them.
-        straight: Distance from start to goal [rad, m]; NaN where goals differ.
-        best_known: Length of the shortest proven answer known before these runs were compared
-            [rad, m], see `best_known`; NaN: none is stored.
-    """
-
-    name: str
+    name: str  # that pages show
+    # Of robot and scenario, 12 hex digits, see `problem_key`; empty where nobody knows them
     key: str = ""
-    straight: float = np.nan
+    straight: float = np.nan  # distance from start to goal [rad, m]; NaN where goals differ
+    # Length of the shortest proven answer known before these runs were compared [rad, m], see
+    # `best_known`; NaN: none is stored
     best_known: float = np.nan
 
     @property
@@ -57,24 +52,17 @@ class Problem(NamedTuple):
 
 
 class PlannerRuns(NamedTuple):
-    """Finished runs of one planner on one problem.
+    """Finished runs of one planner on one problem."""
 
-    Attributes:
-        planner: Its name in figures.
-        problem: That it was run on.
-        label: Of both, in tables.
-        table: Its answers in order; columns replicate, collision_queries, length and certified.
-        replicates: (runs,) in order.
-        spent: (runs,) collision queries of the whole runs, those that the task tells of included.
-        condition: That was run; None: the runs were given, nobody here judged them.
-    """
-
-    planner: str
-    problem: Problem
-    label: str
+    planner: str  # its name in figures
+    problem: Problem  # that it was run on
+    label: str  # of both, in tables
+    # Its answers in order; columns replicate, collision_queries, length and certified
     table: pd.DataFrame
-    replicates: tuple[int, ...]
+    replicates: tuple[int, ...]  # (runs,) in order
+    # (runs,) collision queries of the whole runs, those that the task tells of included
     spent: FloatArray
+    # That was run; None: the runs were given, nobody here judged them
     condition: ConditionResults | None
 
     def first_reached(self, longest: float = np.inf) -> tuple[FloatArray, np.ndarray]:

@@ -1,12 +1,10 @@
 """Players of motions: pages that stand beside the figures that show the same motions."""
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from typing import NamedTuple
 
 from evoexp.playback import player_page
 from evoexp.playback.recording import Heading, NoMotion, record
-from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.page_parts import Drawing, PlayedRun
 from evoexp.report.page_text import MotionText
 
@@ -14,15 +12,10 @@ JOIN = " · "  # between experiment and condition, as in the titles of `evoexp v
 
 
 class Player(NamedTuple):
-    """A page that plays a motion in any browser, offline; `evoexp view` writes the same.
+    """A page that plays a motion in any browser, offline; `evoexp view` writes the same."""
 
-    Attributes:
-        text: Its title and its file.
-        content: HTML.
-    """
-
-    text: MotionText
-    content: bytes
+    text: MotionText  # its title and its file
+    content: bytes  # HTML
 
 
 Key = tuple[str, int]  # full hash of a condition, replicate
@@ -42,8 +35,8 @@ def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[Key, Player
         experiment: Name of the experiment; empty for runs given by their hashes.
     """
     runs = {key(run): run for drawing in drawings for run in drawing.plays}
-    found = on_all_cores(partial(_player, experiment), list(runs.values()))
-    return {name: player for name, player in zip(runs, found, strict=True) if player}
+    players = ((name, _player(experiment, run)) for name, run in runs.items())
+    return {name: player for name, player in players if player}
 
 
 def _player(experiment: str, run: PlayedRun) -> Player | None:

@@ -22,34 +22,23 @@ END = 1.15  # times the largest finite ratio is where a performance profile ends
 
 
 class Friedman(NamedTuple):
-    """Friedman's test whether some planner ranks differently from the others.
+    """Friedman's test whether some planner ranks differently from the others."""
 
-    Attributes:
-        statistic: χ², corrected for ties.
-        p_value: Of the χ² distribution.
-    """
-
-    statistic: float
-    p_value: float
+    statistic: float  # χ², corrected for ties
+    p_value: float  # of the χ² distribution
 
 
 class Standing(NamedTuple):
-    """How planners stand on the problems that all of them were run on.
+    """How planners stand on the problems that all of them were run on."""
 
-    Attributes:
-        planners: Their names.
-        problems: Names of the problems.
-        left_out: Problems that some of these planners was not run on.
-        outsiders: Planners run on less than half of the problems that two planners were run on.
-        efforts: Expected running time to a proven answer, (problems, planners) [collision queries].
-        lengths: Median of the best proven lengths, (problems, planners); inf: half have none.
-    """
-
-    planners: tuple[str, ...]
-    problems: tuple[str, ...]
-    left_out: tuple[str, ...]
+    planners: tuple[str, ...]  # their names
+    problems: tuple[str, ...]  # names of the problems
+    left_out: tuple[str, ...]  # problems that some of these planners was not run on
+    # Planners run on less than half of the problems that two planners were run on
     outsiders: tuple[str, ...]
+    # Expected running time to a proven answer, (problems, planners) [collision queries]
     efforts: FloatArray
+    # Median of the best proven lengths, (problems, planners); inf: half have none
     lengths: FloatArray
 
     @property
@@ -151,13 +140,7 @@ def friedman(lengths: FloatArray) -> Friedman:
 
 
 def critical_difference(num_planners: int, num_problems: int, significance: float) -> float:
-    """Return the difference of mean ranks that Nemenyi's test calls significant (Demšar 2006).
-
-    Args:
-        num_planners: That are compared, each with each other.
-        num_problems: That ranks are means over.
-        significance: Level of the test.
-    """
+    """Return the difference of mean ranks that Nemenyi's test calls significant (Demšar 2006)."""
     q = float(stats.studentized_range.ppf(1.0 - significance, num_planners, np.inf)) / np.sqrt(2.0)
     return float(q * np.sqrt(num_planners * (num_planners + 1) / (6.0 * num_problems)))
 

@@ -10,15 +10,10 @@ from evoexp.report.statistics import Interval, wilson
 
 
 class Proportion(NamedTuple):
-    """A count of runs that have a property.
+    """A count of runs that have a property."""
 
-    Attributes:
-        having: Runs that have it.
-        total: All runs.
-    """
-
-    having: int
-    total: int
+    having: int  # runs that have it
+    total: int  # all runs
 
     @property
     def share(self) -> float:

@@ -8,52 +8,45 @@ know of it. Verdicts take long and follow from log and code alone: they are kept
 import contextlib
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import joblib
 import numpy as np
 import pandas as pd
 
+from evoexp.attachments import PREFIX, keep_all
+from evoexp.condition import Condition
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray
-from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.results import ConditionResults
 from evoexp.store.kept_facts import installed_code
-from evoexp.store.log_reader import LogContents, read_log
+from evoexp.store.log_reader import read_log
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)  # per cubic segment
 NO_PART = ("batch", "commands", "papers", "playback", "report", "testing")
 """Folders of code that planners and the certifier do not know: no verdict depends on them."""
+WORTH_WORKERS = 16  # logs to judge, from which on worker processes are started
 CLOSE = 1e-6  # [rad] by which goals may differ and be the same
 
 
 class Answer(NamedTuple):
-    """One improvement of a run's best solution.
+    """One improvement of a run's best solution."""
 
-    Attributes:
-        replicate: Of the run.
-        generation: In which it was found.
-        evaluations: Since the start.
-        collision_queries: Configurations judged since the start, those that the task tells of
-            (`Planner.prior_queries`) included.
-        length: Of the joints' path [rad, m].
-        straight: Distance of its ends, which no path is shorter than [rad, m].
-        solved: Whether the planner's own model accepts it.
-        certified: Whether the exact certifier proves it, and it is a solution of the task.
-        cpu_s: CPU time of the run until it was logged [s]; NaN where the log does not tell.
-    """
-
-    replicate: int
-    generation: int
-    evaluations: int
+    replicate: int  # of the run
+    generation: int  # in which it was found
+    evaluations: int  # since the start
+    # Configurations judged since the start, those that the task tells of (`Planner.prior_queries`)
+    # included
     collision_queries: int
-    length: float
-    straight: float
-    solved: bool
-    certified: bool
+    length: float  # of the joints' path [rad, m]
+    straight: float  # distance of its ends, which no path is shorter than [rad, m]
+    solved: bool  # whether the planner's own model accepts it
+    certified: bool  # whether the exact certifier proves it, and it is a solution of the task
+    # CPU time of the run until it was logged [s]; NaN where the log does not tell
     cpu_s: float = np.nan
 
 
@@ -69,11 +62,31 @@ def answers(condition: ConditionResults) -> pd.DataFrame:
 def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
     """Return the answers of conditions by their labels, see `answers`; judged on all cores."""
     code = installed_code(NO_PART) + Path(__file__).read_bytes()
-    runs = [(c, int(k)) for c in conditions for k in c.summaries.index]
-    judged = on_all_cores(lambda run: _of_replicate(*run, code), runs)
+    logs = [(c, int(k), c.run.log_path(int(k))) for c in conditions for k in c.summaries.index]
+    times, kept = list[FloatArray](), dict[Path, list[list[Any]]]()
+    places = dict[Path, Path]()  # log → where its answers are kept
+    for condition, _, path in logs:
+        log = read_log(path)
+        times.append(log.cpu_s)
+        key = hashlib.sha256(code)
+        key.update(f"{condition.condition.id} {log.content_digest}".encode())
+        places[path] = cache_root() / "answers" / key.hexdigest()[:32]
+        with contextlib.suppress(FileNotFoundError, Damaged):
+            kept[path] = json.loads(read_kept(places[path]))
+    # a log alone is enough for a worker, which loads pinocchio before it judges
+    unjudged = [path for _, _, path in logs if path not in kept]
+    parallel = joblib.Parallel(n_jobs=-1 if len(unjudged) >= WORTH_WORKERS else 1)
+    judged = parallel(joblib.delayed(_judged)(path) for path in unjudged)
+    for path, own in zip(unjudged, judged, strict=True):
+        kept[path] = own
+        with contextlib.suppress(OSError):
+            write_kept(places[path], json.dumps(own).encode())
     found: dict[str, list[Answer]] = {c.label: [] for c in conditions}
-    for (condition, _), own in zip(runs, judged, strict=True):
-        found[condition.label] += own
+    for (condition, replicate, path), cpu_s in zip(logs, times, strict=True):
+        answers = (Answer(replicate, *answer) for answer in kept[path])
+        found[condition.label] += [
+            answer._replace(cpu_s=float(cpu_s[answer.generation])) for answer in answers
+        ]
     return {label: answer_table(own) for label, own in found.items()}
 
 
@@ -132,29 +145,13 @@ def straight_line(table: pd.DataFrame) -> float:
     return float(far[0]) if len(far) and np.ptp(far) < CLOSE else np.nan
 
 
-def _of_replicate(condition: ConditionResults, replicate: int, code: bytes) -> list[Answer]:
-    log = read_log(condition.run.log_path(replicate))
-    kept = [Answer(replicate, *answer) for answer in _kept(condition, log, code)]
-    return [answer._replace(cpu_s=float(log.cpu_s[answer.generation])) for answer in kept]
-
-
-def _kept(condition: ConditionResults, log: LogContents, code: bytes) -> list[list[Any]]:
-    """Return the answers of a log, from the cache if they were judged before by the same code."""
-    key = hashlib.sha256(code)
-    key.update(f"{condition.condition.id} {log.content_digest}".encode())
-    path = cache_root() / "answers" / key.hexdigest()[:32]
-    with contextlib.suppress(FileNotFoundError, Damaged):
-        kept: list[list[Any]] = json.loads(read_kept(path))
-        return kept
-    found = list(_judged(condition, log))
-    with contextlib.suppress(OSError):
-        write_kept(path, json.dumps(found).encode())
-    return found
-
-
-def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]]:
-    planner, problem = condition.prepared
+def _judged(path: Path) -> list[list[Any]]:
+    """Judge the answers of a log; they lack the replicate and the CPU time of `Answer`."""
+    log = read_log(path)
+    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
+    planner, problem = Condition.from_json(log.config_json).prepare()
     known = planner.prior_queries(problem)
+    found = list[list[Any]]()
     for row in log.solutions:
         if not np.isfinite(row.cost):  # infeasible, as the planner says itself
             continue
@@ -171,4 +168,5 @@ def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]
         ends = motion.q[-1] - motion.q[0]
         straight = float(np.sqrt((ends * ends).sum()))
         counts = row.generation, at.evaluations, known + at.collision_queries
-        yield [*counts, length, straight, bool(at.solved), proven]
+        found.append([*counts, length, straight, bool(at.solved), proven])
+    return found

@@ -37,25 +37,15 @@ def wrapped(planner: Any) -> Any:
 
 
 class Verdicts(NamedTuple):
-    """Counts of the exact verdicts on the motions of a condition's finished replicates.
+    """Counts of the exact verdicts on the motions of a condition's finished replicates."""
 
-    Attributes:
-        judged: Motions.
-        certified: Free of contact.
-        refuted: In contact somewhere.
-        undecided: Neither proven.
-        solved_refuted: Accepted by the paper's own model and refuted.
-        with_margin: That never come closer than the security margin.
-        margin_broken: That do, and touch nothing: certified, required margin not kept.
-    """
-
-    judged: int
-    certified: int
-    refuted: int
-    undecided: int
-    solved_refuted: int
-    with_margin: int
-    margin_broken: int
+    judged: int  # motions
+    certified: int  # free of contact
+    refuted: int  # in contact somewhere
+    undecided: int  # neither proven
+    solved_refuted: int  # accepted by the paper's own model and refuted
+    with_margin: int  # that never come closer than the security margin
+    margin_broken: int  # that do, and touch nothing: certified, required margin not kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,31 +54,22 @@ class ConditionResults:
 
     The content of their logs is read at its first use: a page that draws no convergence reads no
     generation. Thousands of logs are opened one by one, and only the columns stay in memory.
-
-    Attributes:
-        label: Its name in figures.
-        condition: The condition that was run.
-        planned: Number of planned replicates: by the experiment or, where more were asked for or
-            are stored, that many.
-        summaries: One row per finished replicate, indexed by replicate, in order.
-        failures: Replicate → reason of its failure.
-        run: Directory of the logs.
-        code: Version, commit and dirty flag of the code that created the run.
-        options: The option that was taken of each group; empty where nothing records it.
-        plans: The numbers of replicates that were asked for, in order; empty where nothing records
-            them.
-        damaged: Name → what is wrong with it, of the logs that are left out.
     """
 
-    label: str
-    condition: Condition
+    label: str  # its name in figures
+    condition: Condition  # the condition that was run
+    # Number of planned replicates: by the experiment or, where more were asked for or are stored,
+    # that many
     planned: int
-    summaries: pd.DataFrame
-    failures: dict[int, str]
-    run: RunDirectory
-    code: dict[str, Any]
+    summaries: pd.DataFrame  # one row per finished replicate, indexed by replicate, in order
+    failures: dict[int, str]  # replicate → reason of its failure
+    run: RunDirectory  # directory of the logs
+    code: dict[str, Any]  # version, commit and dirty flag of the code that created the run
+    # The option that was taken of each group; empty where nothing records it
     options: tuple[Option, ...] = ()
+    # The numbers of replicates that were asked for, in order; empty where nothing records them
     plans: tuple[Plan, ...] = ()
+    # Name → what is wrong with it, of the logs that are left out
     damaged: Mapping[str, str] = field(default_factory=dict)
 
     @functools.cached_property
@@ -228,19 +209,12 @@ class ConditionResults:
 
 
 class Results(NamedTuple):
-    """Everything that a report is drawn from.
+    """Everything that a report is drawn from."""
 
-    Attributes:
-        experiment: Name of the experiment; empty for runs given by their hashes.
-        budget: Name of the budget; empty for runs given by their hashes.
-        conditions: In the order of the experiment.
-        outputs: Root of the outputs that they were read from.
-    """
-
-    experiment: str
-    budget: str
-    conditions: tuple[ConditionResults, ...]
-    outputs: Path = Path()
+    experiment: str  # name of the experiment; empty for runs given by their hashes
+    budget: str  # name of the budget; empty for runs given by their hashes
+    conditions: tuple[ConditionResults, ...]  # in the order of the experiment
+    outputs: Path = Path()  # root of the outputs that they were read from
 
     @property
     def with_data(self) -> tuple[ConditionResults, ...]:
@@ -279,9 +253,6 @@ class Results(NamedTuple):
         """Return the stored results of another shipped experiment at the paper's budget.
 
         Conditions are found by their hashes, those that were never run are missing.
-
-        Args:
-            experiment: Its name.
         """
         rows = [row for row in shipped() if (row.experiment, row.budget) == (experiment, "paper")]
         runs = {row.label: RunDirectory(self.outputs, row.condition_id) for row in rows}

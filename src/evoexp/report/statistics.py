@@ -30,33 +30,20 @@ class Interval(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Median and quartiles of some values.
+    """Median and quartiles of some values."""
 
-    Attributes:
-        median: NaN without values.
-        lower: First quartile.
-        upper: Third quartile.
-        num_values: Values that are not NaN.
-    """
-
-    median: float
-    lower: float
-    upper: float
-    num_values: int
+    median: float  # NaN without values
+    lower: float  # first quartile
+    upper: float  # third quartile
+    num_values: int  # values that are not NaN
 
 
 class SignedRank(NamedTuple):
-    """Wilcoxon's signed-rank test of paired values.
+    """Wilcoxon's signed-rank test of paired values."""
 
-    Attributes:
-        num_pairs: Pairs that differ; equal ones say nothing.
-        positive_ranks: W+, the sum of ranks of the positive differences.
-        p_value: Two-sided.
-    """
-
-    num_pairs: int
-    positive_ranks: float
-    p_value: float
+    num_pairs: int  # pairs that differ; equal ones say nothing
+    positive_ranks: float  # W+, the sum of ranks of the positive differences
+    p_value: float  # two-sided
 
     @property
     def share(self) -> float:
@@ -71,15 +58,10 @@ class SignedRank(NamedTuple):
 
 
 class RankSum(NamedTuple):
-    """Mann and Whitney's test of two independent samples.
+    """Mann and Whitney's test of two independent samples."""
 
-    Attributes:
-        u: Pairs (x, y) with x > y, and half of those with x = y.
-        p_value: Two-sided.
-    """
-
-    u: float
-    p_value: float
+    u: float  # pairs (x, y) with x > y, and half of those with x = y
+    p_value: float  # two-sided
 
 
 class Effect(NamedTuple):
@@ -96,14 +78,7 @@ def quantile(values: FloatArray, share: float) -> float:
         values: (n,); NaN is ignored, ±inf is a value.
         share: In [0, 1].
     """
-    ordered = np.sort(values[~np.isnan(values)])
-    if not len(ordered):
-        return math.nan
-    position = share * (len(ordered) - 1)
-    below = math.floor(position)
-    low, high = float(ordered[below]), float(ordered[min(below + 1, len(ordered) - 1)])
-    fraction = position - below
-    return low if fraction == 0.0 or low == high else low + fraction * (high - low)
+    return float(quantiles(values[None], (share,))[0, 0])
 
 
 def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
@@ -141,16 +116,8 @@ def wilson(successes: int, trials: int, confidence: float) -> Interval:
     """Return Wilson's score interval of a proportion; [0, 1] without trials."""
     if trials == 0:
         return Interval(0.0, 1.0)
-    found = _binomial_result()(
-        k=successes, n=trials, alternative="two-sided", statistic=successes / trials, pvalue=np.nan
-    ).proportion_ci(confidence, method="wilson")
-    return Interval(float(found.low), float(found.high))
-
-
-@functools.cache
-def _binomial_result() -> type[Any]:
-    """Return scipy's class of results: its intervals want no p-value, which takes long to find."""
-    return type(stats.binomtest(0, 1))
+    low, high = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return Interval(float(low), float(high))
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:

@@ -2,8 +2,6 @@
 
 import contextlib
 import io
-import logging
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple
@@ -14,13 +12,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from evoexp.errors import SettingError, brief
-from evoexp.report.kept_ticks import keep_ticks
-from evoexp.report.narrow_figures import fit_titles, narrow
+from evoexp.report.fitted_texts import fit_texts
+from evoexp.report.style_files import read_style_file
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -46,14 +43,10 @@ SMALLEST_TEXT = 3.0  # [pt] of a legend whose names are wide
 
 
 class Look(NamedTuple):
-    """How figures are drawn.
+    """How figures are drawn."""
 
-    Attributes:
-        width: Over the whole page, or over one of two columns.
-        style: Path of a matplotlib style file, applied over evoexp's own style; None: that alone.
-    """
-
-    width: Literal["page", "column"] = "page"
+    width: Literal["page", "column"] = "page"  # over the whole page, or over one of two columns
+    # Path of a matplotlib style file, applied over evoexp's own style; None: that alone
     style: str | None = None
 
 
@@ -152,12 +145,9 @@ def _drawn(
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         figure, images = draw(), {}
         FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
-        if look.width == "column":
-            narrow(figure)
-        keep_ticks(figure)
         if engine := figure.get_layout_engine():  # arranged once, for all formats
             engine.execute(figure)
-            if fit_titles(figure):
+            if fit_texts(figure):  # what is broken into lines takes room from the others
                 engine.execute(figure)
         figure.set_layout_engine(None)  # with "none" every file would be drawn twice
         for kind in formats:
@@ -179,47 +169,13 @@ def _looking(look: Look) -> Iterator[None]:
             is_scaled = isinstance(value, float) and name.endswith(_SCALED)
             mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
         if look.style is not None:
-            for name, value in _style_file(look.style).items():
+            for name, value in read_style_file(look.style).items():
                 mpl.rcParams[name] = value  # type: ignore[index]
         token = _scale.set(scale)
         try:
             yield
         finally:
             _scale.reset(token)
-
-
-def _style_file(path: str) -> dict[str, Any]:
-    """Return the parameters that a matplotlib style file sets, but those that name files' ids.
-
-    Raises:
-        SettingError: If it cannot be read, or sets what matplotlib does not know.
-    """
-    found: list[str] = []
-    logger, handler = logging.getLogger("matplotlib"), _Lines(found)
-    logger.addHandler(handler)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            style = dict(mpl.rc_params_from_file(path, use_default_template=False))
-    except (OSError, ValueError, Warning) as error:
-        found.append(str(error))
-    finally:
-        logger.removeHandler(handler)
-    if found:
-        wrong = brief(found[0].strip().partition("\n")[0])
-        raise SettingError("report.style", f"a matplotlib style file ({wrong})", path)
-    return {name: value for name, value in style.items() if name != "svg.hashsalt"}
-
-
-class _Lines(logging.Handler):
-    """Keeps the lines that are logged: matplotlib logs what a style file has wrong."""
-
-    def __init__(self, lines: list[str]) -> None:
-        super().__init__(logging.WARNING)
-        self._lines = lines
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._lines.append(record.getMessage())
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
@@ -229,26 +185,54 @@ def figure(height: float, width: float = WIDTH) -> Figure:
 
 
 def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    """Return a figure of some height [inch] over the whole page, and its panels side by side."""
-    found = figure(height)
-    return found, list(found.subplots(1, count, squeeze=False, sharey=sharey)[0])
+    """Return a figure of some height [inch], and its panels side by side.
+
+    In a column half as many stand side by side, the others below them.
+    """
+    columns = _side_by_side(count)
+    lines = -(-count // columns)
+    found = figure(height * lines)
+    panels = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
+    for unused in panels[count:]:
+        unused.remove()
+    return found, panels[:count]
 
 
 def lines_of_panels(
     height: float, count: int, per_line: int, foot: float
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure over the whole page with some panels, and the panels, line by line.
+    """Return a figure with some panels, and the panels, line by line.
 
     Args:
         height: Of a line [inch].
         count: Number of panels.
-        per_line: Panels side by side at most.
+        per_line: Panels side by side at most; half as many in a column.
         foot: Height below the panels, for a legend [inch].
     """
-    columns = min(count, per_line)
+    columns = _side_by_side(min(count, per_line))
     lines = -(-count // columns)
     found = figure(height * lines + foot)
     return found, [found.add_subplot(lines, columns, k + 1) for k in range(count)]
+
+
+def _side_by_side(count: int) -> int:
+    """Return how many of some panels stand side by side: in a column half as many."""
+    return count if _scale.get() is _SCALES["page"] else -(-count // 2)
+
+
+def begins_line(axes: Axes) -> bool:
+    """Whether a panel of a grid is the first one of its line."""
+    place = axes.get_subplotspec()
+    return place is not None and place.is_first_col()
+
+
+def ends_column(axes: Axes, panels: Sequence[Axes]) -> bool:
+    """Whether no other panel of a grid, filled line by line, stands below a panel."""
+    places = [place for panel in panels if (place := panel.get_subplotspec()) is not None]
+    own = axes.get_subplotspec()
+    return own is not None and not any(
+        place.colspan == own.colspan and place.rowspan.start > own.rowspan.start for place in places
+    )
 
 
 def arm_colour(arm: int) -> str:
@@ -352,7 +336,7 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 
 
 def _put_below(
-    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int
+    figure: Figure | SubFigure, handles: Sequence[Artist], labels: Sequence[str], columns: int
 ) -> None:
     """Put a legend under the whole figure, in as many columns as are wanted and as fit.
 
@@ -378,7 +362,9 @@ def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D
     return [key(f"{name} {int(k) + 1}", color=arm_colour(int(k)), **look) for k in arms]
 
 
-def keys_below(figure: Figure, keys: Sequence[Artist], columns: int | None = None) -> None:
+def keys_below(
+    figure: Figure | SubFigure, keys: Sequence[Artist], columns: int | None = None
+) -> None:
     """Put a legend of given entries under the whole figure, in one line if no columns are given."""
     _put_below(figure, keys, [str(one.get_label()) for one in keys], columns or len(keys))
 

@@ -22,29 +22,18 @@ Values = Callable[[ConditionResults], np.ndarray]
 
 
 class Swept(NamedTuple):
-    """A condition of a sweep.
+    """A condition of a sweep."""
 
-    Attributes:
-        base: What its label says beside the settings; empty if nothing.
-        values: Of the settings, in their order.
-        results: Its results.
-    """
-
-    base: str
-    values: tuple[str, ...]
-    results: ConditionResults
+    base: str  # what its label says beside the settings; empty if nothing
+    values: tuple[str, ...]  # of the settings, in their order
+    results: ConditionResults  # its results
 
 
 class Sweep(NamedTuple):
-    """The conditions of a sweep.
+    """The conditions of a sweep."""
 
-    Attributes:
-        settings: Names of the swept settings.
-        conditions: In the order of the experiment.
-    """
-
-    settings: tuple[str, ...]
-    conditions: tuple[Swept, ...]
+    settings: tuple[str, ...]  # names of the swept settings
+    conditions: tuple[Swept, ...]  # in the order of the experiment
 
     @property
     def bases(self) -> tuple[str, ...]:
@@ -68,27 +57,16 @@ class Sweep(NamedTuple):
 
 
 class MainEffect(NamedTuple):
-    """A setting's effect: one value against its first one, all other settings and seeds the same.
+    """One value of a setting against its first one, all other settings and seeds being equal."""
 
-    Attributes:
-        base: The condition that was swept.
-        setting: Name of the setting.
-        first: The first value.
-        other: The value that is compared with it.
-        num_pairs: Pairs of runs.
-        difference: Median of the other's cost minus the first's.
-        interval: Of it, by resampling seeds.
-        better: Share of pairs in which the other one's cost is lower; ties count half.
-    """
-
-    base: str
-    setting: str
-    first: str
-    other: str
-    num_pairs: int
-    difference: float
-    interval: Interval
-    better: float
+    base: str  # the condition that was swept
+    setting: str  # name of the setting
+    first: str  # the first value
+    other: str  # the value that is compared with it
+    num_pairs: int  # pairs of runs
+    difference: float  # median of the other's cost minus the first's
+    interval: Interval  # of it, by resampling seeds
+    better: float  # share of pairs in which the other one's cost is lower; ties count half
 
 
 def sweep_of(results: Results) -> Sweep | None:

@@ -27,50 +27,30 @@ REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
 
 
 class Claim(NamedTuple):
-    """A claim of a paper with our evidence and verdict.
+    """A claim of a paper with our evidence and verdict."""
 
-    Attributes:
-        text: The claim in our words.
-        source: Where the paper makes it.
-        evidence: The numbers.
-        verdict: One of the four words above.
-        name: Of the claim among the paper's.
-        rule: When it is reproduced, and when contradicted.
-        n: Runs, pairs of runs, or whatever was counted.
-    """
-
-    text: str
-    source: str
-    evidence: str
-    verdict: str
-    name: str = ""
-    rule: str = ""
-    n: str = ""
+    text: str  # the claim in our words
+    source: str  # where the paper makes it
+    evidence: str  # the numbers
+    verdict: str  # one of the four words above
+    name: str = ""  # of the claim among the paper's
+    rule: str = ""  # when it is reproduced, and when contradicted
+    n: str = ""  # runs, pairs of runs, or whatever was counted
 
 
 class Comparison(NamedTuple):
-    """One quantity of two conditions on their common seeds.
+    """One quantity of two conditions on their common seeds."""
 
-    Attributes:
-        quantity: Its name, or that of the pair in a table of one quantity.
-        num_seeds: Replicates that both have.
-        median_difference: Of first minus second.
-        test: Signed-rank test of the pairs; positive ranks are those of the first being better.
-        p_adjusted: Its p-value by Holm over all quantities compared; equal to the plain one until
-            `adjusted`.
-        unpaired: The same values tested as independent samples.
-        unpaired_adjusted: Its p-value by Holm, a family of its own.
-        better: A12 of the first being better than the second.
-    """
-
-    quantity: str
-    num_seeds: int
-    median_difference: float
+    quantity: str  # its name, or that of the pair in a table of one quantity
+    num_seeds: int  # replicates that both have
+    median_difference: float  # of first minus second
+    # Signed-rank test of the pairs; positive ranks are those of the first being better
     test: SignedRank
+    # Its p-value by Holm over all quantities compared; equal to the plain one until `adjusted`
     p_adjusted: float
-    unpaired: RankSum
-    unpaired_adjusted: float
-    better: Effect
+    unpaired: RankSum  # the same values tested as independent samples
+    unpaired_adjusted: float  # its p-value by Holm, a family of its own
+    better: Effect  # a12 of the first being better than the second
 
     def says(self, significance: float) -> int:
         """Return 1 if the first is significantly better, −1 if significantly worse, else 0.
@@ -88,11 +68,6 @@ def judged(holds: bool | None) -> str:
 
 def judge_all(holds: int, done: int, planned: int) -> str:
     """Judge a claim about every run.
-
-    Args:
-        holds: Finished runs in which it holds.
-        done: Finished runs.
-        planned: Runs that were planned.
 
     Returns:
         One counter-example contradicts; all planned runs are needed to reproduce.
@@ -116,10 +91,6 @@ def judge_better(comparison: Comparison | None, significance: float) -> str:
 
 def judge_better_than_all(comparisons: Sequence[Comparison], significance: float) -> str:
     """Judge a claim that a condition is better than each of several others.
-
-    Args:
-        comparisons: Of that condition with each other one.
-        significance: Below this adjusted p-value a difference counts.
 
     Returns:
         Contradicted by one that is significantly better, reproduced if all are significantly worse.

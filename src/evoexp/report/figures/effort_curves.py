@@ -119,18 +119,17 @@ def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
     planners, problems = (list(table[name].unique()) for name in ("planner", "problem"))
     shown = problems[:MAX_PANELS]
     figure, panels = style.lines_of_panels(1.75, len(shown), PER_LINE, 0.5)
-    columns = min(len(shown), PER_LINE)
-    for k, (axes, problem) in enumerate(zip(panels, shown, strict=True)):
+    for axes, problem in zip(panels, shown, strict=True):
         own = table[table["problem"] == problem]
         _draw_share_curves(axes, own, planners)
         axes.set_title(style.shortened(problem, 34), fontweight="normal")
         if not (own["share"].astype(float) > 0.0).any():
             axes.text(0.5, 0.5, "no proven answer", transform=axes.transAxes, **NOTE)
-        if k % columns == 0:
+        if style.begins_line(axes):
             axes.set_ylabel("share reached")
         else:
             axes.tick_params(labelleft=False)
-        if k + columns >= len(shown):
+        if style.ends_column(axes, panels):
             axes.set_xlabel("collision queries")
     style.legend_of_all(figure, panels, 4)
     return figure

@@ -1,6 +1,7 @@
 """Names of curves at their right ends: a legend of many is looked up again and again."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,29 +15,83 @@ LONGEST = 40  # signs of a name
 SIZE = 7.5  # [pt]
 LINE = 1.3  # [-] of the size, from one name to the next
 HIGH = 0.82  # [-] of a figure's height that its axes have, about
+APART = 0.075  # [-] of the height of a panel, between names at the ends of curves
+DOTTED = (0, (1, 1.5))  # so that no line to a name is taken for a curve
+BESIDE = 1.06  # [-] of the width of a panel, where names begin
 BEGIN, END = 1.005, 1.035  # [-] of the axes' width, of the line from a curve to its name
+
+
+class CurveEnd(NamedTuple):
+    """The end of a curve in a panel: its place, its name, its colour."""
+
+    x: float
+    y: float
+    name: str
+    colour: str
+
+
+def apart(wanted: FloatArray, gap: float) -> FloatArray:
+    """Return places within 0 to 1 with a gap between neighbours, nearest to the wanted ones.
+
+    Neighbours that are too close become a block around the mean of what they want.
+
+    Args:
+        wanted: Sorted, (n,).
+        gap: Between neighbours; smaller where so many do not fit.
+    """
+    gap = min(gap, 1.0 / max(len(wanted) - 1, 1))
+    steps = gap * np.arange(len(wanted))
+    blocks: list[list[float]] = []
+    for place in wanted - steps:  # without gaps the places only have to be in order
+        blocks.append([float(place)])
+        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
+            last = blocks.pop()
+            blocks[-1] += last
+    found = np.concatenate([np.full(len(block), np.mean(block)) for block in blocks] or [steps])
+    last_step = steps[-1] if len(steps) else 0.0
+    return np.asarray(np.clip(found, 0.0, 1.0 - last_step) + steps)
+
+
+def name_ends(axes: Axes, ends: Sequence[CurveEnd]) -> None:
+    """Write names to the right of a panel, each joined with the end of its curve by a line.
+
+    Args:
+        axes: Whose limits are set.
+        ends: Of its curves; those that end at infinity get no name.
+    """
+    low, high = axes.get_ylim()
+    known = sorted((end for end in ends if np.isfinite(end.y)), key=lambda end: end.y)
+    heights = np.clip([(end.y - low) / (high - low) for end in known], 0.0, 1.0)
+    for end, place in zip(known, apart(np.asarray(heights), APART), strict=True):
+        line = {"arrowstyle": "-", "color": end.colour, "lw": 0.8, "shrinkA": 1.0, "shrinkB": 0.0}
+        look: dict[str, Any] = {"va": "center", "fontsize": 7.0, "color": style.NEUTRAL}
+        axes.annotate(
+            end.name,
+            (end.x, end.y),
+            (BESIDE, place),
+            "data",
+            "axes fraction",
+            {**line, "linestyle": DOTTED, "relpos": (0.0, 0.5)},
+            annotation_clip=False,
+            **look,
+        )
 
 
 def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
     """Name the curves of some axes: many of them at their ends, few in a legend below.
 
     In a figure for a column there is no room beside the axes: there is a legend, too.
-
-    Args:
-        figure: Of the axes.
-        axes: Their curves have labels, and limits are set.
-        columns: Of a legend, at most.
     """
     curves: list[tuple[Any, str]] = list(zip(*axes.get_legend_handles_labels(), strict=True))
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:
         style.legend_below(figure, axes, columns)
         return
-    curves.sort(key=lambda each: _height(each[0]), reverse=True)
+    curves.sort(key=lambda each: _height(each[0]))
     low, high = axes.get_ylim()
     ends = np.array([_height(curve)[0] for curve, _ in curves])
     ends = np.clip((ends - low) / (high - low), 0.0, 1.0)
     gap = SIZE * LINE / 72.0 / (HIGH * figure.get_figheight())
-    for (curve, name), end, place in zip(curves, ends, spread_out(ends, gap), strict=True):
+    for (curve, name), end, place in zip(curves, ends, apart(ends, gap), strict=True):
         look = {"color": curve.get_color(), "transform": axes.transAxes, "clip_on": False}
         dashes, width = curve.get_linestyle(), curve.get_linewidth()
         axes.plot([BEGIN, END], [end, place], linestyle=dashes, linewidth=width, **look)
@@ -50,23 +105,3 @@ def _height(curve: Any) -> tuple[float, float]:
     found = np.asarray(curve.get_ydata(), dtype=np.float64)
     found = found[np.isfinite(found)]
     return (float(found[-1]), float(found.mean())) if len(found) else (0.0, 0.0)
-
-
-def spread_out(heights: FloatArray, gap: float) -> FloatArray:
-    """Return places near to heights, in their order, and no two nearer than a gap.
-
-    Where there is room, all places are between 0 and 1.
-
-    Args:
-        heights: (names,) from the highest to the lowest, between 0 and 1.
-        gap: Least distance of two places.
-    """
-    places, ceiling = np.empty(len(heights)), 1.0
-    for k, height in enumerate(heights):
-        places[k] = min(float(height), ceiling)
-        ceiling = places[k] - gap
-    floor = 0.0
-    for k in range(len(places) - 1, -1, -1):
-        places[k] = max(places[k], floor)
-        floor = places[k] + gap
-    return places

@@ -42,10 +42,6 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
     """Draw one panel per quantity, one row per condition.
 
     All panels have one scale: as many percentage points, from another least one on.
-
-    Args:
-        table: Of `shares_table`.
-        label: Of the axes.
     """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))

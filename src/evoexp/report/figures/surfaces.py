@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
 
 from evoexp.playback.shapes import Outline
 from evoexp.records import FloatArray
@@ -55,15 +56,9 @@ def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> Flo
 
 def placed(triangles: FloatArray, pose: FloatArray) -> FloatArray:
     """Return triangles moved by a pose: position, quaternion x, y, z, w, (7,)."""
-    x, y, z, w = pose[3:]
-    rotation = np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
-    return np.asarray(triangles @ rotation.T + pose[:3])
+    return np.asarray(
+        Rotation.from_quat(pose[3:]).apply(triangles.reshape(-1, 3)) + pose[:3]
+    ).reshape(triangles.shape)
 
 
 def shaded(triangles: FloatArray, colour: Any, alpha: float) -> FloatArray:

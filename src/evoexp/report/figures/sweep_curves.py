@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from evoexp.report import style
 from evoexp.report.figures.convergence import NAMES, cost_table
-from evoexp.report.figures.direct_labels import CurveEnd, name_ends
+from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.results import Results
 from evoexp.report.rows import groups
 from evoexp.report.swept_settings import Sweep
@@ -62,7 +62,7 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
     figure, axes_of = style.lines_of_panels(2.35, len(panels), per_line, 0.3)
     count = int(shown["level"].max()) + 1
     colours = [mpl.colors.to_hex(c) for c in mpl.colormaps[ORDINAL](np.linspace(0, PALEST, count))]
-    for k, (axes, (base, facet)) in enumerate(zip(axes_of, panels, strict=True)):
+    for axes, (base, facet) in zip(axes_of, panels, strict=True):
         of_base = shown[shown["base"] == base]
         own, ends = of_base[of_base["facet"] == facet], []
         for level, curve in groups(own, "level"):
@@ -72,8 +72,8 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
             ends.append(CurveEnd(*place, str(last["value"]), colours[level]))
         axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=_limits(of_base))
         axes.set_title("\n".join(word for word in (base, facet) if word))
-        axes.set_xlabel("evaluations" if k >= len(panels) - per_line else "")
-        axes.set_ylabel("best cost so far" if k % per_line == 0 else "")
+        axes.set_xlabel("evaluations" if style.ends_column(axes, axes_of) else "")
+        axes.set_ylabel("best cost so far" if style.begins_line(axes) else "")
         axes.xaxis.set_major_locator(style.few_ticks())
         style.shorten_thousands(axes.xaxis)
         name_ends(axes, ends)

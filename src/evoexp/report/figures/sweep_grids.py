@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report import style
-from evoexp.report.figures.direct_labels import CurveEnd, name_ends
+from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
 from evoexp.report.rows import records
 from evoexp.report.statistics import quantile
@@ -78,8 +78,8 @@ def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
         axes.set(title=panel, xlabel=table["x_setting"].iloc[0])
         axes.grid(visible=False)
         axes.tick_params(length=0)
-    for k in range(0, len(panels), PER_LINE):
-        axes_of[k].set_ylabel(table["y_setting"].iloc[0])
+    for axes in filter(style.begins_line, axes_of):
+        axes.set_ylabel(table["y_setting"].iloc[0])
     if image is not None:
         figure.colorbar(image, ax=axes_of, label=f"{name} (median)", fraction=0.05, aspect=14)
     return figure
@@ -132,7 +132,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     bases = list(dict.fromkeys(table["base"]))[:MOST_PANELS]
     rows = max(int((table["base"] == base).sum()) for base in bases)
     figure, panels = style.lines_of_panels(0.26 * rows + 1.0, len(bases), PER_LINE, 0.0)
-    for k, (axes, base) in enumerate(zip(panels, bases, strict=True)):
+    for axes, base in zip(panels, bases, strict=True):
         own = table[table["base"] == base].reset_index(drop=True)
         finite = own[np.isfinite(own[["difference", "low", "high"]]).all(axis=1)]
         errors = [finite["difference"] - finite["low"], finite["high"] - finite["difference"]]
@@ -140,7 +140,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         axes.errorbar(finite["difference"], finite.index, xerr=errors, **look)
         axes.axvline(0.0, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         names = [f"{r.setting}: {r.first} → {r.other}" for r in records(own)]
-        axes.set_yticks(range(len(own)), names if k % PER_LINE == 0 else [])
+        axes.set_yticks(range(len(own)), names if style.begins_line(axes) else [])
         axes.set(title=base, xlabel="change of the cost", ylim=(len(own) - 0.5, -0.5))
         axes.xaxis.set_major_locator(style.few_ticks())
     return figure

@@ -65,49 +65,31 @@ SURVIVES = Rule(
 
 
 class Headline(NamedTuple):
-    """A headline claim of a paper.
+    """A headline claim of a paper."""
 
-    Attributes:
-        name: Of its rule.
-        quantity: That is drawn, with its unit.
-        values: The quantity of a condition's runs, (done,); inf: never.
-        judge: Judges the claim on one condition with its controls.
-    """
-
-    name: str
-    quantity: str
-    values: Values
+    name: str  # of its rule
+    quantity: str  # that is drawn, with its unit
+    values: Values  # the quantity of a condition's runs, (done,); inf: never
+    # Judges the claim on one condition with its controls
     judge: Callable[[Judge, ConditionResults, tuple[ConditionResults, ...]], Claim]
 
 
 class Family(NamedTuple):
-    """A condition as assumed, and those that change its numbers.
+    """A condition as assumed, and those that change its numbers."""
 
-    Attributes:
-        shipped: As assumed.
-        varied: Each other condition with the names of the settings that it changes.
-    """
-
-    shipped: ConditionResults
+    shipped: ConditionResults  # as assumed
+    # Each other condition with the names of the settings that it changes
     varied: tuple[tuple[ConditionResults, tuple[str, ...]], ...]
 
 
 class Judged(NamedTuple):
-    """A headline claim under one condition.
+    """A headline claim under one condition."""
 
-    Attributes:
-        headline: The claim.
-        family: That the condition belongs to.
-        condition: As assumed, or varied.
-        claim: With evidence and verdict.
-        same: Whether the verdict is that under the assumed numbers.
-    """
-
-    headline: Headline
-    family: Family
-    condition: ConditionResults
-    claim: Claim
-    same: bool
+    headline: Headline  # the claim
+    family: Family  # that the condition belongs to
+    condition: ConditionResults  # as assumed, or varied
+    claim: Claim  # with evidence and verdict
+    same: bool  # whether the verdict is that under the assumed numbers
 
 
 def page(

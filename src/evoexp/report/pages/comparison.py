@@ -70,46 +70,29 @@ COINS = (
 
 
 class Rated(NamedTuple):
-    """A condition, rated by the proven answers of its runs.
+    """A condition, rated by the proven answers of its runs."""
 
-    Attributes:
-        condition: Its label.
-        planner: Its name in figures.
-        problem: Name of the problem.
-        runs: That are finished.
-        proven: Runs with a proven answer.
-        first_own: Median of the queries to the first answer that the planner's own model accepts.
-        queries: Expected running time to a proven answer [collision queries].
-        interval: Of it, by bootstrap.
-        lengths: Best proven length of a run: median and quartiles [rad, m].
-        straight: Distance from start to goal; NaN where goals differ.
-        best_known: Length of the shortest proven answer known of the problem; NaN: none is stored.
-        unit: The one of both that targets are multiples of; NaN: any answer is the only target.
-        refuted: Last solutions that the planner's own model accepts and the certifier refutes.
-        judged: Last solutions that were judged.
-        body_tests: Pairs of shapes that one collision query stands for; NaN: not known.
-        evaluations: Expected evaluations to a proven answer.
-        cpu_s: Expected CPU time to a proven answer [s].
-        own_cost: The planner's own cost of its last solution: median and quartiles over runs.
-    """
-
-    condition: str
-    planner: str
-    problem: str
-    runs: int
-    proven: int
+    condition: str  # its label
+    planner: str  # its name in figures
+    problem: str  # name of the problem
+    runs: int  # that are finished
+    proven: int  # runs with a proven answer
+    # Median of the queries to the first answer that the planner's own model accepts
     first_own: float
-    queries: float
-    interval: Interval
-    lengths: Spread
-    straight: float
+    queries: float  # expected running time to a proven answer [collision queries]
+    interval: Interval  # of it, by bootstrap
+    lengths: Spread  # best proven length of a run: median and quartiles [rad, m]
+    straight: float  # distance from start to goal; NaN where goals differ
+    # Length of the shortest proven answer known of the problem; NaN: none is stored
     best_known: float
-    unit: float
-    refuted: int
-    judged: int
+    unit: float  # the one of both that targets are multiples of; NaN: any answer is the only target
+    refuted: int  # last solutions that the planner's own model accepts and the certifier refutes
+    judged: int  # last solutions that were judged
+    # Pairs of shapes that one collision query stands for; NaN: not known
     body_tests: float = np.nan
-    evaluations: float = np.nan
-    cpu_s: float = np.nan
+    evaluations: float = np.nan  # expected evaluations to a proven answer
+    cpu_s: float = np.nan  # expected CPU time to a proven answer [s]
+    # The planner's own cost of its last solution: median and quartiles over runs
     own_cost: Spread = Spread(np.nan, np.nan, np.nan, 0)
 
     @property
@@ -136,12 +119,6 @@ def page_of_runs(
     given: GivenData | None = None,
 ) -> Page:
     """Build the page from runs that are judged already.
-
-    Args:
-        runs: Stored ones, and given ones.
-        results: The stored ones come from.
-        settings: Levels.
-        given: The file that the given ones come from.
 
     Raises:
         NothingStored: If there are none.

@@ -111,12 +111,7 @@ def cost_drawing(results: Results) -> Drawing:
 
 
 def best_drawing(results: Results, more: str = "") -> Drawing:
-    """Return the figure of the best costs only, where averages would hide them.
-
-    Args:
-        results: Whose conditions are drawn.
-        more: Is added to the caption.
-    """
+    """Return the figure of the best costs only, where averages would hide them."""
     return Drawing(
         "convergence",
         "Convergence",

@@ -104,7 +104,7 @@ def draw_methods(table: pd.DataFrame) -> Figure:
         *cost_boxes.keys(),
         *(style.key(name, color=style.NEUTRAL, lw=1.0, ls=kind) for name, kind in LINES.items()),
     ]
-    below.legend(handles=keys, loc="outside lower center", ncols=4)
+    style.keys_below(below, keys, 4)
     return figure
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from evoexp.papers.chen.figures import field_grids
-from evoexp.papers.chen.rules import RULES
+from evoexp.papers.chen.rules import PAPER, RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.report.kit import (
     Claim,
@@ -31,12 +31,6 @@ SLIPS = {
     field_grids.MISSING: PLACE + ": {0.computed} is left out",
     field_grids.SURPLUS: PLACE + ": a {0.printed} too many before it",
 }
-INTRODUCTION = (
-    "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from "
-    "obstacles and the boundary, which is a ring of nodes outside the grid. The potential of "
-    "obstacles is the paper's unsafeness of a node. Obstacles of Fig. 1 are taken "
-    "from both printed grids together; all other numbers are computed."
-)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -47,9 +41,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     tables = {c.label: _compared(c) for c in shown if _fields(c)[0].shape == (16, 16)}
     judge, compared = judging.judge(results, settings, RULES), tables.values()
     numbers = (_numbers(c, tables[c.label]) for c in shown if c.label in tables)
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "fields",
         claims=tuple(_claim(judge, *own) for table in compared for own in groups(table, "field")),
         checks=tuple(_slips(*own) for table in compared for own in groups(table, "field")),
         drawings=(*numbers, *map(_map, shown)),
@@ -108,14 +102,8 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
 
 
 def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:
-    return Drawing(
-        "fig_1_fields",
-        "Fig. 1: two numerical potential fields",
-        "Number of every node as the wave fronts give it; black: obstacles (in (b) those with a "
-        "free node beside them have o₀ = 10, as printed). Framed: where the print differs.",
-        partial(_compared_table, table),
-        field_grids.draw_fields,
-        (condition,),
+    return PAPER.drawing(
+        "fig_1_fields", partial(_compared_table, table), field_grids.draw_fields, (condition,)
     )
 
 
@@ -125,14 +113,13 @@ def _compared_table(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _map(condition: ConditionResults) -> Drawing:
-    return Drawing(
-        f"fields_{'_'.join(map(str, _fields(condition)[0].shape))}",
-        f"{condition.label}: the fields as maps",
-        "Dark grey: obstacles. The potential of the goal weighs the draws of random walks; no path "
-        "follows it downhill.",
+    return PAPER.drawing(
+        "fields_map",
         partial(_map_table, condition),
         field_grids.draw_maps,
         (condition,),
+        shape="_".join(map(str, _fields(condition)[0].shape)),
+        label=condition.label,
     )
 
 

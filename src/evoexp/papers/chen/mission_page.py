@@ -5,10 +5,10 @@ from functools import partial
 import numpy as np
 
 from evoexp.papers.chen.figures import missions
+from evoexp.papers.chen.rules import PAPER
 from evoexp.planners.two_stage.planner import TwoStage
 from evoexp.report.kit import (
     ConditionResults,
-    Drawing,
     Page,
     PlayedRun,
     Proportion,
@@ -21,15 +21,6 @@ from evoexp.report.kit import (
     run_measures,
 )
 
-INTRODUCTION = (
-    "Two searches, one motion: the placement search (section 3) chooses docking place and "
-    "posture of the arm, the path search (section 2) a path over the floor to the node nearest "
-    "to it. The platform drives along the path, on to the docking place, and the arm goes from "
-    "its travel posture to the docking posture. The exact verdict covers the whole motion: "
-    "platform and links against all obstacles, and against each other. The cost is E (Eq. 14) + "
-    "C (Eq. 1)."
-)
-
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the missions, or the generic page if another planner was run."""
@@ -38,12 +29,8 @@ def page(results: Results, settings: ReportSettings) -> Page:
         return generic.page(results, settings)
     row, column = partial(generic.quantity, results), by_column
     clearance = "clearance of the bodies over the whole motion (exact)"
-    drawing = Drawing(
+    drawing = PAPER.drawing(
         "mission",
-        "Path and docking posture",
-        "Per condition the run of median cost. Left: the floor, obstacles from centre to centre "
-        "of their outermost nodes. Right: the platform at its docking place, the arm as it "
-        "drives and as it docks, the force that acts.",
         partial(missions.missions_table, found),
         missions.draw_missions,
         found,
@@ -51,9 +38,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
             PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c))) for c in found
         ),
     )
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "mission",
         quantities=(
             row("cost E + C", "–", column("best_cost")),
             row("path cost C", "–", column("term_path_cost")),

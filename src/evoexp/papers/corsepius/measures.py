@@ -31,17 +31,11 @@ evaluations = by_column("evaluations")  # of each run, (done,)
 
 
 class Task(NamedTuple):
-    """Conditions that differ in one setting of the planner.
+    """Conditions that differ in one setting of the planner."""
 
-    Attributes:
-        name: The common part of their labels.
-        values: Values of that setting, ascending.
-        conditions: One per value.
-    """
-
-    name: str
-    values: tuple[float, ...]
-    conditions: tuple[ConditionResults, ...]
+    name: str  # the common part of their labels
+    values: tuple[float, ...]  # values of that setting, ascending
+    conditions: tuple[ConditionResults, ...]  # one per value
 
     @property
     def by_value(self) -> dict[float, ConditionResults]:
@@ -200,17 +194,11 @@ def with_empty_scenes(
 
 
 class AllowedContacts(NamedTuple):
-    """Pairs that may touch in the runs of a condition.
+    """Pairs that may touch in the runs of a condition."""
 
-    Attributes:
-        pairs: Their names, separated by commas.
-        limit: How deep they may overlap [length unit].
-        unit: Length unit of the scene.
-    """
-
-    pairs: str
-    limit: float
-    unit: str
+    pairs: str  # their names, separated by commas
+    limit: float  # how deep they may overlap [length unit]
+    unit: str  # length unit of the scene
 
 
 def allowed_contacts(condition: ConditionResults) -> AllowedContacts | None:
@@ -229,18 +217,13 @@ def lets_go(condition: ConditionResults) -> bool:
 
 
 class Release(NamedTuple):
-    """The state of an object when it is let go of.
+    """The state of an object when it is let go of."""
 
-    Attributes:
-        replicate: Of the run.
-        gap: Signed distance to the nearest body that it may touch; negative: it stands in it
-            [length unit].
-        tilt: Between its axis and the direction up [rad].
-    """
-
-    replicate: int
+    replicate: int  # of the run
+    # signed distance to the nearest body that it may touch; negative: it stands in it [length
+    # unit]
     gap: float
-    tilt: float
+    tilt: float  # between its axis and the direction up [rad]
 
 
 def releases(condition: ConditionResults) -> tuple[Release, ...]:

@@ -14,6 +14,7 @@ from evoexp.papers.corsepius.figures import (
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
+from evoexp.papers.corsepius.rules import PAPER
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.report.figures import shares
 from evoexp.report.kit import (
@@ -37,66 +38,15 @@ from evoexp.report.kit import (
     spread,
 )
 
-INTRODUCTION = (
-    "An individual is a posture. Every cycle random steps within a local scope of a few parents "
-    "give the offspring, the best of which are the next parents; the path is the ancestry of the "
-    "first posture that meets the goal. The cost is a sum of weighted terms in configuration and "
-    "work space; lower is better. A run without a winner ends by stagnation or at its cap of "
-    "cycles, and its path is the ancestry of the best posture. Solved: the goal is met, and every "
-    "posture of the path is free by the spheres; the exact verdict judges the motion between "
-    "postures, too."
-)
-TASKS = (
-    "task",
-    "goal met",
-    "of these certified",
-    "of these refuted",
-    "ended by",
-    "cycles",
-    "evaluations",
-    "steps",
-)
-PHASES = ("task", "phase", "goal of the phase met, of the runs that began it", "cycles")
-BESIDE = (
-    "task",
-    "goal met",
-    "goal met in the empty scene",
-    "p",
-    "cycles",
-    "cycles in the empty scene",
-)
-BESIDE_NOTE = (
-    "Empty scene: the same robot, goals and seeds, without the obstacles that are neither "
-    "approached nor grasped. A goal that is missed there is not missed because of an obstacle. p: "
-    "Fisher's exact tests, Holm over the tasks."
-)
-RELEASED = ("task", "runs", "deepest in another body", "highest above it", "median tilt", "worst")
-RELEASED_NOTE = (
-    "By exact distances to the nearest body that the object may touch, at the posture at which it "
-    "is let go of."
-)
-CHECKS = (
-    (
-        "Paths between postures",
-        "are not rated by the paper: solved paths can be refuted; `planner.edge_check` tests "
-        "configurations between a parent and its child: `evoexp run experiment=corsepius_options`",
-    ),
-    (
-        "Times",
-        "the paper: Pentium III class PC; here: one core of this run's machine; the first run of a "
-        "worker process loads the kernels, too",
-    ),
-)
-
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the tasks, or the generic page if another planner was run."""
     if not planned_by(results, PostureEs):
         return generic.page(results, settings)
     compared = (("distance to the goal", True, measures.residuals),)
-    return Page(
-        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "tasks",
         quantities=quantities(results),
         tables=tables(results, settings),
         claims=claims.judge_tasks(results, settings),
@@ -150,16 +100,12 @@ def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
     level = settings.confidence
     phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
     beside, released = _beside_empty(results, level), tuple(map(_release_row, _releasing(results)))
-    note = (
-        f"Shares of runs, in brackets Wilson's {100 * level:g} % interval; of others median "
-        "[quartiles] over all runs."
-    )
     rows = tuple(_task_row(c, level) for c in results.with_data)
     found = (
-        Table("Tasks", TASKS, rows, note),
-        Table("With and without obstacles", BESIDE, beside, BESIDE_NOTE),
-        Table("Phases", PHASES, phases),
-        Table("Objects when they are let go of", RELEASED, released, RELEASED_NOTE),
+        PAPER.table("tasks", rows, level=100 * level),
+        PAPER.table("beside", beside),
+        PAPER.table("phases", phases),
+        PAPER.table("released", released),
     )
     return tuple(table for table in found if table.rows)
 
@@ -247,7 +193,7 @@ def checks(results: Results) -> tuple[tuple[str, str], ...]:
             f"{len(pairs.always)} always touch, {len(pairs.never)} never do"
         )
         rows.append((f"{c.label}: the model of collisions", text))
-    return (*rows, *CHECKS)
+    return (*rows, *PAPER.checks("tasks"))
 
 
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
@@ -266,47 +212,37 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     ]
     return (
         _models(main),
-        Drawing(
+        PAPER.drawing(
             "fig_2_scope",
-            "Fig. 2: local search scope",
-            "Left: the boxes that a posture's offspring are drawn from, along one path, in the "
-            "plane of its two joints that move most; every child lies in its parent's box. "
-            "Right: where the tool can be one step away from the start, for the scope, a half "
-            "and twice of it: hulls of random steps, as seen from above.",
             partial(posture_motions.scope_table, main[0]),
             posture_motions.draw_scope,
             main[:1],
         ),
-        Drawing(
+        PAPER.drawing(
             "history",
-            "Approach to the goal",
-            "Best so far against cycles: median and quartiles of the runs that began the phase; "
-            "a run that has ended keeps its last value. The best posture is the one of least "
-            "cost, so its distance may grow. At the ends of curves: numbers of runs that began "
-            "the phase, equal ones once.",
             partial(posture_history.history_table, results._replace(conditions=main)),
             posture_history.draw_history,
             main,
         ),
-        Drawing(
+        PAPER.drawing(
             "stop_reasons",
-            "Why searches end",
-            f"Share of runs, with Wilson's {level} interval.",
             partial(shares.shares_table, reasons, {}, settings.confidence),
             shares.draw_shares,
             every,
+            level=level,
         ),
-        _paths("paths", "Paths", PATHS, shown),
+        _paths("paths", shown),
         *_manoeuvres(results, settings),
         *_trap(main),
     )
 
 
-def _paths(stem: str, title: str, caption: str, shown: list[ShownPath]) -> Drawing:
+def _paths(name: str, shown: list[ShownPath], suffix: str = "") -> Drawing:
     table = partial(posture_motions.motions_table, shown)
     draw = partial(posture_motions.draw_motions, same_scene=shown[0].by_phase)
     plays = tuple(PlayedRun(one.condition, one.replicate) for one in shown)
-    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown), plays)
+    drawing = PAPER.drawing(name, table, draw, [one.condition for one in shown], plays)
+    return drawing._replace(stem=drawing.stem + suffix)
 
 
 def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
@@ -315,18 +251,14 @@ def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
     several = [c for c in phased if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
     ends = [f"_{results.position(c.label) + 1}" if len(several) > 1 else "" for c in several]
     shown = [ShownPath(c.label, c, measures.shown_replicate(c), True) for c in several]
-    phases = Drawing(
+    phases = PAPER.drawing(
         "phases",
-        "Phases",
-        "Of the runs that began a phase: how many met its goal (Wilson's "
-        f"{100 * level:g} % interval), and their cycles.",
         partial(posture_history.phases_table, results._replace(conditions=phased), level),
         posture_history.draw_phases,
         phased,
+        level=100 * level,
     )
-    title = "The manoeuvre, phase by phase"
-    named = zip(ends, shown, strict=True)
-    found = [_paths(f"manoeuvre{end}", title, MANOEUVRE, [one]) for end, one in named]
+    found = [_paths("manoeuvre", [one], end) for end, one in zip(ends, shown, strict=True)]
     return [*found, phases] if phased else found
 
 
@@ -336,37 +268,13 @@ def _trap(main: tuple[ConditionResults, ...]) -> list[Drawing]:
     if pair is None:
         return []
     table = partial(posture_trap.trap_table, *pair)
-    return [Drawing("trap", "The local minimum", TRAP, table, posture_trap.draw_trap, pair)]
-
-
-PATHS = (
-    "Per condition the run of median evaluations among the solved ones; where none is solved, "
-    "among all. Lines: the links at every posture of the path, which is the winner's ancestry. "
-    "It was not planned beforehand."
-)
-MANOEUVRE = (
-    "The same path, one panel per phase. Green: the object while it is held, where the phase "
-    "begins and ends."
-)
-TRAP = (
-    "a: ways of the tools, of all runs that are stuck (crosses: their ends) and all that a "
-    "sub-goal has helped. b: a way around must lead away from the goal, or along the wall, "
-    "before it leads there. c: the cost over the two joints that moved most on the way to the "
-    "median stuck posture, the others as they are there; grey: infeasible. d: the least cost "
-    f"among {posture_trap.SAMPLES} random postures in boxes around it, which "
-    "shows the distance to a better one."
-)
+    samples = posture_trap.SAMPLES
+    return [PAPER.drawing("trap", table, posture_trap.draw_trap, pair, samples=samples)]
 
 
 def _models(main: tuple[ConditionResults, ...]) -> Drawing:
     found = measures.by_robot(main)
     shown = [(c.label if len(found) > 1 else "the robot", c) for c in found]
-    return Drawing(
-        "fig_3_4_models",
-        "Figs. 3 and 4: robots, and the shapes that cover them",
-        "Left: the bodies, which the exact verdict uses. Right: the spheres or capsules that "
-        "cover them, which the search uses; the paper's sets have 10⁵ to 10⁶ spheres.",
-        partial(solids.models_table, shown),
-        solids.draw_models,
-        found,
+    return PAPER.drawing(
+        "fig_3_4_models", partial(solids.models_table, shown), solids.draw_models, found
     )

@@ -35,21 +35,13 @@ METRICS: dict[str, Values] = {
 
 
 class SizeComparison(NamedTuple):
-    """The effort of a size over that of the recommended one, expected running times both.
+    """The effort of a size over that of the recommended one, expected running times both."""
 
-    Attributes:
-        task: Name of the task.
-        value: The size.
-        ratio: Ratio of the expected efforts.
-        interval: Its interval.
-        bound: The ratio that it is compared with: 1, or a proportional increase.
-    """
-
-    task: str
-    value: float
-    ratio: float
-    interval: Interval
-    bound: float
+    task: str  # name of the task
+    value: float  # the size
+    ratio: float  # ratio of the expected efforts
+    interval: Interval  # its interval
+    bound: float  # the ratio that it is compared with: 1, or a proportional increase
 
     @property
     def says(self) -> int:
@@ -63,14 +55,7 @@ def judge_study(
     compared: dict[str, list[SizeComparison]],
     settings: ReportSettings,
 ) -> tuple[Claim, ...]:
-    """Judge the claims on the size.
-
-    Args:
-        judge: The judge of the experiment.
-        found: Tasks with one condition per size.
-        compared: Metric → every size against the recommended one.
-        settings: Levels and resamples.
-    """
+    """Judge the claims on the size."""
     larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in compared.items()}
     smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in compared.items()}
     return (

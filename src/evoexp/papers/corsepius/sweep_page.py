@@ -9,7 +9,7 @@ from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius.figures import population_effort
 from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
-from evoexp.papers.corsepius.rules import RULES
+from evoexp.papers.corsepius.rules import PAPER, RULES
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
@@ -36,61 +36,12 @@ from evoexp.report.kit import (
 )
 
 PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
-INTRODUCTION = (
-    "Conditions of one task differ in one setting and share their seeds. Effort of a run that "
-    "does not meet its goal counts as infinite where runs are compared, and as spent where "
-    "expected running times are formed. The paper sweeps nothing; it says that the setting "
-    "scales the algorithm (section 5) or is a next step (section 6)."
-)
-SHARES = (
-    "condition",
-    "goal met",
-    "p",
-    "of these refuted",
-    "p",
-    "steps beyond the scope, of a path",
-)
-NOTE = (
-    "p: against the first condition of the task, Fisher's exact test, Holm over the task's "
-    "conditions."
-)
-FLOOR = (
-    "The goal's tolerance is too small to be met, so every search ends by stagnation; "
-    "drawn is its distance to the goal then: to the surface of an object, and to a point. Points: "
-    "runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands "
-    "nearer than some share of it. A surface fixes one coordinate, a point three, which a random "
-    "step must meet at once: its floor is far higher."
-)
 EFFECTS = (
     f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
     "one; dashed: no difference."
 )
 SETTING = "num_offspring"
-SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, " [ms]")}
-SIZES = (
-    "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds "
-    "included. Expected running time: the effort of all runs, failed ones included, over the "
-    "number of runs that met the goal: the price of a success if one starts again after every "
-    "failure. Cycles stand for planning time on as many processors as individuals, evaluations "
-    "for time on one; CPU time is that of the search here, at the median run's price of an "
-    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ "
-    "is not only less search per cycle: selection is weaker, too (5 of λ)."
-)
-SIZE_CHECKS = (
-    (
-        "Intervals of ratios",
-        "by Bonferroni over all of a metric, so that the verdicts of one metric hold together; "
-        "on common seeds",
-    ),
-    (
-        "A task that no size solves",
-        "says nothing of effort: the local minimum, `evoexp run experiment=corsepius_wall`",
-    ),
-    (
-        "The narrow gate at the recommended size",
-        "is a matter of the scope, too: `evoexp run experiment=corsepius_gate_narrow`",
-    ),
-)
+SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # quantity, first condition of a task, its comparisons with the others
 FirstComparison = tuple[str, str, tuple[Comparison, ...]]
 
@@ -101,9 +52,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
         return whole_page.page(results, settings)
     found = comparisons(results, settings)
     slope = "slope of log residual over log scope {:.2f}; 1: proportional"
-    return Page(
-        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "sweep",
         quantities=whole_page.quantities(results),
         tables=(_table(results, settings), *_floors(results)),
         checks=tuple(
@@ -158,7 +109,7 @@ def _table(results: Results, settings: ReportSettings) -> Table:
             beyond = markdown.spread(spread(c.column("term_oversized_steps")))
             told = goal_met, p_met, refuted.with_interval(level), p_touching, beyond
             rows.append((c.label, *told))
-    return Table("Shares of runs", SHARES, tuple(rows), NOTE)
+    return PAPER.table("shares", rows)
 
 
 def _floors(results: Results) -> tuple[Table, ...]:
@@ -173,8 +124,7 @@ def _floors(results: Results) -> tuple[Table, ...]:
         )
         for c in results.main
     )
-    headers = ("condition", f"residual [1e−3 {results.main[0].condition.length_unit}]", "cycles")
-    return (Table("Residual floors", headers, rows, "Median [quartiles] over all runs."),)
+    return (PAPER.table("floors", rows, unit=results.main[0].condition.length_unit),)
 
 
 def _scopes(results: Results) -> tuple[Task, ...]:
@@ -191,10 +141,8 @@ def _drawings(
     """Return the figures that the settings in which conditions differ allow."""
     scopes, parents = _scopes(results), measures.tasks(results, "num_parents")
     drawn = [
-        Drawing(
+        PAPER.drawing(
             "floor",
-            "Residual floor",
-            FLOOR,
             partial(population_effort.floor_table, scopes),
             population_effort.draw_floor,
             tuple(c for task in scopes for c in task.conditions),
@@ -230,15 +178,13 @@ def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
     """Return the figure of success and effort by the number of parents."""
     levels = settings.confidence, settings.num_resamples
     counts, efforts = {"goal met": success}, {"evaluations [-]": measures.evaluations}
-    return Drawing(
-        "effort",
-        "Success and effort against the number of parents",
-        "Left: share of runs that meet the goal; right: expected running time, failures counted; "
-        f"{100 * settings.confidence:g} % intervals. Dashed: {PRINTED_PARENTS:g}, which the paper "
-        "names typical.",
+    return PAPER.drawing(
+        "parents_effort",
         partial(population_effort.effort_table, found, counts, efforts, *levels),
         partial(population_effort.draw_effort, setting="parents μ [-]", marked=PRINTED_PARENTS),
         tuple(c for task in found for c in task.conditions),
+        level=100 * settings.confidence,
+        size=PRINTED_PARENTS,
     )
 
 
@@ -249,13 +195,13 @@ def population_page(results: Results, settings: ReportSettings) -> Page:
         return whole_page.page(results, settings)
     sizes = {metric: population_claims.compare_sizes(found, metric, settings) for metric in METRICS}
     judge = judging.judge(results, settings, RULES)
-    return Page(
-        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
-        introduction=SIZES,
+    return PAPER.page(
+        results,
+        "sizes",
         quantities=whole_page.effort_quantities(results),
         tables=(_size_table(found, settings),),
         claims=population_claims.judge_study(judge, found, sizes, settings),
-        checks=SIZE_CHECKS,
+        checks=PAPER.checks("sizes"),
         drawings=_size_drawings(found, sizes, settings),
     )
 
@@ -274,14 +220,9 @@ def _size_table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
         for task in found
         for value, c in task.by_value.items()
     )
-    note = (
-        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of "
-        f"{settings.num_resamples} resamples of seeds for expected running times; "
-        f"{sum(c.done for task in found for c in task.conditions)} runs."
-    )
-    names = (f"expected {metric}{SCALES[metric][1]}" for metric in METRICS)
-    headers = ("task", "λ", "goal met", "of these refuted", *names)
-    return Table("Success and expected running times", headers, rows, note)
+    runs = sum(c.done for task in found for c in task.conditions)
+    words = {"level": 100 * level, "resamples": settings.num_resamples, "runs": runs}
+    return PAPER.table("sizes", rows, **words)
 
 
 def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
@@ -291,7 +232,7 @@ def _expected(condition: ConditionResults, metric: str, settings: ReportSettings
     runs = METRICS[metric](condition), solved(condition)
     interval = expected_interval(*runs, settings.confidence, settings.num_resamples)
     expected, low, high = (
-        markdown.number(float(f"{SCALES[metric][0] * value:.3g}"))
+        markdown.number(float(f"{SCALES[metric] * value:.3g}"))
         for value in (expected_effort(*runs), *interval)
     )
     return f"{expected} [{low}, {high}]"
@@ -309,13 +250,8 @@ def _size_drawings(
     levels = settings.confidence, settings.num_resamples
     names = [task.name for task in found]
     drawn = (
-        Drawing(
-            "effort",
-            "Success and effort against the size",
-            "a: share of runs that meet the goal; b: of these, the share whose path touches "
-            f"something between two postures; Wilson's {level} intervals. c–e: expected running "
-            f"times, {level} bootstrap intervals; sizes without a success have no point. Dashed: "
-            f"{RECOMMENDED:g}, which the paper recommends.",
+        PAPER.drawing(
+            "size_effort",
             partial(population_effort.effort_table, found, shares, effort, *levels),
             partial(
                 population_effort.draw_effort,
@@ -323,17 +259,15 @@ def _size_drawings(
                 marked=RECOMMENDED,
             ),
             shown,
+            level=level,
+            size=RECOMMENDED,
         ),
-        Drawing(
+        PAPER.drawing(
             "ratios",
-            f"Effort against that of {RECOMMENDED:g}",
-            f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on "
-            "common seeds, Bonferroni's over a panel. Above 1: worse. Dotted: as many more "
-            "cycles as there are fewer individuals; above it the increase is over-proportional. "
-            "Where one of the two never succeeds, there is no point.",
             partial(population_effort.ratios_table, sizes, names, RECOMMENDED),
             partial(population_effort.draw_ratios, setting="λ [-]"),
             shown,
+            size=RECOMMENDED,
         ),
     )
     return drawn if any(sizes.values()) else drawn[:1]

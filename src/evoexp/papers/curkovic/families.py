@@ -17,44 +17,29 @@ from evoexp.report.kit import (
 
 
 class Family(NamedTuple):
-    """Conditions that are compared with each other.
+    """Conditions that are compared with each other."""
 
-    Attributes:
-        name: Of the first ones in the comparisons.
-        pairs: (first, other).
-    """
-
-    name: str
-    pairs: tuple[tuple[ConditionResults, ConditionResults], ...]
+    name: str  # of the first ones in the comparisons
+    pairs: tuple[tuple[ConditionResults, ConditionResults], ...]  # (first, other)
 
 
 class Measure(NamedTuple):
-    """A quantity that conditions are compared in; lower is better.
+    """A quantity that conditions are compared in; lower is better."""
 
-    Attributes:
-        name: With unit where it has one.
-        values: Of a condition, (done,).
-        converges: Whether it says how fast or how far a method converges; else it is about the
-            motions found.
-    """
-
-    name: str
-    values: Values
+    name: str  # with unit where it has one
+    values: Values  # of a condition, (done,)
+    # whether it says how fast or how far a method converges; else it is about the motions
+    # found
     converges: bool = True
 
 
 class FamilyComparison(NamedTuple):
-    """A family compared in one quantity.
+    """A family compared in one quantity."""
 
-    Attributes:
-        measure: The quantity.
-        family: The conditions.
-        rows: One per pair that shares seeds, each named by its other condition; p-values are
-            adjusted over them.
-    """
-
-    measure: Measure
-    family: Family
+    measure: Measure  # the quantity
+    family: Family  # the conditions
+    # one per pair that shares seeds, each named by its other condition; p-values are adjusted
+    # over them
     rows: tuple[Comparison, ...]
 
 
@@ -82,13 +67,7 @@ def families(results: Results) -> tuple[Family, ...]:
 def tested(
     results: Results, settings: ReportSettings, threshold: float
 ) -> tuple[FamilyComparison, ...]:
-    """Return all comparisons of a sweep.
-
-    Args:
-        results: Of the sweep.
-        settings: Levels and resamples.
-        threshold: Cost that "generations to a team" means.
-    """
+    """Return all comparisons of a sweep."""
     return tuple(
         FamilyComparison(one, family, compared(family.pairs, one.values, settings))
         for one in _measures(results, threshold)

@@ -9,12 +9,11 @@ import pandas as pd
 from evoexp.papers.curkovic import hall_shares, measures, sweep_page
 from evoexp.papers.curkovic.figures import elitism_shares
 from evoexp.papers.curkovic.hall_shares import EFFORT, Corner, Measure, Share
-from evoexp.papers.curkovic.rules import RULES
+from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report.kit import (
     Claim,
     Comparison,
     ConditionResults,
-    Drawing,
     Judge,
     Page,
     ReportSettings,
@@ -27,14 +26,6 @@ from evoexp.report.kit import (
     markdown,
 )
 
-INTRODUCTION = (
-    "Method V with neither hall nor elites, with elites of each population instead of the hall, "
-    "and with the hall, under both readings of Eq. 9 and two mutation rates; all share their "
-    "seeds. A hall of distinct genomes counts copies of an individual as one, and offers its "
-    "members again; a hall of distinct indices does neither (the paper is silent). The cost of a "
-    "team is C2 + C3 + C4 summed over the robots, free of collision at the configurations, lower "
-    "is better; the exact verdict judges the motion between them, too."
-)
 NOTE = (
     "The gain of the hall is the quantity without hall and elites less that with the hall; the "
     "share is the gain by elites over it, with its bootstrap interval over the seeds: 100 % means "
@@ -61,18 +52,17 @@ def page(results: Results, settings: ReportSettings) -> Page:
         for elites in corner.elites
         for hall in _halls(corner)
     }
-    drawing = Drawing(
+    drawing = PAPER.drawing(
         "elitism",
-        "What elitism explains of the hall's gain",
-        "Share of the gain by a hall of distinct genomes that elites have without a hall, with its "
-        f"{100 * settings.confidence:g} % bootstrap interval over the seeds; dashed: all of it. "
-        "Arrows: further out.",
         partial(_drawn, corners, gained, shared),
         elitism_shares.draw_shares,
         results.with_data,
+        level=100 * settings.confidence,
     )
-    return base._replace(
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "hall",
+        base,
         claims=_claims(results, settings, corners, threshold, shared, gained),
         tables=(_table(corners, gained, shared), *base.tables),
         comparisons=_comparisons(settings, corners, threshold, gained),
@@ -207,16 +197,7 @@ def of_corner(
     values: Values,
     shares: str,
 ) -> list[Claim]:
-    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity.
-
-    Args:
-        judge: Of the paper's claims.
-        settings: Levels and resamples.
-        corner: The conditions.
-        name: Of the quantity.
-        values: Of a condition, (done,).
-        shares: What elites explain of the hall's gain, in words.
-    """
+    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
     who, hall = f"{corner.name}: ", corner.hall
     elites = " and than ".join(c.label.rpartition(", ")[2] for c in corner.elites)
     over_nothing = compared([(hall, corner.nothing)], values, settings)

@@ -21,53 +21,31 @@ Statistic = Callable[[ConditionResults, np.ndarray], FloatArray]
 
 
 class Corner(NamedTuple):
-    """A reading of Eq. 9 with a mutation rate, and what may keep good individuals.
+    """A reading of Eq. 9 with a mutation rate, and what may keep good individuals."""
 
-    Attributes:
-        name: "one-sided, Eq. 10".
-        nothing: Neither hall nor elites.
-        elites: With elites instead of a hall, by growing number.
-        hall: With a hall of distinct genomes.
-        by_index: With a hall of distinct indices; None: not run.
-        others: Other halls: those that forget, or never change.
-    """
-
-    name: str
-    nothing: ConditionResults
-    elites: tuple[ConditionResults, ...]
-    hall: ConditionResults
-    by_index: ConditionResults | None
-    others: tuple[ConditionResults, ...]
+    name: str  # "one-sided, Eq. 10"
+    nothing: ConditionResults  # neither hall nor elites
+    elites: tuple[ConditionResults, ...]  # with elites instead of a hall, by growing number
+    hall: ConditionResults  # with a hall of distinct genomes
+    by_index: ConditionResults | None  # with a hall of distinct indices; None: not run
+    others: tuple[ConditionResults, ...]  # other halls: those that forget, or never change
 
 
 class Measure(NamedTuple):
-    """A quantity whose gain is shared out.
+    """A quantity whose gain is shared out."""
 
-    Attributes:
-        name: With unit where it has one.
-        short: The same in a few words.
-        statistic: (condition, (resamples, runs) numbers of runs) → its value, (resamples,).
-        runs: The number of runs that count.
-    """
-
-    name: str
-    short: str
-    statistic: Statistic
-    runs: Callable[[ConditionResults], int]
+    name: str  # with unit where it has one
+    short: str  # the same in a few words
+    statistic: Statistic  # (condition, (resamples, runs) numbers of runs) → its value, (resamples,)
+    runs: Callable[[ConditionResults], int]  # the number of runs that count
 
 
 class Share(NamedTuple):
-    """The share of a hall's gain that elites have, too.
+    """The share of a hall's gain that elites have, too."""
 
-    Attributes:
-        value: (nothing − elites) / (nothing − hall); NaN where the hall gains nothing.
-        interval: Over resampled seeds; NaN where the hall's gain cannot be told from none.
-        n: Runs of nothing, elites and hall that count.
-    """
-
-    value: float
-    interval: Interval
-    n: tuple[int, int, int]
+    value: float  # (nothing − elites) / (nothing − hall); NaN where the hall gains nothing
+    interval: Interval  # over resampled seeds; NaN where the hall's gain cannot be told from none
+    n: tuple[int, int, int]  # runs of nothing, elites and hall that count
 
 
 def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
@@ -140,12 +118,7 @@ def log_effort(threshold: float) -> Statistic:
 
 
 def gain_measures(threshold: float, told: str) -> tuple[Measure, ...]:
-    """Return the quantities in which gains are shared out.
-
-    Args:
-        threshold: Cost that counts as reached.
-        told: The same in words.
-    """
+    """Return the quantities in which gains are shared out."""
     return (
         Measure(
             "best cost", "best cost", medians(lambda c: c.column("best_cost")), lambda c: c.done

@@ -91,13 +91,7 @@ def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...
 
 
 def team_quantities(results: Results, threshold: float, *more: Quantity) -> tuple[Quantity, ...]:
-    """Return the rows of the table of results that methods and sweeps share.
-
-    Args:
-        results: With data.
-        threshold: Cost that counts as reached.
-        more: Rows that follow the clearance.
-    """
+    """Return the rows of the table of results that methods and sweeps share."""
     row = partial(generic.quantity, results)
     cost, _, *effort = generic.quantities(results)
     return (

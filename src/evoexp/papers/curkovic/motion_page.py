@@ -12,7 +12,7 @@ from evoexp.papers.curkovic.figures import (
     link_intersection,
     robot_motions,
 )
-from evoexp.papers.curkovic.rules import RULES
+from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
@@ -30,12 +30,6 @@ from evoexp.report.kit import (
     markdown,
 )
 
-INTRODUCTION = (
-    "Link angles are absolute, from the positive x-axis; one instant is one sampling step from a "
-    "configuration to the next. The search looks for collisions at the configurations (and at "
-    "collision substeps between them, where a condition has them); the exact verdict judges the "
-    "executed curve, straight or cubic between configurations."
-)
 SAMPLES = 20  # per segment, where the distance of end-effectors from other robots is measured
 KEPT = "least distance of an end-effector from another robot's links"
 
@@ -49,9 +43,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
     tools = _tools(results, settings)
     speed = "greatest speed of a link over what Eq. 2 allows"
     kept = generic.quantity(results, f"{KEPT}, its centre line", unit, tool_distance)
-    return base._replace(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "motion",
+        base,
         quantities=(
             base.quantities[0]._replace(name="best cost of a collision-free team"),
             measures.clearance_quantity(results),
@@ -182,12 +177,8 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
     problem = first.problem(Problem)
     if len(problem.start) == 2 and not _enveloped(first) and problem.moving.all():
         drawn.append(
-            Drawing(
+            PAPER.drawing(
                 "fig_7_intersection",
-                "Fig. 7: the intersection of the top links",
-                "The paper defines the vectors and the parameters μ and ν (Eqs. 11, 12). Here: "
-                "both robots on the straight line from start to goal in link angles, where their "
-                "top links cross best.",
                 partial(link_intersection.intersection_table, first),
                 link_intersection.draw_intersection,
                 (first,),
@@ -198,13 +189,8 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
     if radii := _by_radius(results):
         shown = tuple(c for conditions in radii.values() for c in conditions)
         drawn.append(
-            Drawing(
+            PAPER.drawing(
                 "fig_11_safety",
-                "Fig. 11: the safety factor of the end-effector",
-                "The paper shows three trajectories, which move away from the other robot by "
-                "various amounts. Here: end-effectors of each condition's cheapest motion that the "
-                "exact verdict does not refute (dashed: all are refuted), with a circle of its "
-                "radius at each configuration.",
                 partial(robot_motions.tools_table, shown),
                 robot_motions.draw_tools,
                 shown,
@@ -212,12 +198,8 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
         )
     shown = results.main
     drawn.append(
-        Drawing(
+        PAPER.drawing(
             "distances",
-            "Least distance of bodies along the motions",
-            "Of links (and tools) of different robots, and of robots from obstacles; at the "
-            "configurations, where the paper looks, and between them. Sampled; the counts are "
-            "the exact verdict's.",
             partial(body_distances.distances_table, shown, settings.samples_per_segment),
             body_distances.draw_distances,
             shown,
@@ -228,36 +210,22 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
 
 def _of_condition(results: Results, condition: ConditionResults, suffix: str) -> list[Drawing]:
     problem = condition.problem(Problem)
-    name = f" ({condition.label})" if suffix else ""
     if not problem.moving.all():
         number, title = "10", "Fig. 10: one robot stands still"
     elif len(problem.start) > 2 or _by_radius(results):
         number, title = "", f"Motion of {len(problem.start)} robots"
     else:
         number, title = "8", "Fig. 8: motion of the two robots"
+    best = (PlayedRun(condition, condition.best_replicate),)
+    motion = {"stem": f"fig_{number}_motion" if number else "motion", "title": title}
+    joints = {"stem": "fig_9_joints", "what": "Fig. 9: link"}
+    if number != "8":
+        joints = {"stem": "joints", "what": "Link"}
+    table, draw = partial(robot_motions.motion_table, condition), robot_motions.draw_motion
+    angles = partial(joint_values.joints_table, condition)
     return [
-        Drawing(
-            f"fig_{number}_motion{suffix}" if number else f"motion{suffix}",
-            f"{title}{name}",
-            "As the paper draws it: trail of the arms, end-effectors as points, a circle at the "
-            "start, a cross at the goal. a) best replicate (lowest cost); thin lines: postures "
-            "at equal times, boundaries of links and circles of tools at the configurations. b) "
-            "end-effectors of all replicates. Dark red crosses: where bodies first touch in the "
-            "motions that the exact verdict refutes.",
-            partial(robot_motions.motion_table, condition),
-            robot_motions.draw_motion,
-            (condition,),
-            (PlayedRun(condition, condition.best_replicate),),
-        ),
-        Drawing(
-            f"fig_9_joints{suffix}" if number == "8" else f"joints{suffix}",
-            f"{'Fig. 9: link' if number == '8' else 'Link'} angles and their speeds{name}",
-            "The paper interpolates the configurations by a polynomial of the third order and "
-            "asks for a check of its gradient. Here: best replicate; b) turns per sampling step; "
-            "dotted: limits by Eq. 2's formula (the angles that the paper states beside it are "
-            "twice as large).",
-            partial(joint_values.joints_table, condition),
-            joint_values.draw_joints,
-            (condition,),
+        PAPER.drawing("motion", table, draw, (condition,), best, suffix, **motion),
+        PAPER.drawing(
+            "joints", angles, joint_values.draw_joints, (condition,), (), suffix, **joints
         ),
     ]

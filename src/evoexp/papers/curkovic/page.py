@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 
 from evoexp.papers.curkovic import measures
-from evoexp.papers.curkovic.figures import cost_boxes, methods
-from evoexp.papers.curkovic.rules import RULES
+from evoexp.papers.curkovic.figures import methods
+from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report.kit import (
     Comparison,
     Drawing,
@@ -22,16 +22,6 @@ from evoexp.report.kit import (
 )
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
-INTRODUCTION = (
-    "One population of paths per robot; a path's cost is C1 + C2 + C3 + C4, where C1 counts "
-    "collisions with all paths of the other populations. The answer is a team: one path per "
-    "robot, free of collision with each other; its cost is C2 + C3 + C4 (end-effector paths, "
-    "turns of the links, unevenness) summed over the robots, lower is better. Methods I–IV are "
-    "generational with a roulette wheel, V–VIII keep a hall of fame of pairs and lower the "
-    "mutation rate. The search looks for collisions at the configurations; the exact verdict "
-    "judges the motion between them, too, and a refuted run counts as worse than any where costs "
-    "are compared so."
-)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -52,9 +42,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     generations = matched(partial(measures.generations_to, threshold=threshold))
     certified = matched(measures.certified_cost)
     one_scene = len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
-    return Page(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "methods",
         quantities=(
             *measures.team_quantities(results, threshold),
             *generic.term_quantities(results),
@@ -123,13 +113,8 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
 
 
 def _methods(results: Results, bound: float, threshold: float) -> Drawing:
-    return Drawing(
+    return PAPER.drawing(
         "fig_6_methods",
-        "Fig. 6: convergence of the methods, and their results",
-        "The paper shows the cost of 20 runs per method with standard deviation, and a box plot. "
-        "Here: a) the cheapest collision-free team so far, mean and standard deviation over the "
-        "runs that have one by then, in matched pairs (dashed: without hall); b) the cost at the "
-        f"end of each run. {cost_boxes.CAPTION}",
         partial(methods.methods_table, results, PAIRS, bound, threshold),
         methods.draw_methods,
         results.with_data,

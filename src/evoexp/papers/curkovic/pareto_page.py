@@ -7,6 +7,7 @@ import numpy as np
 from evoexp.evolution.pareto import pareto_front
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import pareto_fronts
+from evoexp.papers.curkovic.rules import PAPER
 from evoexp.records import FloatArray, FrontRow
 from evoexp.report.kit import (
     ConditionResults,
@@ -22,13 +23,6 @@ from evoexp.report.kit import (
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 
-INTRODUCTION = (
-    "One population of paths per robot. An individual is on the front of its population if no "
-    "other one is at least as good in all of C1 (collisions with all paths of the other "
-    "populations), C2 (end-effector's path), C3 (turns of the links) and C4 (longest step of the "
-    "end-effector less its shortest), and better in one."
-)
-
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of fronts, or the generic page if no log holds a front."""
@@ -41,9 +35,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
     base = generic.basis(results, settings)
     populations = range(max(len(rows) for c in drawn for rows in fronts[c.label].values()))
     sizes = [(p, {c.label: _sizes(fronts[c.label], p) for c in drawn}) for p in populations]
-    return base._replace(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "fronts",
+        base,
         quantities=(*(_quantity(results, p, of) for p, of in sizes), *base.quantities),
         checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
         drawings=(
@@ -55,11 +50,6 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
     """Return the criteria of a finished replicate's populations, one record per population.
-
-    Args:
-        results: The results that the condition is part of.
-        condition: The condition.
-        replicate: Number of the replicate.
 
     Raises:
         CorruptLog: If the log cannot be trusted.
@@ -124,14 +114,12 @@ def _drawing(
     best, several = condition.best_replicate, len(results.with_data) > 1
     generation = fronts[best][0].generation
     suffix = f"_{results.position(condition.label) + 1}" if several else ""
-    return Drawing(
-        f"fig_5_fronts{suffix}",
-        f"Fig. 5: fronts at generation {generation}, criterion against criterion"
-        + (f" ({condition.label})" if several else ""),
-        "The paper shows non-dominated individuals red, dominated ones blue. Here: both robots' "
-        f"populations of replicate {best} (lowest cost), all four criteria judged at once; so a "
-        "front looks scattered in two of them.",
+    return PAPER.drawing(
+        "fig_5_fronts",
         partial(pareto_fronts.fronts_table, fronts[best], best, condition.condition.length_unit),
         pareto_fronts.draw_fronts,
         (condition,),
+        suffix=suffix,
+        generation=generation,
+        replicate=best,
     )

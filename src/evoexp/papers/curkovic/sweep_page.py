@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from evoexp.papers.curkovic import claims, families, measures
 from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.papers.curkovic.figures import cost_boxes, facets
+from evoexp.papers.curkovic.rules import PAPER
 from evoexp.report.kit import (
     Drawing,
     Page,
@@ -23,14 +24,6 @@ from evoexp.report.kit import (
 )
 
 NAMES = {"quantity": "defect", "having": "failing", "total": "solved"}  # of shares, of defects
-INTRODUCTION = (
-    "Each condition changes one part of a method; all share their seeds. The cost of a team is "
-    "C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, "
-    "free of collision, lower is better. Generations and evaluations are those until a team's "
-    "cost is at or below a threshold; a run that never gets there counts as infinite. The search "
-    "looks for collisions at the configurations; where costs are compared with a refuted motion "
-    "counting as worse than any, the exact verdict on the motion between them counts, too."
-)
 SHORT = {
     measures.REFUTED: "collide in between",
     measures.LEAVES: "leave [0, π]",
@@ -46,9 +39,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
     bound = measures.lower_bound(results.with_data[0])
     threshold = settings.threshold_ratio * bound
     found = families.tested(results, settings, threshold)
-    return generic.basis(results, settings)._replace(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "sweep",
+        generic.basis(results, settings),
         quantities=_quantities(results, threshold),
         claims=claims.of_sweep(results, settings, found),
         checks=_checks(results, bound),
@@ -91,51 +85,32 @@ def _drawings(
     bound = markdown.number(threshold / settings.threshold_ratio)
     table = partial(facets.facet_table, results, threshold)
     return (
-        Drawing(
+        PAPER.drawing(
             "costs",
-            "Best costs of all runs",
-            f"{cost_boxes.CAPTION} Dashed: the threshold, {told}.",
             partial(cost_boxes.costs_table, results, threshold),
             cost_boxes.draw_costs,
             shown,
+            threshold=told,
         ),
-        Drawing(
-            "effort",
-            f"Effort to a team of cost ≤ {told}",
-            facets.CURVES,
-            table,
-            facets.draw_effort,
-            shown,
-        ),
-        Drawing(
-            "convergence",
-            "Convergence",
-            f"Median of the best cost so far over all runs. Dashed: the threshold, {told}; lower "
-            f"bound {bound}.",
-            table,
-            facets.draw_convergence,
-            shown,
+        PAPER.drawing("effort", table, facets.draw_effort, shown, threshold=told),
+        PAPER.drawing(
+            "convergence", table, facets.draw_convergence, shown, threshold=told, bound=bound
         ),
         *sweep_figures.effects_drawings(
             results, settings, by_name, "the first condition of a family", EFFECTS
         ),
-        Drawing(
+        PAPER.drawing(
             "defects",
-            "Motions that the paper's model accepts and that fail",
-            f"Share of the solved motions, with Wilson's {100 * settings.confidence:g} % interval.",
             partial(rates_table, results, settings.confidence),
             draw_rates,
             results.with_data,
+            level=100 * settings.confidence,
         ),
     )
 
 
 def rates_table(results: Results, confidence: float) -> pd.DataFrame:
     """Return the shares of solved motions that have a defect; without curves only one varies.
-
-    Args:
-        results: With data.
-        confidence: Level of Wilson's intervals.
 
     Returns:
         Columns defect, position, condition, failing, solved, lower, upper, share.

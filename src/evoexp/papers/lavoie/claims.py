@@ -33,11 +33,6 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults], level: flo
 
     Both percentages are samples: a printed one is contradicted where Fisher's exact test, adjusted
     by Holm over all percentages judged here, tells it from ours.
-
-    Args:
-        judge: The judge of the experiment.
-        conditions: The conditions whose runs they are judged by.
-        level: Level of the intervals.
     """
     pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
     ours = [measures.below(condition, printed.bound) for condition, printed in pairs]

@@ -58,16 +58,7 @@ def more_solutions(
     p_adjusted: float | None = None,
     who: str = "",
 ) -> Claim:
-    """Judge that the algorithm finds more solutions than a control.
-
-    Args:
-        judge: The judge of the experiment.
-        own: The condition of the algorithm.
-        control: Its best control.
-        settings: Level of the intervals.
-        p_adjusted: Of the test of both shares where it is one of several.
-        who: Stands before the claim.
-    """
+    """Judge that the algorithm finds more solutions than a control."""
     level, one, two = settings.confidence, success(own), success(control)
     p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
     low, high = newcombe(one, two, level)

@@ -24,17 +24,11 @@ Contact = tuple[float, str]
 
 
 class Percentage(NamedTuple):
-    """A percentage that the paper prints beside Fig. 3.
+    """A percentage that the paper prints beside Fig. 3."""
 
-    Attributes:
-        joints: Number of joints of the arm.
-        bound: x of P(position error < x) [length unit].
-        having: Number of the thousand runs with a smaller error.
-    """
-
-    joints: int
-    bound: float
-    having: int
+    joints: int  # number of joints of the arm
+    bound: float  # x of P(position error < x) [length unit]
+    having: int  # number of the thousand runs with a smaller error
 
     @property
     def proportion(self) -> Proportion:
@@ -97,11 +91,6 @@ def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> l
 
     A verdict names the first contact of the whole motion only; if that is on SP1, the planner's
     motion on SP2 is judged by itself.
-
-    Args:
-        condition: The condition of the replicate.
-        replicate: The replicate.
-        verdict: The first contact of its motion.
     """
     if verdict[0] >= 1.0:
         return [verdict]
@@ -128,17 +117,11 @@ def refuted_paths(condition: ConditionResults) -> np.ndarray:
 
 
 class RefutedMotions(NamedTuple):
-    """Counts of a condition's accepted motions that touch an obstacle.
+    """Counts of a condition's accepted motions that touch an obstacle."""
 
-    Attributes:
-        anywhere: Motions that touch on either sub-path, of all solved runs.
-        sp1: Motions that touch on the first sub-path.
-        sp2: Motions that touch on the second one.
-    """
-
-    anywhere: Proportion
-    sp1: Proportion
-    sp2: Proportion
+    anywhere: Proportion  # motions that touch on either sub-path, of all solved runs
+    sp1: Proportion  # motions that touch on the first sub-path
+    sp2: Proportion  # motions that touch on the second one
 
 
 def refuted(condition: ConditionResults) -> RefutedMotions:

@@ -8,7 +8,7 @@ from evoexp.papers.lavoie import claims, measures
 from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.papers.lavoie.rules import RULES
+from evoexp.papers.lavoie.rules import PAPER, RULES
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.report.kit import (
     Claim,
@@ -28,56 +28,12 @@ from evoexp.report.kit import (
     run_measures,
 )
 
-INTRODUCTION = (
-    "A genetic algorithm searches the posture A at the end of the first sub-path (SP1, tip near "
-    "the via point), a second one the posture B at the end of the second (SP2, tip near the "
-    "goal, inside the box); both are repeated until both are successful, ten times at most. The "
-    "cost is the objective of SP2 (Eq. 4): position error + 0.7 · joint displacement, infinite "
-    "in collision or outside the box; lower is better. A run has a solution if both searches "
-    "were successful: they stopped below their values, 6 and 2 (unless `planner.success` is "
-    "`finite`); its error is that of the tip at the end of SP2."
-)
 ACCEPTED = "Accepted motions that touch an obstacle between tested positions (exact verdict)"
 REMOVED = (
     "Remedies",
     "more positions M, and chords from one position to the next: `evoexp run "
     "experiment=lavoie_sweeps_positions`; an arm blind to obstacles: `evoexp run "
     "experiment=lavoie_controls`",
-)
-CHECKS = (
-    (
-        "An error of 2 or more",
-        "cannot come from a run that stopped below 2: the objective is at least the error. So "
-        "P(error < 2) is the share of runs with a solution, and the printed 99.8 % says that 2 of "
-        "1000 runs of the paper had none after ten attempts, or counted as successful without "
-        "stopping below 2: `evoexp run experiment=lavoie_success`",
-    ),
-    (
-        "Selection, crossover and mutation",
-        "are not named by the paper, and the percentages depend on them: `evoexp run "
-        "experiment=lavoie_operators`; so neither agreement nor disagreement with Fig. 3 says much "
-        "of the paper's algorithm",
-    ),
-    (
-        "Time of a run",
-        "the paper prints its own (Pentium II, 400 MHz) inside Fig. 3 only; here: above, one core "
-        "of this run's machine",
-    ),
-)
-START = (
-    "The ellipses as they are tested, exactly; the paper prints neither their places nor their "
-    "sizes: ours make a box around the printed goal, open towards the printed via-point. The "
-    "tip must end inside the box."
-)
-SOLUTIONS = (
-    "The paper shows one solution of the arm of seven joints. Here: per arm the run whose "
-    "position error is the median of all solved runs (the lower one of two); intermediate "
-    "postures are tested positions (Eq. 3), the later the stronger."
-)
-THROUGH = (
-    "Per arm the accepted run of median position error among those that the exact verdict "
-    "refutes: every tested position is free, and the arm passes through an obstacle between two "
-    "of them."
 )
 
 
@@ -86,9 +42,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     if not measures.fits(results):
         return generic.page(results, settings)
     refuted = {c.label: measures.refuted(c) for c in results.with_data}
-    return Page(
-        title=f"Lavoie & Boudreau 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "arms",
         quantities=quantities(results),
         claims=_claims(results, settings, refuted),
         checks=_checks(results, settings, refuted),
@@ -162,7 +118,7 @@ def _checks(
         REMOVED,
         row("Runs with a solution", success),
         ("Attempts of SP1 → SP2: mean, most", "; ".join(attempts)),
-        *CHECKS,
+        *PAPER.checks("arms"),
         *(one for c in results.with_data for one in _literal_shift(c)),
     )
 
@@ -202,36 +158,24 @@ def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]
         settings.confidence,
     )
     return (
-        _postures("fig_1_start", "Fig. 1: start postures", START, starts),
+        _postures("fig_1_start", starts),
         *_solutions(results),
-        Drawing(
-            "fig_3_error",
-            "Fig. 3: probability of a position error below x",
-            "Steps: share of all runs that end with a solution of a smaller error, with Wilson's "
-            f"{level} interval at each x. Diamonds: the percentages that the paper prints, with "
-            "the intervals of its own thousand runs.",
-            distribution,
-            error_distribution.draw_distribution,
-            shown,
+        PAPER.drawing(
+            "fig_3_error", distribution, error_distribution.draw_distribution, shown, level=level
         ),
-        Drawing(
+        PAPER.drawing(
             "attempts",
-            "Attempts",
-            f"Share of runs that took so many attempts of SP1 → SP2, with Wilson's {level} "
-            "interval; above: runs.",
             partial(attempts.attempts_table, results, settings.confidence),
             attempts.draw_attempts,
             shown,
+            level=level,
         ),
     )
 
 
 def _solutions(results: Results) -> Iterator[Drawing]:
     """Return the figures of each arm's median solution and of its median refuted solution."""
-    for stem, title, caption, only_refuted in (
-        ("fig_2_solution", "Fig. 2: solutions", SOLUTIONS, False),
-        ("refuted", "Contacts between tested positions", THROUGH, True),
-    ):
+    for name, only_refuted in (("fig_2_solution", False), ("refuted", True)):
         shown = []
         for c in results.with_data:
             rows = run_measures.solved(c) & (measures.touches(c) | (not only_refuted))
@@ -239,13 +183,13 @@ def _solutions(results: Results) -> Iterator[Drawing]:
                 errors = measures.errors(c)
                 shown.append(_solution(c, run_measures.median_replicate(c, errors, rows)))
         if shown:
-            yield _postures(stem, title, caption, shown)
+            yield _postures(name, shown)
 
 
-def _postures(stem: str, title: str, caption: str, shown: list[ShownMotion]) -> Drawing:
+def _postures(name: str, shown: list[ShownMotion]) -> Drawing:
     table, draw = partial(reaching_motions.reaching_table, shown), reaching_motions.draw_reaching
     plays = tuple(PlayedRun(c, k) for _, c, k, _ in shown if k is not None)
-    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown), plays)
+    return PAPER.drawing(name, table, draw, [one.condition for one in shown], plays)
 
 
 def _solution(condition: ConditionResults, replicate: int) -> ShownMotion:

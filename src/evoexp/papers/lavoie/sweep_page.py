@@ -8,6 +8,7 @@ from evoexp.papers.lavoie import measures, sweep_claims
 from evoexp.papers.lavoie import page as whole_page
 from evoexp.papers.lavoie.figures import stopping
 from evoexp.papers.lavoie.measures import RefutedMotions
+from evoexp.papers.lavoie.rules import PAPER
 from evoexp.report.kit import (
     Comparison,
     ConditionResults,
@@ -24,12 +25,6 @@ from evoexp.report.kit import (
     sweep_figures,
 )
 
-INTRODUCTION = (
-    "Each condition changes one part of the first one of its arm; all share their seeds. A run "
-    "has a solution if both searches were successful (`planner.success`); one without counts as "
-    "an infinite error and infinite effort. Searches differ in length and one follows the other, "
-    "so there is no common axis to draw convergence on."
-)
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
 
 
@@ -58,9 +53,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
         return whole_page.page(results, settings)
     refuted = {c.label: measures.refuted(c) for c in results.with_data}
     found = compared_arms(results, settings)
-    return Page(
-        title=f"Lavoie & Boudreau 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "sweep",
         quantities=whole_page.quantities(results),
         claims=sweep_claims.judge_sweep(results, settings, refuted),
         checks=_checks(results, settings, refuted),
@@ -160,12 +155,8 @@ def _drawings(
     refuted: dict[str, RefutedMotions],
 ) -> tuple[Drawing, ...]:
     """Return the figures: stopping values where they differ, shares, values, effect sizes."""
-    stopping_values = Drawing(
+    stopping_values = PAPER.drawing(
         "stopping",
-        "Precision against the stopping value",
-        "Medians with quartiles over all runs; one without a solution counts as infinite; a "
-        "triangle on the first quartile: the third one is infinite. To the right searches stop at "
-        "smaller values.",
         partial(stopping.stopping_table, results, measures.errors, measures.effort),
         stopping.draw_stopping,
         results.with_data,

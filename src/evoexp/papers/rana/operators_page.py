@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.papers.rana import crossover_checks, measures
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.report.kit import (
     Claim,
     Comparison,
@@ -53,11 +53,6 @@ COMPARED = (
     ),
     ComparedQuantity("", measures.FIRST_FREE, "generation", run_measures.first_feasible),
 )
-INTRODUCTION = (
-    "Each condition changes one part of the first one; all share their seeds. Costs are measured "
-    "by the same formula, except that collision substeps look for collisions between via-points, "
-    "too. Without elites a generation evaluates as many individuals more as there were elites."
-)
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
 
 
@@ -77,9 +72,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
     units = {one.name: unit if one.unit == "length" else one.unit for one in COMPARED}
     cost, _, *effort = base.quantities
     own = [generic.quantity(results, one.name, units[one.name], one.values) for one in COMPARED[1:]]
-    return base._replace(
+    return PAPER.page(
+        results,
+        "operators",
+        base,
         title=f"{results.experiment or 'stored runs'}: {first.label} against each other condition",
-        introduction=INTRODUCTION,
         quantities=(cost, *own, *effort),
         claims=tuple(operator_claims(results, settings, judging.judge(results, settings, RULES))),
         checks=tuple(crossover_checks.checks(results, tables[COST], tables[EVENNESS])),

@@ -5,7 +5,7 @@ import numpy as np
 from evoexp.papers.rana import drawings, measures, motions, operators_page
 from evoexp.papers.rana.claims import evolution_told
 from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.kit import (
     ConditionResults,
@@ -41,11 +41,6 @@ COMPARED = (  # with the controls: name, whether lower is better, values
     ("colliding instants C5 of the best", True, by_column("term_collisions")),
     ("clearance of the bodies over the whole motion", False, CLEARANCE),
 )
-INTRODUCTION = (
-    "Two arms change sides; the paths of both are strings of via-points, evolved together. The "
-    "paper maximises the fitness F = C_max − cost; everything else here is a cost, lower is "
-    "better. Instant i is the i-th via-point of both arms."
-)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -63,10 +58,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
         *(d for one in drawn for d in drawings.drawings(one)),
     ]
     planar = {one.planar for one in drawn}
-    return Page(
-        f"Rana & Zalzala 1995: {' and '.join(ARMS[flat] for flat in sorted(planar, reverse=True))}",
-        INTRODUCTION,
-        _quantities(results),
+    arms = " and ".join(ARMS[flat] for flat in sorted(planar, reverse=True))
+    return PAPER.page(
+        results,
+        "arms",
+        title=f"{PAPER.name}: {arms}",
+        quantities=_quantities(results),
         claims=tuple(found),
         checks=tuple(checks),
         comparisons=comparisons,

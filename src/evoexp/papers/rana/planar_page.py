@@ -3,11 +3,9 @@
 from collections.abc import Iterator
 from functools import partial
 
-import pandas as pd
-
 from evoexp.papers.rana import measures, motions
 from evoexp.papers.rana.figures import planar_motion
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.kit import (
     Claim,
@@ -24,26 +22,6 @@ from evoexp.report.kit import (
     run_measures,
 )
 
-INTRODUCTION = (
-    "Strings of via-points for planar arms, evolved together. A string has one path per arm; two "
-    "arms collide at an instant if circles of both overlap, an arm and an obstacle if a circle of "
-    "the arm reaches it. The planner keeps circles apart: links keep the sum of two radii from "
-    "each other and one radius from obstacles, as far as circles stand for links."
-)
-SNAPSHOTS = (
-    "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in "
-    "one panel do so at different instants unless both are drawn in the same shade."
-)
-PATHS = (
-    "Paths of all replicates, or of 200 if there are more, in the planes of the joint angles; "
-    "angles are not wrapped."
-)
-DISTANCES = (
-    "Least distance against the instant: of the centres of circles or spheres, and of the bodies "
-    "themselves; at via-points (dots) and sampled between them (line); diamonds and crosses: the "
-    "exact verdict on every replicate. Obstacles have panels and a required distance of their own."
-)
-
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of planar arms, or the generic page if no robot is drawable."""
@@ -54,18 +32,16 @@ def page(results: Results, settings: ReportSettings) -> Page:
     judge = judging.judge(results, settings, RULES)
     drawings, claims = list(base.drawings), list[Claim]()
     for condition, suffix in shown:
-        drawings += motion_drawings(condition, suffix)
-        if condition.problem(Problem).assembly.num_arms > 1:
-            sampled = planar_motion.sampled_distances(condition, settings.samples_per_segment)
-            drawings.append(distances_drawing(condition, suffix, sampled))
+        drawings += _drawings(condition, suffix, settings.samples_per_segment)
         claims += _claims(judge, condition)
     cost, _, *effort = base.quantities
     first = generic.quantity(
         results, measures.FIRST_FREE, "generation", run_measures.first_feasible
     )
-    return base._replace(
-        title=f"Rana & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "planar",
+        base,
         quantities=(cost, first, *effort),
         claims=tuple(claims),
         drawings=tuple(drawings),
@@ -111,40 +87,16 @@ def drawable(condition: ConditionResults) -> bool:
     return all(stop - first == 2 for first, stop in problem.arm_slices)
 
 
-def motion_drawings(condition: ConditionResults, suffix: str) -> list[Drawing]:
-    """Return snapshots and paths of one condition."""
-    return [
-        Drawing(
-            f"snapshots{suffix}",
-            _title("Snapshots of the motion", condition, suffix),
-            SNAPSHOTS,
-            partial(planar_motion.snapshots_table, condition),
-            planar_motion.draw_snapshots,
-            (condition,),
-            (PlayedRun(condition, condition.best_replicate),),
-        ),
-        Drawing(
-            f"paths{suffix}",
-            _title("Paths in configuration space", condition, suffix),
-            PATHS,
-            partial(planar_motion.paths_table, condition),
-            planar_motion.draw_paths,
-            (condition,),
-        ),
-    ]
-
-
-def distances_drawing(condition: ConditionResults, suffix: str, sampled: pd.DataFrame) -> Drawing:
-    """Return the figure of distances between the arms of one condition."""
-    return Drawing(
-        f"distances{suffix}",
-        _title("Least distances", condition, suffix),
-        DISTANCES,
-        partial(planar_motion.distances_table, condition, sampled),
-        planar_motion.draw_distances,
-        (condition,),
-    )
-
-
-def _title(text: str, condition: ConditionResults, suffix: str) -> str:
-    return f"{text} ({condition.label})" if suffix else text
+def _drawings(condition: ConditionResults, suffix: str, samples: int) -> Iterator[Drawing]:
+    """Yield snapshots and paths of one condition, and distances if it has several arms."""
+    c, played = condition, (PlayedRun(condition, condition.best_replicate),)
+    snapshots, draw = partial(planar_motion.snapshots_table, c), planar_motion.draw_snapshots
+    yield PAPER.drawing("snapshots", snapshots, draw, (c,), played, suffix)
+    paths = partial(planar_motion.paths_table, c)
+    yield PAPER.drawing("paths", paths, planar_motion.draw_paths, (c,), suffix=suffix)
+    if c.problem(Problem).assembly.num_arms > 1:
+        sampled = planar_motion.sampled_distances(c, samples)
+        distances = partial(planar_motion.distances_table, c, sampled)
+        yield PAPER.drawing(
+            "distances", distances, planar_motion.draw_distances, (c,), suffix=suffix
+        )

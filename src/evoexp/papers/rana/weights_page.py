@@ -3,7 +3,7 @@
 import numpy as np
 
 from evoexp.papers.rana import measures, motions
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
@@ -25,11 +25,6 @@ from evoexp.report.kit import (
 )
 
 LENGTH, HITS = "path length of the best, all arms", "colliding instants C5 of the best"
-INTRODUCTION = (
-    "Eq. 7 weighs a colliding instant (k3) against the length of the paths (k1 per degree). All "
-    "conditions share their seeds and differ in k3 alone, so their costs are not comparable: "
-    "lengths and collisions are."
-)
 COLLIDING = (
     "Share of runs whose best string collides at a via-point by the paper's model, or whose "
     "bodies touch somewhere on the whole motion, with Wilson's interval."
@@ -51,9 +46,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
     rows = compared([(first, other) for other in others], length, settings)
     counts = [(c, *_colliding(c)) for c in results.with_data]
-    return Page(
-        title=f"Rana & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "weights",
         quantities=quantities,
         claims=tuple(_claims(judge, first)),
         comparisons=((f"{LENGTH}: {first.label} against …", rows),) if rows else (),
@@ -134,14 +129,4 @@ def _table(counts: list[tuple[ConditionResults, Proportion, Proportion]]) -> Tab
         )
         for c, at, anywhere in counts
     )
-    return Table(
-        "What a collision costs",
-        (
-            "condition",
-            "path that costs as much as one colliding instant",
-            "runs that end in a collision at a via-point",
-            "runs whose bodies touch somewhere",
-            "median path length",
-        ),
-        rows,
-    )
+    return PAPER.table("costs", rows)

@@ -26,19 +26,12 @@ KNOWN, BOUND = "best path known", "no path costs less"
 
 
 class Line(NamedTuple):
-    """A path to draw.
+    """A path to draw."""
 
-    Attributes:
-        kind: Lines of one kind look alike and share an entry in the legend.
-        path: (nodes, 2).
-        share: Share of the runs that take it, in [0, 1]; tells its width.
-        text: Entry in the legend; empty: the kind.
-    """
-
-    kind: str
-    path: FloatArray
-    share: float = 1.0
-    text: str = ""
+    kind: str  # lines of one kind look alike and share an entry in the legend
+    path: FloatArray  # (nodes, 2)
+    share: float = 1.0  # share of the runs that take it, in [0, 1]; tells its width
+    text: str = ""  # entry in the legend; empty: the kind
 
 
 def known_lines(group: Group) -> list[Line]:

@@ -74,13 +74,7 @@ def effort_table(
 
 
 def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
-    """Draw one panel per quantity; a value without a success has no point.
-
-    Args:
-        table: As `effort_table` gives it.
-        setting: Label of the horizontal axis.
-        marked: The value that the paper recommends.
-    """
+    """Draw one panel per quantity; a value without a success has no point."""
     quantities = list(dict.fromkeys(table["quantity"]))
     lines, free = -(-len(quantities) // 2), len(quantities) % 2 == 1
     figure = style.figure(2.6 * lines + (0.0 if free else 0.7))
@@ -107,11 +101,6 @@ def ratios_table(
     rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float
 ) -> pd.DataFrame:
     """Return the effort of every value over that of the recommended one.
-
-    Args:
-        rows: Metric → objects with task, value, ratio, interval, bound.
-        names: Tasks, in the order that gives them their colours.
-        reference: The recommended value.
 
     Returns:
         Columns quantity, kind (ratio), position, task, value, expected (the ratio), lower, upper,

@@ -40,19 +40,12 @@ EQUAL: dict[str, Any] = {"adjustable": "datalim", "aspect": "equal"}
 
 
 class ShownPath(NamedTuple):
-    """The run of one panel, or of one panel per phase.
+    """The run of one panel, or of one panel per phase."""
 
-    Attributes:
-        title: Title of the panel.
-        condition: The condition of the run.
-        replicate: Its replicate.
-        by_phase: Whether each phase has a panel of its own.
-    """
-
-    title: str
-    condition: ConditionResults
-    replicate: int
-    by_phase: bool = False
+    title: str  # title of the panel
+    condition: ConditionResults  # the condition of the run
+    replicate: int  # its replicate
+    by_phase: bool = False  # whether each phase has a panel of its own
 
 
 def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
@@ -91,12 +84,7 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
 
 
 def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
-    """Draw one panel per path or phase; where there are one or two, each from above, too.
-
-    Args:
-        table: As `motions_table` gives it.
-        same_scene: Whether all panels show the same room: the phases of one path.
-    """
+    """Draw one panel per path or phase; where there are one or two, each from above, too."""
     panels = list(groups(table, ["panel", "title"]))
     above = len(panels) <= FEW
     columns = 2 if above else min(PER_LINE, len(panels))

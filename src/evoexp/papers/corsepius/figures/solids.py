@@ -100,15 +100,7 @@ def corners(table: pd.DataFrame) -> FloatArray:
 def space(
     figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple[float, float]
 ) -> Any:
-    """Return axes in space, with equal scales, that hold some points.
-
-    Args:
-        figure: The figure that they are put into.
-        place: As `add_subplot` takes it.
-        points: (points, 3).
-        unit: Of lengths.
-        view: Elevation and azimuth [deg].
-    """
+    """Return axes in space, with equal scales, that hold some points."""
     axes: Any = figure.add_subplot(place, projection="3d")
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())

@@ -27,10 +27,6 @@ LOWEST, HIGHEST, BEST, STRAIGHT = "lowest", "highest", "best replicate", "straig
 def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
     """Return the bodies' least distance: range over all motions, best replicate, straight line.
 
-    Args:
-        conditions: With data.
-        samples: Configurations per segment.
-
     Returns:
         Columns condition, position, series (lowest and highest of all replicates, best replicate,
         straight line in link angles), instant, distance [length unit], replicates, refuted (of

@@ -24,10 +24,6 @@ CAPTION = (
 def costs_table(results: Results, threshold: float) -> pd.DataFrame:
     """Return every run's best cost.
 
-    Args:
-        results: With data.
-        threshold: Cost that counts as reached.
-
     Returns:
         Columns position, condition, replicate, cost, refuted, threshold.
     """

@@ -15,11 +15,7 @@ ALL = 1.0  # elites gain as much as the hall does
 
 
 def draw_shares(table: pd.DataFrame) -> Figure:
-    """Draw one panel per quantity, one row per reading and rate, elites side by side.
-
-    Args:
-        table: With `COLUMNS`; NaN where the hall gains nothing.
-    """
+    """Draw one panel per quantity, one row per reading and rate, elites side by side."""
     corners = list(dict.fromkeys(table["corner"]))
     numbers = list(dict.fromkeys(table["elites"]))
     measures = list(dict.fromkeys(table["measure"]))

@@ -22,11 +22,6 @@ FRONT, DOMINATED = (
 def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> pd.DataFrame:
     """Return the criteria of every individual of every population.
 
-    Args:
-        fronts: One record per population, of one generation of a replicate.
-        replicate: Which.
-        length_unit: Of C2 and C4.
-
     Returns:
         Columns replicate, generation, population, individual, c1 [collisions], c2 [length unit], c3
         [rad], c4 [length unit], non_dominated (in its own population), length_unit.

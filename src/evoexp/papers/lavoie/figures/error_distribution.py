@@ -28,12 +28,6 @@ def distribution_table(
 ) -> pd.DataFrame:
     """Return P(error < x) of every condition at each error that occurs, and the printed points.
 
-    Args:
-        results: With data.
-        errors: Of a condition, (done,); inf: no solution.
-        printed: The paper's points for a condition.
-        confidence: Level of Wilson's intervals, each for itself.
-
     Returns:
         Columns series (found: holds for x from this row's error, exclusive, to the next one's;
         printed), position, condition, error, having, total, share, lower, upper, length_unit.

@@ -64,18 +64,13 @@ HALO = withStroke(linewidth=2.0, foreground="white")
 
 
 class ShownMotion(NamedTuple):
-    """The scene of one panel, and the motion in it.
+    """The scene of one panel, and the motion in it."""
 
-    Attributes:
-        title: Title of the panel.
-        condition: The condition whose scene is drawn.
-        replicate: The replicate whose solution is drawn; None: the start posture only.
-        contacts: (instant, bodies) of the first contact on each sub-path that has one.
-    """
-
-    title: str
-    condition: ConditionResults
+    title: str  # title of the panel
+    condition: ConditionResults  # the condition whose scene is drawn
+    # the replicate whose solution is drawn; None: the start posture only
     replicate: int | None = None
+    # (instant, bodies) of the first contact on each sub-path that has one
     contacts: Sequence[tuple[float, str]] = ()
 
 
@@ -215,13 +210,7 @@ def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
-    """Draw the start in black, each sub-path in a colour of its own, its end strong.
-
-    Args:
-        axes: To be drawn into.
-        links: Rows of links.
-        named: Sub-paths whose ends have their names written beside them; 0: the start.
-    """
+    """Draw the start in black, each sub-path in a colour of its own, its end strong."""
     for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
         x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
         colour, share = _colour(sub_path), instant - (sub_path - 1)

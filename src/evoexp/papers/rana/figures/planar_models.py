@@ -123,12 +123,7 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
 def configuration_planes(
     table: pd.DataFrame, height: float
 ) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
-    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm).
-
-    Args:
-        table: With the column arm.
-        height: Of the figure, if it has two planes or one [inch].
-    """
+    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm)."""
     by_arm = list(groups(table, "arm"))
     figure, panels = style.row_of_panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
     for axes, (arm, _) in zip(panels, by_arm, strict=True):

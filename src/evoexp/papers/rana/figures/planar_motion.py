@@ -148,10 +148,6 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
     """Return the distances along the best motion and the straight line, and their range over all.
 
-    Args:
-        condition: With data.
-        samples: Configurations per segment.
-
     Returns:
         Columns series (straight line, best replicate, lowest and highest of all replicates),
         instant (a fraction between via-points), centres and links: least distances between two
@@ -216,10 +212,6 @@ def _in_radians(measure: Measure) -> Measure:
 
 def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
     """Return the distances that Fig. 7 shows.
-
-    Args:
-        condition: With data.
-        sampled: Of `sampled_distances`.
 
     Returns:
         Columns kind (between arms, to obstacles), measure (circle centres, links), series, instant,

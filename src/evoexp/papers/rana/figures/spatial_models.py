@@ -21,10 +21,6 @@ POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
 def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion.
 
-    Args:
-        condition: With the robot.
-        q: (nq, instants) [deg].
-
     Returns:
         Columns of `motion_geometry.links_table`, length_unit.
     """

@@ -8,6 +8,7 @@ from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
 from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.kit import (
+    Claim,
     ConditionResults,
     Judge,
     Page,
@@ -25,7 +26,6 @@ from evoexp.report.kit import (
     planned_replicates,
     run_measures,
     spread,
-    verdicts,
 )
 
 CLEARANCE, COST = by_column("clearance"), by_column("best_cost")
@@ -118,9 +118,7 @@ def not_judged(results: Results, condition: ConditionResults) -> str:
     return f"overridden: {', '.join(changed)}" if changed else ""
 
 
-def _claims(
-    results: Results, settings: ReportSettings, one: MeasuredMotions
-) -> list[verdicts.Claim]:
+def _claims(results: Results, settings: ReportSettings, one: MeasuredMotions) -> list[Claim]:
     """Return the paper's claims with verdicts on one condition."""
     c, unit, who = one.condition, one.condition.condition.length_unit, _who(results, one)
     judge = Judge(not_judged(results, c), settings.significance, RULES)
@@ -157,7 +155,7 @@ def _claims(
 
 def _operator_claims(
     results: Results, settings: ReportSettings, one: MeasuredMotions, judge: Judge
-) -> list[verdicts.Claim]:
+) -> list[Claim]:
     """Judge the claim about the two operators from the stored ablations of the same scene."""
     experiment = f"rana_{'planar' if one.planar else 'puma'}_ablations"
     stored, who = results.beside(experiment), _who(results, one)
@@ -172,7 +170,7 @@ def _operator_claims(
 
 def _evolution_claim(
     results: Results, settings: ReportSettings, one: MeasuredMotions, judge: Judge
-) -> verdicts.Claim:
+) -> Claim:
     """Judge what evolution adds to every control, and tell how much to the best of them."""
     c = one.condition
     controls = [k for k in results.evolved if k.is_control and beside(c.condition, k.condition)]

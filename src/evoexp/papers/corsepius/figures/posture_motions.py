@@ -67,20 +67,8 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
             given = {"panel": len(panels), "title": title, "length_unit": unit}
             panels.append([given | row for row in _panel(problem, span, postures, first)])
     rows = [row for panel in panels for row in panel]
-    return rounded(
-        pd.DataFrame(rows).reindex(
-            columns=[
-                "panel",
-                "title",
-                "element",
-                "instant",
-                "name",
-                *solids.COLUMNS,
-                *PATH,
-                "length_unit",
-            ]
-        )
-    )
+    names = ["panel", "title", "element", "instant", "name", *solids.COLUMNS, *PATH, "length_unit"]
+    return rounded(pd.DataFrame(rows).reindex(columns=names))
 
 
 def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
@@ -188,14 +176,8 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     # the tool's way and its goal
     way = tip.sort_values("instant")
     axes.plot(*(way[name] for name in names), color=TOOL, linewidth=1.0, zorder=7)
-    axes.plot(
-        *(goal[name] for name in names),
-        "*",
-        color="white",
-        markeredgecolor=style.NEUTRAL,
-        ms=8,
-        zorder=8,
-    )
+    star: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "ms": 8}
+    axes.plot(*(goal[name] for name in names), "*", zorder=8, **star)
 
 
 def scope_table(condition: ConditionResults) -> pd.DataFrame:

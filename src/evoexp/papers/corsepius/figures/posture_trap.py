@@ -10,6 +10,7 @@ from matplotlib.patches import Rectangle
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
@@ -34,12 +35,6 @@ BOXES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 SAMPLES = 20_000  # postures in each box
 STUCK, HELPED = "stuck", "helped"
 END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
-STAR: dict[str, Any] = {
-    "color": "white",
-    "markeredgecolor": style.NEUTRAL,
-    "markersize": 10,
-    "zorder": 6,
-}
 Rows = list[dict[str, object]]
 
 
@@ -91,14 +86,8 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     shapes = obstacle_shapes(problem.obstacles_in(problem.last_stage))
     standing = [solids.solid(*shape) for shape in shapes]
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
-    table = rounded(
-        pd.DataFrame(rows).reindex(
-            columns=[
-                *("element", "series", "replicate", "order", "value", *solids.COLUMNS),
-                *("x_end", "y_end", "scope_deg"),
-            ]
-        )
-    )
+    names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS]
+    table = rounded(pd.DataFrame(rows).reindex(columns=[*names, "x_end", "y_end", "scope_deg"]))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
 
 
@@ -174,7 +163,7 @@ def draw_trap(table: pd.DataFrame) -> Figure:
                 axes.plot(rows[x], rows[y], color=colour, linewidth=0.7, alpha=0.45)
             if series == STUCK:
                 above.plot(*rows[["x", "y"]].iloc[-1], "x", **END)
-    above.plot(goal["x"], goal["y"], "*", **STAR)
+    marks.hollow(above, goal["x"], goal["y"], "*", style.NEUTRAL, 10, zorder=6)
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
     along.set(
@@ -197,7 +186,7 @@ def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
     shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
     figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
     x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
-    axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
+    marks.contact(axes, x, y, 8)
     frame: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
     axes.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **frame))
     axes.grid(visible=False)
@@ -208,13 +197,8 @@ def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
 
 def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
     """Draw the least cost in boxes around the posture that is stuck."""
-    axes.axhline(
-        escapes["y"].iloc[0],
-        label="stuck",
-        color=style.FORBIDDEN,
-        linewidth=1.0,
-        linestyle=(0, (4, 2)),
-    )
+    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    axes.axhline(escapes["y"].iloc[0], label="stuck", **look)
     axes.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     axes.set_xscale("log", base=2)
     axes.xaxis.set_major_formatter("{x:g}")

@@ -7,6 +7,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
@@ -81,9 +82,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         colour = style.condition_colour(int(position))
         own = dict(groups(rows, "series"))
         low, high, best, straight = (own[name] for name in (LOWEST, HIGHEST, BEST, STRAIGHT))
-        axes.fill_between(
-            low["instant"], low["distance"], high["distance"], color=colour, alpha=0.18, linewidth=0
-        )
+        marks.band(axes, low["instant"], low["distance"], high["distance"], colour)
         axes.plot(straight["instant"], straight["distance"], ":", color=style.FAINT)
         axes.plot(best["instant"], best["distance"], color=colour)
         at = best[best["instant"] == best["instant"].round()]

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from evoexp.papers import marks
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
 from evoexp.report.kit import Results, groups, quantile, style
@@ -120,11 +121,9 @@ def keys() -> list[Line2D]:
     """Return the entries of a legend for points and medians."""
     grey = style.NEUTRAL
     return [
-        style.key("a run", marker="o", color=grey, ms=3, linestyle="none"),
-        style.key("refuted (×)", marker="x", color=style.FORBIDDEN, ms=5, linestyle="none"),
-        style.key(
-            "median, refuted as worst", marker="D", mec=grey, mfc="white", ms=5, linestyle="none"
-        ),
+        marks.point_key("a run", "o", 3, color=grey),
+        marks.point_key("refuted (×)", "x", 5, color=style.FORBIDDEN),
+        marks.point_key("median, refuted as worst", "D", 5, mec=grey, mfc="white"),
     ]
 
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
 from evoexp.papers.rana.motions import STRAIGHT
@@ -28,10 +29,8 @@ from evoexp.scenarios.obstacles import obstacle_table
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
 BEST, AT_VIA_POINTS = "best replicate", "best replicate, at via-points"
-CLOSEST, REFUTED = (
-    "closest over the whole motion, every replicate that is free (exact)",
-    "refuted: first contact of bodies",
-)
+CLOSEST = "closest over the whole motion, every replicate that is free (exact)"
+REFUTED = "refuted: first contact of bodies"
 LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are drawn as they are
     STRAIGHT: {"linestyle": ":", "color": style.FAINT, "lw": 1.2},
     BEST: {"color": style.ARM_COLOURS[0], "lw": 1.3, "label": f"{BEST}, between via-points too"},
@@ -48,6 +47,8 @@ LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are draw
         **{"clip_on": False, "zorder": 5},
     },
 }
+# the first instant of a panel
+FIRST: dict[str, Any] = {"linestyle": (0, (2, 1)), "linewidth": 1.4, "alpha": 0.8, "zorder": 2}
 MANY = 200  # marks of a series, from which on they are drawn small, below the curves
 CROWDED: dict[str, dict[str, Any]] = {
     CLOSEST: {"ms": 1.5, "mew": 0.0, "alpha": 0.35, "zorder": 2},
@@ -268,21 +269,13 @@ def draw_distances(table: pd.DataFrame) -> Figure:
 def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> None:
     series = dict(groups(rows, "series"))
     low, high, colour = series[LOWEST], series[HIGHEST], style.ARM_COLOURS[0]
-    axes.fill_between(
-        low["instant"],
-        low["distance"],
-        high["distance"],
-        color=colour,
-        alpha=0.18,
-        linewidth=0,
-        label="range over replicates",
-    )
+    ends = low["distance"], high["distance"]
+    marks.band(axes, low["instant"], *ends, colour, label="range over replicates")
     for name, look in LOOKS.items():
         if name in series and len(series[name]):
-            shown = (
-                {"label": name} | look | (CROWDED.get(name, {}) if len(series[name]) > MANY else {})
-            )
-            axes.plot(series[name]["instant"], series[name]["distance"], **shown)
+            crowded = CROWDED.get(name, {}) if len(series[name]) > MANY else {}
+            x, y = (series[name][column] for column in ("instant", "distance"))
+            axes.plot(x, y, **{"label": name} | look | crowded)
     label = f"below the required distance: {required}"
     axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
     axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))
@@ -301,15 +294,11 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             if instant == last:
                 style.draw_arm(axes, arm, links)
             elif instant == first:
-                axes.plot(
-                    x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2
-                )
+                axes.plot(x, y, color=colour, **FIRST)
             else:
                 between.append(np.column_stack([x, y]))
                 shades.append(0.25 if whole else 0.7 - 0.5 * (last - instant) / (last - first))
         axes.add_collection(
             LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
         )
-        axes.plot(
-            own["x"].iloc[0], own["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2
-        )
+        marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)

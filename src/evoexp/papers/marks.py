@@ -50,6 +50,7 @@ def space(
     place: tuple[Any, ...],
     low: FloatArray,
     high: FloatArray,
+    pad: FloatArray,
     unit: str,
     *,
     view: tuple[float, float],
@@ -62,8 +63,9 @@ def space(
     Args:
         figure: The figure that they are put into.
         place: As `add_subplot` takes it.
-        low: (3,) their least coordinates.
-        high: (3,) their greatest ones.
+        low: (3,) the least coordinates that they hold.
+        high: (3,) the greatest ones.
+        pad: (3,) room beyond them.
         unit: Of lengths.
         view: Elevation and azimuth [deg].
         zoom: Of the box in its panel [-].
@@ -71,10 +73,12 @@ def space(
         ticks: At most, along a narrow side and along a wide one.
     """
     axes: Any = figure.add_subplot(*place, projection="3d")
-    sides = high - low
-    for name, least, greatest, pad in zip("xyz", low, high, label_pads, strict=True):
+    sides = high - low + 2.0 * pad
+    for name, least, greatest, label_pad in zip(
+        "xyz", low - pad, high + pad, label_pads, strict=True
+    ):
         getattr(axes, f"set_{name}lim")(least, greatest)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=pad, fontsize=7)
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=label_pad, fontsize=7)
     axes.set_box_aspect(sides, zoom=zoom)
     axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
     axes.tick_params(labelsize=6, pad=-2)

@@ -38,35 +38,28 @@ REACHED = 1e-9  # of a cost: a bound so close to it is reached
 
 
 class GridFrontier(Reference):
-    """The best path known, and the bound below all paths.
-
-    Attributes:
-        planner: The path search whose grid and cost it shares.
-        num_weights: Values of μ, from `least_weight` to `greatest_weight` by equal ratios, after
-            the very smallest.
-        least_weight: Of μ [cell].
-        greatest_weight: Of μ [cell].
-        max_nodes: Of the walks; longer walks are not searched, and cannot be better if ε is not
-            very small.
-        exchanged_nodes: No exchange of at most so many nodes improves the best path known.
-        forced_nodes: Exchanges of at most so many nodes are made though they cost more, to improve
-            the path from there.
-        bound_gap: The bound is raised until it is within this part of the best cost known, by every
-            number of nodes [-].
-        bound_steps: Most steps that raise it, by every number of nodes; 0: the bound by walks.
-    """
+    """The best path known, and the bound below all paths."""
 
     component: ClassVar[str] = "grid_frontier"
     revision: ClassVar[int] = 2
 
-    planner: GridPathGa
+    planner: GridPathGa  # the path search whose grid and cost it shares
+    # values of μ, from `least_weight` to `greatest_weight` by equal ratios, after the very
+    # smallest
     num_weights: LayoutCount
-    least_weight: Positive
-    greatest_weight: Positive
+    least_weight: Positive  # of μ [cell]
+    greatest_weight: Positive  # of μ [cell]
+    # of the walks; longer walks are not searched, and cannot be better if ε is not very small
     max_nodes: LayoutCount
+    # no exchange of at most so many nodes improves the best path known
     exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
+    # exchanges of at most so many nodes are made though they cost more, to improve the path
+    # from there
     forced_nodes: Annotated[int, Field(ge=0, le=4)]
+    # the bound is raised until it is within this part of the best cost known, by every number
+    # of nodes [-]
     bound_gap: Annotated[float, Field(ge=0.0, lt=1.0)]
+    # most steps that raise it, by every number of nodes; 0: the bound by walks
     bound_steps: NonNegativeCount
 
     def truth(self, problem: Any) -> Truth:

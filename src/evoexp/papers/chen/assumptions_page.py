@@ -2,41 +2,33 @@
 
 from evoexp.papers.chen import path_claims, path_measures
 from evoexp.papers.chen.rules import PAPER, RULES
-from evoexp.report.kit import (
-    ConditionResults,
-    Headline,
-    Page,
-    ReportSettings,
-    Results,
-    assumptions,
-    by_column,
-    generic,
-)
+from evoexp.report import kit
+from evoexp.report.kit import assumptions, generic
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of assumed numbers, or the generic page if another planner was run."""
     if not path_measures.fits(results):
         return generic.page(results, settings)
 
-    def truth(condition: ConditionResults) -> ConditionResults:
+    def truth(condition: kit.ConditionResults) -> kit.ConditionResults:
         """Return the reference of the same map, potentials and weights, of any algorithm."""
         return next(c for c in results.references if _problem(c) == _problem(condition))
 
-    def shortest(condition: ConditionResults) -> float:
+    def shortest(condition: kit.ConditionResults) -> float:
         return float(truth(condition).array("frontier")[:, 1].min())
 
-    def known(condition: ConditionResults, column: str = "best_cost") -> float:
+    def known(condition: kit.ConditionResults, column: str = "best_cost") -> float:
         return float(truth(condition).column(column)[0])
 
     headlines = (
-        Headline(
+        kit.Headline(
             "much_longer",
             "length above shortest [%]",
             lambda c: path_claims.excess_of(c, shortest(c)),
             lambda judge, c, _: path_claims.much_longer(judge, c, c.label, shortest(c), truth(c)),
         ),
-        Headline(
+        kit.Headline(
             "nearly_best",
             "cost above best known [%]",
             lambda c: path_measures.gaps(c, known(c)),
@@ -44,16 +36,16 @@ def page(results: Results, settings: ReportSettings) -> Page:
                 judge, c, c.label, known(c), known(c, "term_lower_bound")
             ),
         ),
-        Headline(
+        kit.Headline(
             "path_evolution",
             "cost C",
-            by_column("best_cost"),
+            kit.by_column("best_cost"),
             lambda judge, c, controls: path_claims.evolution(judge, settings, c, c.label, controls),
         ),
     )
     return assumptions.page(results, settings, RULES, PAPER.name, headlines)
 
 
-def _problem(condition: ConditionResults) -> tuple[object, ...]:
+def _problem(condition: kit.ConditionResults) -> tuple[object, ...]:
     planner, own = condition.planner, condition.condition
     return own.robot, own.scenario, planner.objective, planner.collision, planner.revisits

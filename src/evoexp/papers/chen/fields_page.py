@@ -9,19 +9,8 @@ import pandas as pd
 from evoexp.papers.chen.figures import field_grids
 from evoexp.papers.chen.rules import PAPER, RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Drawing,
-    Judge,
-    Page,
-    ReportSettings,
-    Results,
-    generic,
-    groups,
-    judging,
-    records,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging
 
 PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")
@@ -33,7 +22,7 @@ SLIPS = {
 }
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the potential fields, or the generic page if there are none."""
     shown = [c for c in results.references if isinstance(c.planner, GridPathGa)]
     if not shown:
@@ -44,17 +33,19 @@ def page(results: Results, settings: ReportSettings) -> Page:
     return PAPER.page(
         results,
         "fields",
-        claims=tuple(_claim(judge, *own) for table in compared for own in groups(table, "field")),
-        checks=tuple(_slips(*own) for table in compared for own in groups(table, "field")),
+        claims=tuple(
+            _claim(judge, *own) for table in compared for own in kit.groups(table, "field")
+        ),
+        checks=tuple(_slips(*own) for table in compared for own in kit.groups(table, "field")),
         drawings=(*numbers, *map(_map, shown)),
     )
 
 
-def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
+def _fields(condition: kit.ConditionResults) -> tuple[np.ndarray, np.ndarray]:
     return condition.array("goal_field"), condition.array("unsafeness")
 
 
-def _compared(condition: ConditionResults) -> pd.DataFrame:
+def _compared(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return all nodes of both fields beside the printed ones; see `field_grids.compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
@@ -63,7 +54,7 @@ def _compared(condition: ConditionResults) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
+def _claim(judge: kit.Judge, name: str, table: pd.DataFrame) -> kit.Claim:
     """Judge that a field is printed as the wave front computes it."""
     total = int((table["slip"] != field_grids.SURPLUS).sum())
     same, wrong, missing, surplus = (
@@ -80,7 +71,7 @@ def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
 
 def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:
     """Return the row of checks on a field: its slips in words."""
-    slips = records(table[table["slip"] != ""])
+    slips = kit.records(table[table["slip"] != ""])
     told = "; ".join(
         (SLIPS[row.slip].format(row) + _alike(row, table)).replace("*", "\\*") for row in slips
     )
@@ -101,7 +92,7 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
     return f" (or any equal one of columns {first} to {last})" if first < last else ""
 
 
-def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:
+def _numbers(condition: kit.ConditionResults, table: pd.DataFrame) -> kit.Drawing:
     return PAPER.drawing(
         "fig_1_fields", partial(_compared_table, table), field_grids.draw_fields, (condition,)
     )
@@ -112,7 +103,7 @@ def _compared_table(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _map(condition: ConditionResults) -> Drawing:
+def _map(condition: kit.ConditionResults) -> kit.Drawing:
     return PAPER.drawing(
         "fields_map",
         partial(_map_table, condition),
@@ -123,7 +114,7 @@ def _map(condition: ConditionResults) -> Drawing:
     )
 
 
-def _map_table(condition: ConditionResults) -> pd.DataFrame:
+def _map_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
     x, y = (axis.ravel() for axis in np.indices(goal.shape))

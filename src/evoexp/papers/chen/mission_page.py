@@ -7,27 +7,16 @@ import numpy as np
 from evoexp.papers.chen.figures import missions
 from evoexp.papers.chen.rules import PAPER
 from evoexp.planners.two_stage.planner import TwoStage
-from evoexp.report.kit import (
-    ConditionResults,
-    Page,
-    PlayedRun,
-    Proportion,
-    ReportSettings,
-    Results,
-    by_column,
-    generic,
-    markdown,
-    planned_by,
-    run_measures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown, run_measures
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the missions, or the generic page if another planner was run."""
     found = results.with_data
-    if not planned_by(results, TwoStage):
+    if not kit.planned_by(results, TwoStage):
         return generic.page(results, settings)
-    row, column = partial(generic.quantity, results), by_column
+    row, column = partial(generic.quantity, results), kit.by_column
     clearance = "clearance of the bodies over the whole motion (exact)"
     drawing = PAPER.drawing(
         "mission",
@@ -35,7 +24,8 @@ def page(results: Results, settings: ReportSettings) -> Page:
         missions.draw_missions,
         found,
         tuple(
-            PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c))) for c in found
+            kit.PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c)))
+            for c in found
         ),
     )
     return PAPER.page(
@@ -60,10 +50,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _checks(condition: ConditionResults, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
+def _checks(
+    condition: kit.ConditionResults, settings: kit.ReportSettings
+) -> tuple[tuple[str, str], ...]:
     """Return the rows on a condition's exact verdicts and on its docking places."""
     label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
-    free = Proportion(found.certified, found.judged)
+    free = kit.Proportion(found.certified, found.judged)
     nearest = condition.summaries["clearance_pair"].value_counts()
     places = np.round(condition.column("term_platform_x"), 3)
     near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]

@@ -12,26 +12,11 @@ from evoexp.papers.chen.figures import grid_paths
 from evoexp.papers.chen.figures.grid_paths import FAINT, Line
 from evoexp.papers.chen.path_measures import Group, Routes
 from evoexp.papers.chen.rules import PAPER
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    Quantity,
-    ReportSettings,
-    Results,
-    Values,
-    by_column,
-    compared,
-    counted,
-    generic,
-    markdown,
-    run_measures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown, run_measures
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the grid paths, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -48,13 +33,13 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, ...]:
+def quantities(results: kit.Results, groups: tuple[Group, ...]) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), by_column
+    row, column = partial(generic.quantity, results), kit.by_column
     group_of = {c.label: group for group in groups for c in group.all}
     above = "cost above the best path known (below 0: better than it)"
 
-    def gap(truth: str) -> Values:
+    def gap(truth: str) -> kit.Values:
         return lambda c: measures.gaps(c, getattr(group_of[c.label], truth))
 
     return (
@@ -73,7 +58,7 @@ def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, .
 
 
 def checks(
-    groups: tuple[Group, ...], settings: ReportSettings, found: Routes
+    groups: tuple[Group, ...], settings: kit.ReportSettings, found: Routes
 ) -> tuple[tuple[str, str], ...]:
     """Return the rows on gaps, on weightings that are nearly the same, and on routes."""
     gaps = [
@@ -97,11 +82,11 @@ def checks(
     return (*gaps, *_same_problem(groups), *routes, *PAPER.checks("path"))
 
 
-def _gap_text(condition: ConditionResults, group: Group, settings: ReportSettings) -> str:
+def _gap_text(condition: kit.ConditionResults, group: Group, settings: kit.ReportSettings) -> str:
     """Describe the gaps of a condition's runs above the best path known."""
     gaps, shares = measures.gaps(condition, group.optimum), []
     for bound in (0, 1, 5):  # [%]
-        found = counted(gaps <= bound + 1e-9)
+        found = kit.counted(gaps <= bound + 1e-9)
         interval = markdown.percent(found.interval(settings.confidence))
         name = f"within {bound} %" if bound else "equal or better"
         shares.append(f"{name} {markdown.share(*found)} ({interval})")
@@ -143,19 +128,21 @@ def _same_problem(groups: tuple[Group, ...]) -> Iterator[tuple[str, str]]:
 
 
 def comparisons(
-    groups: tuple[Group, ...], settings: ReportSettings
-) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    groups: tuple[Group, ...], settings: kit.ReportSettings
+) -> tuple[tuple[str, tuple[kit.Comparison, ...]], ...]:
     """Compare the costs of the first condition of each weighting with those of its others."""
-    values = by_column("best_cost")
+    values = kit.by_column("best_cost")
     return tuple(
         (f"cost: {group.main.label} against …", rows)
         for group in groups
-        for rows in (compared([(group.main, c) for c in group.conditions[1:]], values, settings),)
+        for rows in (
+            kit.compared([(group.main, c) for c in group.conditions[1:]], values, settings),
+        )
         if rows
     )
 
 
-def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
+def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[kit.Drawing, ...]:
     """Return the figures."""
     shown = tuple(c for group in groups for c in group.all)
     faint = {
@@ -175,7 +162,7 @@ def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
             partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             shown,
-            tuple(PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
+            tuple(kit.PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
         ),
         PAPER.drawing(
             "routes",
@@ -201,7 +188,7 @@ def _route_lines(group: Group, found: Routes) -> list[Line]:
     ]
 
 
-def lingering_page(results: Results, settings: ReportSettings) -> Page:
+def lingering_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of lingering paths, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -257,7 +244,7 @@ def _repeated(path: np.ndarray) -> int:
     return len(path) - len(np.unique(path, axis=0))
 
 
-def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
+def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[kit.Drawing, ...]:
     panels = [(group.name, group.main, grid_paths.known_lines(group)) for group in groups]
     return (
         PAPER.drawing(
@@ -265,7 +252,7 @@ def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
             partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             tuple(c for group in groups for c in group.all),
-            tuple(PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
+            tuple(kit.PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
         ),
         PAPER.drawing(
             "lingering",

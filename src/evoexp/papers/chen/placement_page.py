@@ -10,22 +10,13 @@ from evoexp.papers.chen.cases import CLOSE, Case, cases
 from evoexp.papers.chen.figures import placements
 from evoexp.papers.chen.rules import PAPER
 from evoexp.planners.placement_ga.planner import PlacementGa
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    ReportSettings,
-    Results,
-    generic,
-    markdown,
-    planned_by,
-    spread,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the placements, or the generic page if another planner was run."""
-    if not planned_by(results, PlacementGa):
+    if not kit.planned_by(results, PlacementGa):
         return generic.page(results, settings)
     found = cases(results)
     exact = [case for case in found if case.optimum is not None]
@@ -43,9 +34,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def landscapes_page(results: Results, settings: ReportSettings) -> Page:
+def landscapes_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the landscapes (Fig. 9), or that of the placements if there are none."""
-    found = cases(results) if planned_by(results, PlacementGa) else []
+    found = cases(results) if kit.planned_by(results, PlacementGa) else []
     shown = [case for case in found if case.landscape is not None]
     if not shown:
         return page(results, settings)
@@ -89,12 +80,12 @@ def _paper(case: Case) -> str:
     return "; ".join(told)
 
 
-def _run(case: Case, condition: ConditionResults | None) -> str:
+def _run(case: Case, condition: kit.ConditionResults | None) -> str:
     """Return the spread of the best E of a condition's runs, and shares near the optimum."""
     if condition is None:
         return "–"
     costs = condition.column("best_cost")
-    return f"{markdown.spread(spread(costs))} {_shares(case, costs)}"
+    return f"{markdown.spread(kit.spread(costs))} {_shares(case, costs)}"
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:
@@ -150,7 +141,7 @@ def _checks(case: Case) -> list[tuple[str, str]]:
     return rows
 
 
-def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
+def _drawings(cases: list[Case]) -> tuple[kit.Drawing, ...]:
     """Return the figures: postures, and where optima are known, fitness and gaps."""
     exact = [case for case in cases if case.optimum is not None and case.evolved]
     shown = tuple(c for case in cases for c in case.conditions)

@@ -7,41 +7,18 @@ import numpy as np
 
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import claims, measures
-from evoexp.papers.corsepius.figures import (
-    posture_history,
-    posture_motions,
-    posture_trap,
-    solids,
-)
+from evoexp.papers.corsepius.figures import posture_history, posture_motions, posture_trap, solids
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
 from evoexp.papers.corsepius.rules import PAPER
 from evoexp.planners.posture_es.planner import PostureEs
+from evoexp.report import kit
 from evoexp.report.figures import shares
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    Quantity,
-    ReportSettings,
-    Results,
-    Table,
-    by_column,
-    compared_with_controls,
-    counted,
-    fisher_exact,
-    generic,
-    holm,
-    markdown,
-    planned_by,
-    run_measures,
-    spread,
-)
+from evoexp.report.kit import generic, markdown, run_measures
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the tasks, or the generic page if another planner was run."""
-    if not planned_by(results, PostureEs):
+    if not kit.planned_by(results, PostureEs):
         return generic.page(results, settings)
     compared = (("distance to the goal", True, measures.residuals),)
     return PAPER.page(
@@ -51,14 +28,14 @@ def page(results: Results, settings: ReportSettings) -> Page:
         tables=tables(results, settings),
         claims=claims.judge_tasks(results, settings),
         checks=checks(results),
-        comparisons=compared_with_controls(results, settings, compared),
+        comparisons=kit.compared_with_controls(results, settings, compared),
         drawings=drawings(results, settings),
     )
 
 
-def quantities(results: Results) -> tuple[Quantity, ...]:
+def quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), by_column
+    row, column = partial(generic.quantity, results), kit.by_column
     unit = results.with_data[0].condition.length_unit
     tilts = [
         row(
@@ -79,10 +56,10 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
     )
 
 
-def effort_quantities(results: Results) -> tuple[Quantity, ...]:
+def effort_quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows that need no log, only summaries."""
     row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
-    column = by_column
+    column = kit.by_column
     return (
         row("cycles, all phases", "–", measures.cycles),
         row("evaluations", "–", measures.evaluations),
@@ -95,7 +72,7 @@ def effort_quantities(results: Results) -> tuple[Quantity, ...]:
     )
 
 
-def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
+def tables(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Table, ...]:
     """Return the tables of tasks, and of the phases of those that have several."""
     level = settings.confidence
     phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
@@ -110,7 +87,7 @@ def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
     return tuple(table for table in found if table.rows)
 
 
-def _task_row(condition: ConditionResults, level: float) -> tuple[str, ...]:
+def _task_row(condition: kit.ConditionResults, level: float) -> tuple[str, ...]:
     """Return the row of a task: shares of its runs, the ends of searches, efforts."""
     counts = run_measures.success, measures.certified, measures.refuted
     reasons = measures.reasons(condition).items()
@@ -119,33 +96,33 @@ def _task_row(condition: ConditionResults, level: float) -> tuple[str, ...]:
         condition.label,
         *(count(condition).with_interval(level) for count in counts),
         ", ".join(f"{name} {p.having}" for name, p in reasons if p.having),
-        *(markdown.spread(spread(effort(condition))) for effort in efforts),
+        *(markdown.spread(kit.spread(effort(condition))) for effort in efforts),
     )
 
 
-def _beside_empty(results: Results, level: float) -> tuple[tuple[str, ...], ...]:
+def _beside_empty(results: kit.Results, level: float) -> tuple[tuple[str, ...], ...]:
     """Return a row per task that has an empty scene as its control: shares, test, cycles."""
     pairs = measures.with_empty_scenes(results.main)
-    tested = [fisher_exact(run_measures.success(c), run_measures.success(e)) for c, e in pairs]
+    tested = [kit.fisher_exact(run_measures.success(c), run_measures.success(e)) for c, e in pairs]
     return tuple(
         (
             c.label,
             *(run_measures.success(one).with_interval(level) for one in (c, e)),
             markdown.p_value(p),
-            *(markdown.spread(spread(measures.cycles(one))) for one in (c, e)),
+            *(markdown.spread(kit.spread(measures.cycles(one))) for one in (c, e)),
         )
-        for (c, e), p in zip(pairs, holm(tested), strict=True)
+        for (c, e), p in zip(pairs, kit.holm(tested), strict=True)
     )
 
 
-def _releasing(results: Results) -> tuple[ConditionResults, ...]:
+def _releasing(results: kit.Results) -> tuple[kit.ConditionResults, ...]:
     """Return the conditions in which an object is let go of in a run at least."""
     main = measures.among_obstacles(results.main)
     detaching = (c for c in main if measures.lets_go(c))
     return tuple(c for c in detaching if measures.releases(c))
 
 
-def _release_row(condition: ConditionResults) -> tuple[str, ...]:
+def _release_row(condition: kit.ConditionResults) -> tuple[str, ...]:
     """Return gap and tilt of the objects of a condition: medians and the worst."""
     found, unit = measures.releases(condition), condition.condition.length_unit
     gaps, tilts = (np.array([getattr(one, name) for one in found]) for name in ("gap", "tilt"))
@@ -160,27 +137,27 @@ def _release_row(condition: ConditionResults) -> tuple[str, ...]:
     )
 
 
-def _phased(results: Results) -> tuple[ConditionResults, ...]:
+def _phased(results: kit.Results) -> tuple[kit.ConditionResults, ...]:
     """Return the conditions that have several phases."""
     several = (c for c in results.main if len(measures.phase_names(c)) > 1)
     return measures.among_obstacles(tuple(several))
 
 
-def _phase_rows(condition: ConditionResults, level: float) -> Iterator[tuple[object, ...]]:
+def _phase_rows(condition: kit.ConditionResults, level: float) -> Iterator[tuple[object, ...]]:
     """Return a row per phase: runs that met its goal, and cycles."""
     table = measures.phase_cycles(condition)
     for k, name in enumerate(measures.phase_names(condition)):
         own = table[table["phase"] == k]
-        cycles = markdown.spread(spread(own["cycles"].to_numpy(dtype=np.float64)))
+        cycles = markdown.spread(kit.spread(own["cycles"].to_numpy(dtype=np.float64)))
         yield (
             condition.label,
             f"{k + 1}  {name}",
-            counted(own["reached"]).with_interval(level),
+            kit.counted(own["reached"]).with_interval(level),
             cycles,
         )
 
 
-def checks(results: Results) -> tuple[tuple[str, str], ...]:
+def checks(results: kit.Results) -> tuple[tuple[str, str], ...]:
     """Return the rows on collision models and times."""
     rows = []
     for c in measures.by_robot(results.main):
@@ -196,7 +173,7 @@ def checks(results: Results) -> tuple[tuple[str, str], ...]:
     return (*rows, *PAPER.checks("tasks"))
 
 
-def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
+def drawings(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Drawing, ...]:
     """Return the figures."""
     every, level = results.main, f"{100 * settings.confidence:g} %"
     main = measures.among_obstacles(every)
@@ -237,15 +214,15 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     )
 
 
-def _paths(name: str, shown: list[ShownPath], suffix: str = "") -> Drawing:
+def _paths(name: str, shown: list[ShownPath], suffix: str = "") -> kit.Drawing:
     table = partial(posture_motions.motions_table, shown)
     draw = partial(posture_motions.draw_motions, same_scene=shown[0].by_phase)
-    plays = tuple(PlayedRun(one.condition, one.replicate) for one in shown)
+    plays = tuple(kit.PlayedRun(one.condition, one.replicate) for one in shown)
     drawing = PAPER.drawing(name, table, draw, [one.condition for one in shown], plays)
     return drawing._replace(stem=drawing.stem + suffix)
 
 
-def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
+def _manoeuvres(results: kit.Results, settings: kit.ReportSettings) -> list[kit.Drawing]:
     """Return the figures of conditions that have several phases."""
     phased, level = _phased(results), settings.confidence
     several = [c for c in phased if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
@@ -262,7 +239,7 @@ def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
     return [*found, phases] if phased else found
 
 
-def _trap(main: tuple[ConditionResults, ...]) -> list[Drawing]:
+def _trap(main: tuple[kit.ConditionResults, ...]) -> list[kit.Drawing]:
     """Return the figure of the local minimum, where runs get stuck that a sub-goal helps."""
     pair = posture_trap.pair(main)
     if pair is None:
@@ -272,7 +249,7 @@ def _trap(main: tuple[ConditionResults, ...]) -> list[Drawing]:
     return [PAPER.drawing("trap", table, posture_trap.draw_trap, pair, samples=samples)]
 
 
-def _models(main: tuple[ConditionResults, ...]) -> Drawing:
+def _models(main: tuple[kit.ConditionResults, ...]) -> kit.Drawing:
     found = measures.by_robot(main)
     shown = [(c.label if len(found) > 1 else "the robot", c) for c in found]
     return PAPER.drawing(

@@ -12,28 +12,8 @@ from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, Size
 from evoexp.papers.corsepius.rules import PAPER, RULES
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    ReportSettings,
-    Results,
-    Table,
-    compared,
-    expected_effort,
-    expected_interval,
-    fisher_exact,
-    grouped,
-    holm,
-    judging,
-    markdown,
-    planned_by,
-    solved,
-    spread,
-    success,
-    sweep_figures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown, sweep_figures
 
 PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
 EFFECTS = (
@@ -43,12 +23,12 @@ EFFECTS = (
 SETTING = "num_offspring"
 SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # quantity, first condition of a task, its comparisons with the others
-FirstComparison = tuple[str, str, tuple[Comparison, ...]]
+FirstComparison = tuple[str, str, tuple[kit.Comparison, ...]]
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or that of the tasks if there is nothing to compare."""
-    if not planned_by(results, PostureEs) or len(results.main) < 2:
+    if not kit.planned_by(results, PostureEs) or len(results.main) < 2:
         return whole_page.page(results, settings)
     found = comparisons(results, settings)
     slope = "slope of log residual over log scope {:.2f}; 1: proportional"
@@ -66,17 +46,17 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def effort(condition: ConditionResults) -> FloatArray:
+def effort(condition: kit.ConditionResults) -> FloatArray:
     """Return the evaluations to the goal of each run, (done,); inf without it."""
-    return np.where(solved(condition), measures.evaluations(condition), np.inf)
+    return np.where(kit.solved(condition), measures.evaluations(condition), np.inf)
 
 
-def _steps(condition: ConditionResults) -> FloatArray:
+def _steps(condition: kit.ConditionResults) -> FloatArray:
     """Return the steps of each run's path to the goal, (done,); inf without it."""
-    return np.where(solved(condition), measures.num_steps(condition), np.inf)
+    return np.where(kit.solved(condition), measures.num_steps(condition), np.inf)
 
 
-def comparisons(results: Results, settings: ReportSettings) -> list[FirstComparison]:
+def comparisons(results: kit.Results, settings: kit.ReportSettings) -> list[FirstComparison]:
     """Compare the first condition of every task with each other one.
 
     P-values are adjusted over each task. If no run meets its goal, distances to it are compared.
@@ -85,49 +65,50 @@ def comparisons(results: Results, settings: ReportSettings) -> list[FirstCompari
     name = "evaluations to the goal" if reaching else "distance to the goal"
     values = effort if reaching else measures.residuals
     found = (
-        (name, first.label, compared([(first, other) for other in others], values, settings))
-        for first, *others in grouped(results.with_data, measures.scene)
+        (name, first.label, kit.compared([(first, other) for other in others], values, settings))
+        for first, *others in kit.grouped(results.with_data, measures.scene)
     )
     return [one for one in found if one[2]]
 
 
-def _table(results: Results, settings: ReportSettings) -> Table:
+def _table(results: kit.Results, settings: kit.ReportSettings) -> kit.Table:
     """Return success, verdicts and oversized steps of every condition."""
     rows, level = [], settings.confidence
-    for first, *others in grouped(results.with_data, measures.scene):
+    for first, *others in kit.grouped(results.with_data, measures.scene):
         met, touching = (
             [
                 "–",
                 *map(
-                    markdown.p_value, holm([fisher_exact(count(first), count(c)) for c in others])
+                    markdown.p_value,
+                    kit.holm([kit.fisher_exact(count(first), count(c)) for c in others]),
                 ),
             ]
-            for count in (success, measures.refuted)
+            for count in (kit.success, measures.refuted)
         )
         for c, p_met, p_touching in zip((first, *others), met, touching, strict=True):
-            goal_met, refuted = success(c).with_interval(level), measures.refuted(c)
-            beyond = markdown.spread(spread(c.column("term_oversized_steps")))
+            goal_met, refuted = kit.success(c).with_interval(level), measures.refuted(c)
+            beyond = markdown.spread(kit.spread(c.column("term_oversized_steps")))
             told = goal_met, p_met, refuted.with_interval(level), p_touching, beyond
             rows.append((c.label, *told))
     return PAPER.table("shares", rows)
 
 
-def _floors(results: Results) -> tuple[Table, ...]:
+def _floors(results: kit.Results) -> tuple[kit.Table, ...]:
     """Return the distances at which searches stagnate, if no goal can be met."""
     if not _scopes(results):
         return ()
     rows = tuple(
         (
             c.label,
-            markdown.spread(spread(1e3 * measures.residuals(c))),
-            markdown.spread(spread(measures.cycles(c))),
+            markdown.spread(kit.spread(1e3 * measures.residuals(c))),
+            markdown.spread(kit.spread(measures.cycles(c))),
         )
         for c in results.main
     )
     return (PAPER.table("floors", rows, unit=results.main[0].condition.length_unit),)
 
 
-def _scopes(results: Results) -> tuple[Task, ...]:
+def _scopes(results: kit.Results) -> tuple[Task, ...]:
     """Return the tasks whose scopes differ and that never end by reaching the goal."""
     if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
         return ()
@@ -136,8 +117,8 @@ def _scopes(results: Results) -> tuple[Task, ...]:
 
 
 def _drawings(
-    results: Results, settings: ReportSettings, found: list[FirstComparison]
-) -> tuple[Drawing, ...]:
+    results: kit.Results, settings: kit.ReportSettings, found: list[FirstComparison]
+) -> tuple[kit.Drawing, ...]:
     """Return the figures that the settings in which conditions differ allow."""
     scopes, parents = _scopes(results), measures.tasks(results, "num_parents")
     drawn = [
@@ -153,7 +134,7 @@ def _drawings(
         return (*drawn, _effort(parents, settings))
     shown = results.with_data
     if any(c.solved for c in shown):
-        counts = {"goal met": success, "of these: touch between postures": measures.refuted}
+        counts = {"goal met": kit.success, "of these: touch between postures": measures.refuted}
         rows = [
             (name, results.position(c.label), c.label, count(c))
             for name, count in counts.items()
@@ -174,10 +155,10 @@ def _drawings(
     return tuple(drawn)
 
 
-def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
+def _effort(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Drawing:
     """Return the figure of success and effort by the number of parents."""
     levels = settings.confidence, settings.num_resamples
-    counts, efforts = {"goal met": success}, {"evaluations [-]": measures.evaluations}
+    counts, efforts = {"goal met": kit.success}, {"evaluations [-]": measures.evaluations}
     return PAPER.drawing(
         "parents_effort",
         partial(population_effort.effort_table, found, counts, efforts, *levels),
@@ -188,9 +169,9 @@ def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
     )
 
 
-def population_page(results: Results, settings: ReportSettings) -> Page:
+def population_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of sizes, or that of the tasks if no size differs."""
-    found = measures.tasks(results, SETTING) if planned_by(results, PostureEs) else ()
+    found = measures.tasks(results, SETTING) if kit.planned_by(results, PostureEs) else ()
     if not found:
         return whole_page.page(results, settings)
     sizes = {metric: population_claims.compare_sizes(found, metric, settings) for metric in METRICS}
@@ -206,14 +187,14 @@ def population_page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _size_table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
+def _size_table(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Table:
     """Return success and expected running times with their intervals, a row per task and size."""
     level = settings.confidence
     rows = tuple(
         (
             task.name,
             f"{value:g}",
-            success(c).with_interval(level),
+            kit.success(c).with_interval(level),
             measures.refuted(c).with_interval(level),
             *(_expected(c, metric, settings) for metric in METRICS),
         )
@@ -225,28 +206,28 @@ def _size_table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
     return PAPER.table("sizes", rows, **words)
 
 
-def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
+def _expected(condition: kit.ConditionResults, metric: str, settings: kit.ReportSettings) -> str:
     """Return the expected running time with its interval."""
     if not condition.solved:
         return "∞"
-    runs = METRICS[metric](condition), solved(condition)
-    interval = expected_interval(*runs, settings.confidence, settings.num_resamples)
+    runs = METRICS[metric](condition), kit.solved(condition)
+    interval = kit.expected_interval(*runs, settings.confidence, settings.num_resamples)
     expected, low, high = (
         markdown.number(float(f"{SCALES[metric] * value:.3g}"))
-        for value in (expected_effort(*runs), *interval)
+        for value in (kit.expected_effort(*runs), *interval)
     )
     return f"{expected} [{low}, {high}]"
 
 
 def _size_drawings(
-    found: tuple[Task, ...], sizes: dict[str, list[SizeComparison]], settings: ReportSettings
-) -> tuple[Drawing, ...]:
+    found: tuple[Task, ...], sizes: dict[str, list[SizeComparison]], settings: kit.ReportSettings
+) -> tuple[kit.Drawing, ...]:
     """Return the figures of effort, and of ratios where there are any."""
     level = f"{100 * settings.confidence:g} %"
     shown = tuple(c for task in found for c in task.conditions)
     units = (f"{metric} [{'s' if metric == 'CPU time' else '-'}]" for metric in METRICS)
     effort = dict(zip(units, METRICS.values(), strict=True))
-    shares = {"goal met": success, "of these: in contact between postures": measures.refuted}
+    shares = {"goal met": kit.success, "of these: in contact between postures": measures.refuted}
     levels = settings.confidence, settings.num_resamples
     names = [task.name for task in found]
     drawn = (

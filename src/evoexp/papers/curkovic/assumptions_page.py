@@ -3,41 +3,28 @@
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Headline,
-    Judge,
-    Page,
-    ReportSettings,
-    Results,
-    Values,
-    assumptions,
-    by_column,
-    compared,
-    generic,
-    judging,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import assumptions, generic, judging, markdown
 
 EFFORT = "evaluations to a team whose cost is the threshold"
 CLEARANCE = "least clearance of the bodies (exact; 0: contact)"
 METHOD, PLAIN, ELITES = "V", "I", "15 elites"
-Controls = tuple[ConditionResults, ...]
+Controls = tuple[kit.ConditionResults, ...]
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of assumptions, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
 
-    def effort(condition: ConditionResults) -> FloatArray:
+    def effort(condition: kit.ConditionResults) -> FloatArray:
         """Return the evaluations to a team of the threshold's cost in its own scene, (done,)."""
         threshold = settings.threshold_ratio * measures.lower_bound(condition)
         return measures.evaluations_to(condition, threshold)
 
-    def against(c: ConditionResults, other: str, values: Values) -> tuple[Comparison, ...]:
+    def against(
+        c: kit.ConditionResults, other: str, values: kit.Values
+    ) -> tuple[kit.Comparison, ...]:
         """Compare method V with another treatment under the same numbers.
 
         Numbers of the hall are no numbers of a treatment without one: that is as assumed then.
@@ -45,23 +32,23 @@ def page(results: Results, settings: ReportSettings) -> Page:
         _, comma, changed = c.label.partition(", ")
         by_label = {c.label: c for c in results.with_data}
         twin = by_label.get(f"{other}{comma}{changed}", by_label.get(other))
-        return compared([] if twin is None else [(c, twin)], values, settings)
+        return kit.compared([] if twin is None else [(c, twin)], values, settings)
 
-    def faster(judge: Judge, c: ConditionResults, _: Controls) -> Claim:
+    def faster(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
         hearing = judge.on("faster", who="", measure=EFFORT, pair=f": {METHOD} against {PLAIN}")
         return hearing.better(next(iter(against(c, PLAIN, effort)), None), "lower")
 
-    def beyond_elites(judge: Judge, c: ConditionResults, _: Controls) -> Claim:
+    def beyond_elites(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
         rows = against(c, ELITES, cost)
         told = "; ".join(judging.evidence(row, "lower") for row in rows) or "nothing to compare"
         hearing = judge.on("hall_beyond_elites", who="", elites=ELITES, measure="best cost")
         return hearing.better_than_all(told, rows)
 
-    cost = by_column("best_cost")
+    cost = kit.by_column("best_cost")
     headlines = (
-        Headline("faster", EFFORT, effort, faster),
-        Headline("hall_beyond_elites", "best cost", cost, beyond_elites),
-        Headline("free_motion", CLEARANCE, by_column("clearance"), _free),
+        kit.Headline("faster", EFFORT, effort, faster),
+        kit.Headline("hall_beyond_elites", "best cost", cost, beyond_elites),
+        kit.Headline("free_motion", CLEARANCE, kit.by_column("clearance"), _free),
     )
     treated = [c for c in results.conditions if c.label.partition(", ")[0] == METHOD]
     method = results._replace(conditions=tuple(treated))
@@ -69,7 +56,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     return found._replace(quantities=generic.quantities(results))
 
 
-def _free(judge: Judge, condition: ConditionResults, controls: Controls) -> Claim:
+def _free(judge: kit.Judge, condition: kit.ConditionResults, controls: Controls) -> kit.Claim:
     certified = int(
         (condition.summaries["certified"].eq(True) & condition.summaries["solved"]).sum()
     )

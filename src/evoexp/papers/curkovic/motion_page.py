@@ -15,26 +15,14 @@ from evoexp.papers.curkovic.figures import (
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    ReportSettings,
-    Results,
-    compared,
-    generic,
-    judging,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown
 
 SAMPLES = 20  # per segment, where the distance of end-effectors from other robots is measured
 KEPT = "least distance of an end-effector from another robot's links"
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of motions, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -64,7 +52,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def tool_distance(condition: ConditionResults) -> FloatArray:
+def tool_distance(condition: kit.ConditionResults) -> FloatArray:
     """Return how near any end-effector comes to a link of another robot, (done,) [length unit].
 
     Links and end-effectors have no thickness here.
@@ -95,22 +83,22 @@ def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
     return float(np.sqrt(((points - start - share[:, None] * along) ** 2).sum(axis=1)).min())
 
 
-def _by_radius(results: Results) -> dict[int, list[ConditionResults]]:
+def _by_radius(results: kit.Results) -> dict[int, list[kit.ConditionResults]]:
     """Return collision substeps → conditions by growing radius; nothing if no radius differs."""
-    found: dict[int, list[ConditionResults]] = {}
+    found: dict[int, list[kit.ConditionResults]] = {}
     for c in sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius)):
         found.setdefault(c.planner.collision.collision_substeps, []).append(c)
     several = len({c.planner.collision.tcp_radius for c in results.main}) > 1
     return found if several else {}
 
 
-def _tools(results: Results, settings: ReportSettings) -> tuple[Comparison, ...]:
+def _tools(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Comparison, ...]:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
     pairs = [(own[-1], own[0]) for own in _by_radius(results).values() if len(own) > 1]
-    return compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
+    return kit.compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
 
 
-def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:
+def _pair(largest: kit.ConditionResults, smallest: kit.ConditionResults) -> str:
     """Name the comparison of two radii."""
     substeps = largest.planner.collision.collision_substeps
     tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
@@ -118,9 +106,9 @@ def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:
 
 
 def _claims(
-    results: Results, settings: ReportSettings, tools: tuple[Comparison, ...]
-) -> tuple[Claim, ...]:
-    judge, found = judging.judge(results, settings, RULES), list[Claim]()
+    results: kit.Results, settings: kit.ReportSettings, tools: tuple[kit.Comparison, ...]
+) -> tuple[kit.Claim, ...]:
+    judge, found = judging.judge(results, settings, RULES), list[kit.Claim]()
     for c in results.main:
         scene, where = _scene_claim(c)
         certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
@@ -137,7 +125,7 @@ def _claims(
     return tuple(found)
 
 
-def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
+def _scene_claim(condition: kit.ConditionResults) -> tuple[str, str]:
     """Return the claim that the paper makes of a scene, and its source."""
     problem = condition.problem(Problem)
     if len(problem.start) > 2:
@@ -151,13 +139,13 @@ def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
     return "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
 
 
-def _enveloped(condition: ConditionResults) -> bool:
+def _enveloped(condition: kit.ConditionResults) -> bool:
     """Return whether the search tests more of the robots than their lines."""
     collision = condition.planner.collision
     return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
 
 
-def _checks(results: Results) -> tuple[tuple[str, str], ...]:
+def _checks(results: kit.Results) -> tuple[tuple[str, str], ...]:
     first = results.with_data[0]
     checks = [measures.rates_check(results, defect) for defect in measures.DEFECTS]
     if _enveloped(first):
@@ -172,7 +160,7 @@ def _checks(results: Results) -> tuple[tuple[str, str], ...]:
     return (*checks, *(("Length of the chromosome (Eqs. 2, 3)", note) for note in notes))
 
 
-def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
+def _drawings(results: kit.Results, settings: kit.ReportSettings) -> list[kit.Drawing]:
     first, drawn = results.main[0], []
     problem = first.problem(Problem)
     if len(problem.start) == 2 and not _enveloped(first) and problem.moving.all():
@@ -208,7 +196,9 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
     return drawn
 
 
-def _of_condition(results: Results, condition: ConditionResults, suffix: str) -> list[Drawing]:
+def _of_condition(
+    results: kit.Results, condition: kit.ConditionResults, suffix: str
+) -> list[kit.Drawing]:
     problem = condition.problem(Problem)
     if not problem.moving.all():
         number, title = "10", "Fig. 10: one robot stands still"
@@ -216,7 +206,7 @@ def _of_condition(results: Results, condition: ConditionResults, suffix: str) ->
         number, title = "", f"Motion of {len(problem.start)} robots"
     else:
         number, title = "8", "Fig. 8: motion of the two robots"
-    best = (PlayedRun(condition, condition.best_replicate),)
+    best = (kit.PlayedRun(condition, condition.best_replicate),)
     motion = {"stem": f"fig_{number}_motion" if number else "motion", "title": title}
     joints = {"stem": "fig_9_joints", "what": "Fig. 9: link"}
     if number != "8":

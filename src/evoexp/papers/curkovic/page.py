@@ -7,24 +7,13 @@ import numpy as np
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import methods
 from evoexp.papers.curkovic.rules import PAPER, RULES
-from evoexp.report.kit import (
-    Comparison,
-    Drawing,
-    Page,
-    ReportSettings,
-    Results,
-    by_column,
-    compared,
-    generic,
-    judging,
-    markdown,
-    verdicts,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown, verdicts
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of methods, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -33,12 +22,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     by_label = {c.label: c for c in results.with_data}
     pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
     matched = partial(
-        compared,
-        pairs,
-        settings=settings,
-        named=lambda a, b: f"{a.label} against {b.label}",
+        kit.compared, pairs, settings=settings, named=lambda a, b: f"{a.label} against {b.label}"
     )
-    costs = matched(by_column("best_cost"))
+    costs = matched(kit.by_column("best_cost"))
     generations = matched(partial(measures.generations_to, threshold=threshold))
     certified = matched(measures.certified_cost)
     one_scene = len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
@@ -67,11 +53,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 
 def _claims(
-    results: Results,
-    settings: ReportSettings,
-    generations: tuple[Comparison, ...],
-    costs: tuple[Comparison, ...],
-    certified: tuple[Comparison, ...],
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    generations: tuple[kit.Comparison, ...],
+    costs: tuple[kit.Comparison, ...],
+    certified: tuple[kit.Comparison, ...],
     threshold: float,
 ) -> tuple[verdicts.Claim, ...]:
     judge = judging.judge(results, settings, RULES)
@@ -95,7 +81,7 @@ def _claims(
     return (*found, judge.on("in_time").every(told, in_time, done, planned))
 
 
-def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
+def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
     at_first = "; ".join(
         f"{c.label}: {int((c.column('first_feasible_generation') == 0).sum())} of {c.done}"
         for c in results.with_data
@@ -112,7 +98,7 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _methods(results: Results, bound: float, threshold: float) -> Drawing:
+def _methods(results: kit.Results, bound: float, threshold: float) -> kit.Drawing:
     return PAPER.drawing(
         "fig_6_methods",
         partial(methods.methods_table, results, PAIRS, bound, threshold),

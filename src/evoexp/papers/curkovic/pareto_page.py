@@ -9,22 +9,13 @@ from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import pareto_fronts
 from evoexp.papers.curkovic.rules import PAPER
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    Quantity,
-    ReportSettings,
-    Results,
-    generic,
-    markdown,
-    spread,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of fronts, or the generic page if no log holds a front."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -48,7 +39,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
+def read_fronts(
+    results: kit.Results, condition: kit.ConditionResults, replicate: int
+) -> list[FrontRow]:
     """Return the criteria of a finished replicate's populations, one record per population.
 
     Raises:
@@ -59,7 +52,7 @@ def read_fronts(results: Results, condition: ConditionResults, replicate: int) -
     ).fronts
 
 
-def _fronts(results: Results, condition: ConditionResults) -> dict[int, list[FrontRow]]:
+def _fronts(results: kit.Results, condition: kit.ConditionResults) -> dict[int, list[FrontRow]]:
     """Return the fronts of every finished replicate."""
     return {int(k): read_fronts(results, condition, int(k)) for k in condition.summaries.index}
 
@@ -76,15 +69,15 @@ def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
     )
 
 
-def _quantity(results: Results, population: int, sizes: dict[str, FloatArray]) -> Quantity:
-    spreads = {c.label: spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
-    return Quantity(
+def _quantity(results: kit.Results, population: int, sizes: dict[str, FloatArray]) -> kit.Quantity:
+    spreads = {c.label: kit.spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
+    return kit.Quantity(
         f"individuals on the front of robot {population + 1}'s population", "–", spreads
     )
 
 
 def _checks(
-    condition: ConditionResults, fronts: dict[int, list[FrontRow]]
+    condition: kit.ConditionResults, fronts: dict[int, list[FrontRow]]
 ) -> list[tuple[str, str]]:
     ga = condition.planner.ga
     sizes = np.array([_size(front) for rows in fronts.values() for front in rows])
@@ -109,8 +102,8 @@ def _checks(
 
 
 def _drawing(
-    results: Results, condition: ConditionResults, fronts: dict[int, list[FrontRow]]
-) -> Drawing:
+    results: kit.Results, condition: kit.ConditionResults, fronts: dict[int, list[FrontRow]]
+) -> kit.Drawing:
     best, several = condition.best_replicate, len(results.with_data) > 1
     generation = fronts[best][0].generation
     suffix = f"_{results.position(condition.label) + 1}" if several else ""

@@ -11,17 +11,8 @@ from evoexp.papers.curkovic import claims, families, measures
 from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.papers.curkovic.figures import cost_boxes, facets
 from evoexp.papers.curkovic.rules import PAPER
-from evoexp.report.kit import (
-    Drawing,
-    Page,
-    Quantity,
-    ReportSettings,
-    Results,
-    generic,
-    markdown,
-    shares,
-    sweep_figures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown, shares, sweep_figures
 
 NAMES = {"quantity": "defect", "having": "failing", "total": "solved"}  # of shares, of defects
 SHORT = {
@@ -32,7 +23,7 @@ SHORT = {
 EFFECTS = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or the generic page if there is nothing to compare."""
     if not measures.fits(results) or len(results.with_data) < 2:
         return generic.page(results, settings)
@@ -55,14 +46,14 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
+def _quantities(results: kit.Results, threshold: float) -> tuple[kit.Quantity, ...]:
     speed = "greatest speed of a link over what Eq. 2 allows"
     return measures.team_quantities(
         results, threshold, generic.quantity(results, speed, "–", measures.times_over_limit)
     )
 
 
-def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
+def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
     slowest = "; ".join(
         f"{c.label}: {markdown.number(float(c.column('cpu_s').max()))} s" for c in results.with_data
     )
@@ -74,8 +65,11 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
 
 
 def _drawings(
-    results: Results, settings: ReportSettings, found: Sequence[FamilyComparison], threshold: float
-) -> tuple[Drawing, ...]:
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    found: Sequence[FamilyComparison],
+    threshold: float,
+) -> tuple[kit.Drawing, ...]:
     names = dict.fromkeys(one.measure.name for one in found if one.measure.converges)
     by_name = {
         name: [row for one in found if one.measure.name == name for row in one.rows]
@@ -109,7 +103,7 @@ def _drawings(
     )
 
 
-def rates_table(results: Results, confidence: float) -> pd.DataFrame:
+def rates_table(results: kit.Results, confidence: float) -> pd.DataFrame:
     """Return the shares of solved motions that have a defect; without curves only one varies.
 
     Returns:

@@ -10,23 +10,8 @@ from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import PAPER, RULES
 from evoexp.planners.reaching_tasks import Problem
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    Proportion,
-    Quantity,
-    ReportSettings,
-    Results,
-    body_contacts,
-    by_column,
-    generic,
-    judging,
-    markdown,
-    run_measures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import body_contacts, generic, judging, markdown, run_measures
 
 ACCEPTED = "Accepted motions that touch an obstacle between tested positions (exact verdict)"
 REMOVED = (
@@ -37,7 +22,7 @@ REMOVED = (
 )
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the arms, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -52,11 +37,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def quantities(results: Results) -> tuple[Quantity, ...]:
+def quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
     row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
     cost, _, evaluations, queries = generic.quantities(results)
-    column = by_column
+    column = kit.by_column
     tests = "tests of a link against an ellipse per second of search"
     return (
         row("position error of SP2 (runs without a solution: ∞)", unit, measures.errors),
@@ -76,8 +61,8 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
 
 
 def _claims(
-    results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
-) -> tuple[Claim, ...]:
+    results: kit.Results, settings: kit.ReportSettings, refuted: dict[str, RefutedMotions]
+) -> tuple[kit.Claim, ...]:
     judge, level = judging.judge(results, settings, RULES), settings.confidence
     shown = results.with_data
     return (
@@ -97,11 +82,11 @@ def _claims(
 
 
 def _checks(
-    results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
+    results: kit.Results, settings: kit.ReportSettings, refuted: dict[str, RefutedMotions]
 ) -> tuple[tuple[str, str], ...]:
     """Return the rows on contacts, solutions, attempts and the literal reading of the shift."""
 
-    def row(what: str, counts: dict[str, Proportion]) -> tuple[str, str]:
+    def row(what: str, counts: dict[str, kit.Proportion]) -> tuple[str, str]:
         texts = (f"{name}: {measures.text(p, settings.confidence)}" for name, p in counts.items())
         return what, "; ".join(texts)
 
@@ -123,7 +108,7 @@ def _checks(
     )
 
 
-def _literal_shift(condition: ConditionResults) -> list[tuple[str, str]]:
+def _literal_shift(condition: kit.ConditionResults) -> list[tuple[str, str]]:
     """Return a row on the printed shift if the words vertically and horizontally are not swapped.
 
     There is none if nothing is shifted. The arm's collision model tells whether the start is free
@@ -147,7 +132,7 @@ def _literal_shift(condition: ConditionResults) -> list[tuple[str, str]]:
     return [(what, f"({dy:g}, {dx:g}) instead of ({dx:g}, {dy:g}): {told}")]
 
 
-def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
+def _drawings(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Drawing, ...]:
     shown, level = results.with_data, f"{100 * settings.confidence:g} %"
     starts = [ShownMotion(c.label, c) for c in shown]
     distribution = partial(
@@ -173,7 +158,7 @@ def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]
     )
 
 
-def _solutions(results: Results) -> Iterator[Drawing]:
+def _solutions(results: kit.Results) -> Iterator[kit.Drawing]:
     """Return the figures of each arm's median solution and of its median refuted solution."""
     for name, only_refuted in (("fig_2_solution", False), ("refuted", True)):
         shown = []
@@ -186,13 +171,13 @@ def _solutions(results: Results) -> Iterator[Drawing]:
             yield _postures(name, shown)
 
 
-def _postures(name: str, shown: list[ShownMotion]) -> Drawing:
+def _postures(name: str, shown: list[ShownMotion]) -> kit.Drawing:
     table, draw = partial(reaching_motions.reaching_table, shown), reaching_motions.draw_reaching
-    plays = tuple(PlayedRun(c, k) for _, c, k, _ in shown if k is not None)
+    plays = tuple(kit.PlayedRun(c, k) for _, c, k, _ in shown if k is not None)
     return PAPER.drawing(name, table, draw, [one.condition for one in shown], plays)
 
 
-def _solution(condition: ConditionResults, replicate: int) -> ShownMotion:
+def _solution(condition: kit.ConditionResults, replicate: int) -> ShownMotion:
     """Return a run as it is drawn: its error, its contacts."""
     verdict = body_contacts.refuted(condition).get(replicate)
     found = measures.contacts(condition, replicate, verdict) if verdict else []

@@ -9,21 +9,8 @@ from evoexp.papers.lavoie import page as whole_page
 from evoexp.papers.lavoie.figures import stopping
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import PAPER
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    Proportion,
-    ReportSettings,
-    Results,
-    Values,
-    compared,
-    grouped,
-    newcombe,
-    success,
-    sweep_figures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import sweep_figures
 
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
 
@@ -33,7 +20,7 @@ class Measure(NamedTuple):
 
     name: str
     unit: str
-    values: Values
+    values: kit.Values
 
 
 class ArmComparison(NamedTuple):
@@ -43,11 +30,11 @@ class ArmComparison(NamedTuple):
     """
 
     measure: Measure
-    first: ConditionResults
-    rows: tuple[Comparison, ...]
+    first: kit.ConditionResults
+    rows: tuple[kit.Comparison, ...]
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or that of the experiment if there is nothing to compare."""
     if not measures.fits(results) or len(results.with_data) < 2:
         return whole_page.page(results, settings)
@@ -68,12 +55,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def arms(results: Results) -> tuple[tuple[ConditionResults, ...], ...]:
+def arms(results: kit.Results) -> tuple[tuple[kit.ConditionResults, ...], ...]:
     """Return the conditions arm by arm, told by their numbers of joints."""
-    return grouped(results.with_data, measures.num_joints)
+    return kit.grouped(results.with_data, measures.num_joints)
 
 
-def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmComparison, ...]:
+def compared_arms(results: kit.Results, settings: kit.ReportSettings) -> tuple[ArmComparison, ...]:
     """Compare the first condition of every arm with its others, quantity by quantity."""
     quantities = (
         Measure("position error", results.with_data[0].condition.length_unit, measures.errors),
@@ -83,7 +70,7 @@ def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmCompar
         ArmComparison(
             measure,
             first,
-            compared([(first, other) for other in others], measure.values, settings),
+            kit.compared([(first, other) for other in others], measure.values, settings),
         )
         for measure in quantities
         for first, *others in arms(results)
@@ -91,14 +78,14 @@ def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmCompar
 
 
 def _checks(
-    results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
+    results: kit.Results, settings: kit.ReportSettings, refuted: dict[str, RefutedMotions]
 ) -> tuple[tuple[str, str], ...]:
     """Return a row of shares per condition, and rows on the worth of agreement with Fig. 3."""
     rows = []
     for c in results.with_data:
         found = refuted[c.label]
         told = {
-            "with a solution": success(c),
+            "with a solution": kit.success(c),
             f"error below {BOUND:g}": measures.below(c, BOUND),
             "accepted and in contact": found.anywhere,
             "on SP1": found.sp1,
@@ -117,7 +104,7 @@ def _checks(
     return *rows, *weak
 
 
-def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple[str, str]]:
+def _weak_evidence(results: kit.Results, settings: kit.ReportSettings) -> Iterator[tuple[str, str]]:
     """Count the settings of each arm that agree with a printed percentage.
 
     The more settings agree, the less agreement says about any of them.
@@ -125,7 +112,9 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple
     for own in arms(results):
         for printed in (one for one in measures.printed(own[0]) if one.bound == BOUND):
             intervals = {
-                c.label: newcombe(measures.below(c, BOUND), printed.proportion, settings.confidence)
+                c.label: kit.newcombe(
+                    measures.below(c, BOUND), printed.proportion, settings.confidence
+                )
                 for c in own
             }
             same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
@@ -142,18 +131,18 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple
             yield (what, text)
 
 
-def _paths_differ(results: Results) -> bool:
+def _paths_differ(results: kit.Results) -> bool:
     """Return whether conditions differ in the places at which they test paths for collision."""
     collisions = (c.planner.collision for c in results.with_data)
     return len({(model.num_positions, model.swept) for model in collisions}) > 1
 
 
 def _drawings(
-    results: Results,
-    settings: ReportSettings,
+    results: kit.Results,
+    settings: kit.ReportSettings,
     found: tuple[ArmComparison, ...],
     refuted: dict[str, RefutedMotions],
-) -> tuple[Drawing, ...]:
+) -> tuple[kit.Drawing, ...]:
     """Return the figures: stopping values where they differ, shares, values, effect sizes."""
     stopping_values = PAPER.drawing(
         "stopping",
@@ -172,7 +161,7 @@ def _drawings(
     references = {f"error below {p.bound:g}": p.proportion.share for p in printed}
     shares = _share_rows(results, refuted)
     values = {f"{one.measure.name} [{one.measure.unit}]": one.measure.values for one in found}
-    rows: dict[str, tuple[Comparison, ...]] = {}
+    rows: dict[str, tuple[kit.Comparison, ...]] = {}
     for one in found:
         rows[one.measure.name] = (*rows.get(one.measure.name, ()), *one.rows)
     a12 = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
@@ -187,8 +176,8 @@ def _drawings(
 
 
 def _share_rows(
-    results: Results, refuted: dict[str, RefutedMotions]
-) -> list[tuple[str, int, str, Proportion]]:
+    results: kit.Results, refuted: dict[str, RefutedMotions]
+) -> list[tuple[str, int, str, kit.Proportion]]:
     """Return the counts that are drawn: by sub-path if conditions differ in how paths are tested.
 
     Returns:
@@ -201,7 +190,7 @@ def _share_rows(
         if not _paths_differ(results):
             told = {
                 f"error below {BOUND:g}": measures.below(c, BOUND),
-                "with a solution": success(c),
+                "with a solution": kit.success(c),
                 "touch an obstacle": found.anywhere,
             }
         rows += [(name, position, c.label, proportion) for name, proportion in told.items()]

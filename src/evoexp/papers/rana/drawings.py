@@ -10,15 +10,8 @@ import pandas as pd
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures import planar_models, planar_motion, spatial_models, spatial_paths
 from evoexp.papers.rana.rules import PAPER
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    PlayedRun,
-    ReportSettings,
-    Results,
-    convergence,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import convergence, markdown
 
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
 PLANAR = (  # figures of arms in the plane: name, table of a condition, drawing of the table
@@ -46,7 +39,7 @@ PLAYED = ("fig_4_snapshots", "fig_11_snapshots")  # figures of the best replicat
 class MeasuredMotions(NamedTuple):
     """A condition, the end of its files' names, and the distances along its motions."""
 
-    condition: ConditionResults
+    condition: kit.ConditionResults
     suffix: str
     sampled: pd.DataFrame
 
@@ -61,19 +54,21 @@ class MeasuredMotions(NamedTuple):
         return motions.problem(self.condition).security_margin
 
 
-def measure(condition: ConditionResults, suffix: str, settings: ReportSettings) -> MeasuredMotions:
+def measure(
+    condition: kit.ConditionResults, suffix: str, settings: kit.ReportSettings
+) -> MeasuredMotions:
     """Return a condition with the distances along its motions."""
     return MeasuredMotions(
         condition, suffix, planar_motion.sampled_distances(condition, settings.samples_per_segment)
     )
 
 
-def drawings(one: MeasuredMotions) -> list[Drawing]:
+def drawings(one: MeasuredMotions) -> list[kit.Drawing]:
     """Return the paper's figures of one condition, without those of its fitness."""
     c = one.condition
     median = c.spread("term_path_length_ratio").median
     ratio = f"Median length over that of the straight line: {markdown.number(median)}."
-    played = (PlayedRun(c, c.best_replicate),)
+    played = (kit.PlayedRun(c, c.best_replicate),)
     figures = [
         PAPER.drawing(
             name,
@@ -89,12 +84,12 @@ def drawings(one: MeasuredMotions) -> list[Drawing]:
     return [*figures, _distances(one)]
 
 
-def order(drawing: Drawing) -> tuple[int, str]:
+def order(drawing: kit.Drawing) -> tuple[int, str]:
     """Return the key that sorts drawings by the number of the paper's figure."""
     return int(re.findall(r"\d+", drawing.stem)[0]), drawing.stem
 
 
-def fitness(results: Results, drawn: Sequence[MeasuredMotions]) -> Iterator[Drawing]:
+def fitness(results: kit.Results, drawn: Sequence[MeasuredMotions]) -> Iterator[kit.Drawing]:
     """Yield Figs. 5 and 12a: one figure per scene, of all conditions and controls in it."""
     scenes = list(dict.fromkeys(_scene(one.condition) for one in drawn))
     for scene in scenes:
@@ -116,11 +111,11 @@ def fitness(results: Results, drawn: Sequence[MeasuredMotions]) -> Iterator[Draw
         yield drawing._replace(stem=stem + suffix, title=title)
 
 
-def _scene(condition: ConditionResults) -> tuple[Any, Any]:
+def _scene(condition: kit.ConditionResults) -> tuple[Any, Any]:
     return condition.condition.robot, condition.condition.scenario
 
 
-def _distances(one: MeasuredMotions) -> Drawing:
+def _distances(one: MeasuredMotions) -> kit.Drawing:
     """Return the figure of distances between the arms, with the least of all replicates."""
     c = one.condition
     at, between, clearance = (

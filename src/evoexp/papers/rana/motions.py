@@ -108,10 +108,7 @@ def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, f
     """Return the kinds of pairs of bodies: name → (pairs of the scene, required distance)."""
     found = problem(condition)
     among = obstacle_pairs(found.assembly, found.scene)
-    kinds = {
-        ARMS: (~among, found.security_margin),
-        OBSTACLES: (among, found.obstacle_margin),
-    }
+    kinds = {ARMS: (~among, found.security_margin), OBSTACLES: (among, found.obstacle_margin)}
     return {name: kind for name, kind in kinds.items() if kind[0].any()}
 
 

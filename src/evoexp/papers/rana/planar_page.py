@@ -7,30 +7,18 @@ from evoexp.papers.rana import measures, motions
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Drawing,
-    Judge,
-    Page,
-    PlayedRun,
-    ReportSettings,
-    Results,
-    generic,
-    judging,
-    markdown,
-    run_measures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown, run_measures
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of planar arms, or the generic page if no robot is drawable."""
     shown = [(c, suffix) for c, suffix in results.suffixed if drawable(c)]
     if not shown:
         return generic.page(results, settings)
     base = generic.basis(results, settings)
     judge = judging.judge(results, settings, RULES)
-    drawings, claims = list(base.drawings), list[Claim]()
+    drawings, claims = list(base.drawings), list[kit.Claim]()
     for condition, suffix in shown:
         drawings += _drawings(condition, suffix, settings.samples_per_segment)
         claims += _claims(judge, condition)
@@ -48,7 +36,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _claims(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
+def _claims(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Claim]:
     """Judge section 5's claims of extension: static obstacles, more than two arms."""
     problem, unit = condition.problem(Problem), condition.condition.length_unit
     arms, kinds = problem.assembly.num_arms, motions.kinds_of_pairs(condition)
@@ -68,18 +56,14 @@ def _claims(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
         for rule, evidence, holds in (
             ("extends_at_via_points", "finished runs", condition.solved),
             ("extends_whole_motion", "motions certified", verdicts.certified),
-            (
-                "extends_with_margin",
-                f"motions keep them; {', '.join(told)}",
-                verdicts.with_margin,
-            ),
+            ("extends_with_margin", f"motions keep them; {', '.join(told)}", verdicts.with_margin),
         ):
             text = f"{markdown.share(holds, condition.done)} {evidence}"
             hearing = judge.on(rule, extension=name)
             yield hearing.every(text, holds, condition.done, condition.planned)
 
 
-def drawable(condition: ConditionResults) -> bool:
+def drawable(condition: kit.ConditionResults) -> bool:
     """Return whether a condition's arms move in a plane and have two joints each."""
     problem = condition.prepared.problem
     if not isinstance(problem, Problem) or not problem.assembly.table.planar:
@@ -87,9 +71,9 @@ def drawable(condition: ConditionResults) -> bool:
     return all(stop - first == 2 for first, stop in problem.arm_slices)
 
 
-def _drawings(condition: ConditionResults, suffix: str, samples: int) -> Iterator[Drawing]:
+def _drawings(condition: kit.ConditionResults, suffix: str, samples: int) -> Iterator[kit.Drawing]:
     """Yield snapshots and paths of one condition, and distances if it has several arms."""
-    c, played = condition, (PlayedRun(condition, condition.best_replicate),)
+    c, played = condition, (kit.PlayedRun(condition, condition.best_replicate),)
     snapshots, draw = partial(planar_motion.snapshots_table, c), planar_motion.draw_snapshots
     yield PAPER.drawing("snapshots", snapshots, draw, (c,), played, suffix)
     paths = partial(planar_motion.paths_table, c)

@@ -41,9 +41,7 @@ def known_lines(group: Group) -> list[Line]:
     return [Line(MEDIAN, median_path(group.main)), *best]
 
 
-def paths_table(
-    panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]],
-) -> pd.DataFrame:
+def paths_table(panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]]) -> pd.DataFrame:
     """Return obstacles and paths of all workspaces.
 
     Args:

@@ -105,7 +105,7 @@ def space(
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
     look: dict[str, Any] = {"zoom": 0.92, "label_pads": (-7, -7, -7), "ticks": (2, 4)}
-    axes = marks.space(figure, (place,), low - pad, high + pad, unit, view=view, **look)
+    axes = marks.space(figure, (place,), low, high, pad, unit, view=view, **look)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
     return axes

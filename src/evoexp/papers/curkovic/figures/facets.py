@@ -107,11 +107,7 @@ def _panels(table: pd.DataFrame) -> tuple[Figure, list[Axes]]:
 
 
 def _lines(
-    axes: Axes,
-    rows: pd.DataFrame,
-    column: str,
-    steps: Any,
-    label: Callable[[pd.DataFrame], str],
+    axes: Axes, rows: pd.DataFrame, column: str, steps: Any, label: Callable[[pd.DataFrame], str]
 ) -> None:
     several = rows.groupby("generation")["evaluations"].nunique().max() > 1
     across = "evaluations" if several else "generation"

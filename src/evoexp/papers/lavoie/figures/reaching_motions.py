@@ -13,15 +13,8 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import marks
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    ConditionResults,
-    body_contacts,
-    groups,
-    motion_geometry,
-    records,
-    rounded,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import body_contacts, motion_geometry, style
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
 LINK, TOUCHING, CONTACT = "link", "touching", "contact"
@@ -49,7 +42,7 @@ class ShownMotion(NamedTuple):
     """The scene of one panel, and the motion in it."""
 
     title: str  # title of the panel
-    condition: ConditionResults  # the condition whose scene is drawn
+    condition: kit.ConditionResults  # the condition whose scene is drawn
     # the replicate whose solution is drawn; None: the start posture only
     replicate: int | None = None
     # (instant, bodies) of the first contact on each sub-path that has one
@@ -69,12 +62,12 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
         rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]
         end = one.condition.condition.length_unit
         parts += [(panel, one.title, *row, end) for row in rows]
-    return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
+    return kit.rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
     """Draw every scene with its postures, and below each motion a close view of its box."""
-    panels = [rows for _, rows in groups(table, "panel")]
+    panels = [rows for _, rows in kit.groups(table, "panel")]
     ratios = [x / y for x, y in map(_span, panels)]
     moving = bool((table["sub_path"] > 0).any())
     height = min(4.6, 6.1 / sum(ratios))
@@ -96,7 +89,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
+def _scene(condition: kit.ConditionResults) -> list[tuple[Any, ...]]:
     """Return the rows of ellipses, box and targets."""
     scenario: Any = condition.condition.scenario
     table = scenario.obstacle_table()
@@ -157,15 +150,15 @@ def _span(rows: pd.DataFrame) -> tuple[float, float]:
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw ellipses, box and targets."""
-    for row in records(rows[rows["element"] == ELLIPSE]):
+    for row in kit.records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
         look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
         axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
-    for row in records(rows[rows["element"] == BOX]):
+    for row in kit.records(rows[rows["element"] == BOX]):
         size = row.x_end - row.x, row.y_end - row.y
         edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
         axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
-    for row in records(rows[rows["element"] == TARGET]):
+    for row in kit.records(rows[rows["element"] == TARGET]):
         wide = 8 if row.name == "via point" else 11
         point: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
         axes.plot(row.x, row.y, MARKERS[row.name], ms=wide, **point)
@@ -183,7 +176,7 @@ def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
 
 def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
     """Draw the start in black, each sub-path in a colour of its own, its end strong."""
-    for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
+    for (element, sub_path, instant), rows in kit.groups(links, ["element", "sub_path", "instant"]):
         x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
         colour, share = _colour(sub_path), instant - (sub_path - 1)
         if element == TOUCHING:

@@ -166,7 +166,7 @@ def _space(
     pad = 0.05 + 0.5 * np.maximum(0.0, 0.5 - (high - low))
     pads = label_pad, label_pad, label_pad - 4.0  # else z's meets the panel beside it
     look: dict[str, Any] = {"view": VIEW, "zoom": zoom, "label_pads": pads, "ticks": (2, 3)}
-    return marks.space(figure, place, low - pad, high + pad, unit, **look)
+    return marks.space(figure, place, low, high, pad, unit, **look)
 
 
 def _arm(

@@ -1,10 +1,8 @@
 """The numbers that Corsépius 2001 does not print, and which headline claims survive others."""
 
-import numpy as np
-
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.rules import PAPER, RULES
-from evoexp.records import FloatArray
 from evoexp.report import kit
 from evoexp.report.kit import assumptions
 
@@ -16,7 +14,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         kit.Headline(
             "goals_met",
             "cycles to the goal [-]",
-            cycles_to_goal,
+            run_values.where_solved(measures.cycles),
             lambda judge, c, _: claims.judge_met(judge, c, level),
         ),
         kit.Headline(
@@ -27,8 +25,3 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         ),
     )
     return assumptions.page(results, settings, RULES, PAPER.name, headlines)
-
-
-def cycles_to_goal(condition: kit.ConditionResults) -> FloatArray:
-    """Return the cycles of each run that meets its goal, (done,); inf without it."""
-    return np.where(kit.solved(condition), measures.cycles(condition), np.inf)

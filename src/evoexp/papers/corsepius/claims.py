@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import kit
@@ -16,7 +17,7 @@ def judge_tasks(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit
     judge, level = judging.judge(results, settings, RULES), settings.confidence
     found = measures.among_obstacles(results.main)
     many = RULES["redundant_arms"].limits["joints"]
-    arms = [c for c in found if measures.num_joints(c) > many]
+    arms = [c for c in found if run_values.num_joints(c) > many]
     single = (
         (
             judge_met(judge, c, level),
@@ -47,7 +48,7 @@ def judge_met(judge: kit.Judge, condition: kit.ConditionResults, level: float) -
 
 def judge_free(judge: kit.Judge, condition: kit.ConditionResults, level: float) -> kit.Claim:
     """Judge that binary ratings of distances keep the whole motion free."""
-    refuted, free = measures.refuted(condition), measures.certified(condition).having
+    refuted, free = measures.refuted(condition), run_values.certified(condition).having
     planned = refuted.total if condition.done == condition.planned else 0
     told = (
         f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
@@ -81,9 +82,9 @@ def _tilt(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Cla
 
 def judge_redundant(judge: kit.Judge, arms: list[kit.ConditionResults], level: float) -> kit.Claim:
     """Judge that the approach works for highly redundant arms: it finds a certified path."""
-    free = {c.label: measures.certified(c).having for c in arms}
+    free = {c.label: run_values.certified(c).having for c in arms}
     texts = [
-        f"{c.label}, {measures.num_joints(c)} joints: goal met "
+        f"{c.label}, {run_values.num_joints(c)} joints: goal met "
         f"{kit.success(c).with_interval(level)}, {free[c.label]} of them certified"
         for c in arms
     ]

@@ -7,6 +7,7 @@ import pandas as pd
 
 from evoexp.collision.certifier.coal_distances import CoalDistance
 from evoexp.objectives.posture_cost import UPRIGHT
+from evoexp.papers import run_values
 from evoexp.paths.motion import Motion
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
@@ -76,12 +77,6 @@ def refuted(condition: kit.ConditionResults) -> kit.Proportion:
     return kit.Proportion(condition.verdicts.solved_refuted, condition.solved)
 
 
-def certified(condition: kit.ConditionResults) -> kit.Proportion:
-    """Count the solved runs whose paths the exact verdict certifies."""
-    free = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
-    return kit.counted(free[kit.solved(condition)])
-
-
 def usual_seconds(condition: kit.ConditionResults) -> FloatArray:
     """Return the CPU time of each run's evaluations at the median run's price, (done,) [s].
 
@@ -102,14 +97,9 @@ def num_steps(condition: kit.ConditionResults) -> FloatArray:
     return condition.column("term_postures") - 1.0
 
 
-def num_joints(condition: kit.ConditionResults) -> int:
-    """Return the number of joints of the arm."""
-    return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
-
-
 def paths(condition: kit.ConditionResults) -> dict[int, FloatArray]:
     """Return replicate → the postures of its path, (postures, nq) [rad]."""
-    nq = num_joints(condition)
+    nq = run_values.num_joints(condition)
     return {k: flat.reshape(-1, nq) for k, flat in condition.solutions.items()}
 
 

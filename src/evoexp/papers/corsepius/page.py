@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.figures import posture_history, posture_motions, posture_trap, solids
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
@@ -89,7 +90,7 @@ def tables(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Tabl
 
 def _task_row(condition: kit.ConditionResults, level: float) -> tuple[str, ...]:
     """Return the row of a task: shares of its runs, the ends of searches, efforts."""
-    counts = run_measures.success, measures.certified, measures.refuted
+    counts = run_measures.success, run_values.certified, measures.refuted
     reasons = measures.reasons(condition).items()
     efforts = measures.cycles, measures.evaluations, measures.num_steps
     return (

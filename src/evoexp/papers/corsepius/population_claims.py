@@ -1,14 +1,14 @@
 """The claims of Corsépius 2001 on the size of the population, judged metric by metric."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.rules import RULES
-from evoexp.records import FloatArray
 from evoexp.report import kit
 from evoexp.report.kit import markdown, verdicts
 
@@ -79,25 +79,13 @@ def compare_sizes(
     level = 1.0 - (1.0 - settings.confidence) / max(1, len(pairs))
     rows = []
     for name, value, c, own in pairs:
-        one, two = _on_common_seeds(c, own, METRICS[metric])
+        one, two = run_values.on_common_seeds(c, own, METRICS[metric])
         above, below = kit.expected_effort(*one), kit.expected_effort(*two)
         ratio = above / below if np.isfinite(below) else 0.0
         proportional = RECOMMENDED / value if metric == "cycles" and value < RECOMMENDED else 1.0
         interval = kit.effort_ratio(one, two, level, settings.num_resamples)
         rows.append(SizeComparison(name, value, ratio, interval, proportional))
     return rows
-
-
-def _on_common_seeds(
-    one: kit.ConditionResults, two: kit.ConditionResults, values: kit.Values
-) -> list[tuple[FloatArray, Any]]:
-    """Return effort and success of the replicates that both have."""
-    common = one.summaries.index.intersection(two.summaries.index)
-    return [
-        (values(c)[rows], kit.solved(c)[rows])
-        for c in (one, two)
-        for rows in (c.summaries.index.get_indexer(common),)
-    ]
 
 
 def _ratios(rows: list[SizeComparison], says: int) -> str:

@@ -2,8 +2,7 @@
 
 from functools import partial
 
-import numpy as np
-
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import measures, population_claims
 from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius.figures import population_effort
@@ -11,7 +10,6 @@ from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
 from evoexp.papers.corsepius.rules import PAPER, RULES
 from evoexp.planners.posture_es.planner import PostureEs
-from evoexp.records import FloatArray
 from evoexp.report import kit
 from evoexp.report.kit import judging, markdown, sweep_figures
 
@@ -24,6 +22,9 @@ SETTING = "num_offspring"
 SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # quantity, first condition of a task, its comparisons with the others
 FirstComparison = tuple[str, str, tuple[kit.Comparison, ...]]
+# evaluations to the goal, and steps of the path to it, (done,); inf without it
+effort = run_values.where_solved(measures.evaluations)
+steps_to_goal = run_values.where_solved(measures.num_steps)
 
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -44,16 +45,6 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in found),
         drawings=_drawings(results, settings, found),
     )
-
-
-def effort(condition: kit.ConditionResults) -> FloatArray:
-    """Return the evaluations to the goal of each run, (done,); inf without it."""
-    return np.where(kit.solved(condition), measures.evaluations(condition), np.inf)
-
-
-def _steps(condition: kit.ConditionResults) -> FloatArray:
-    """Return the steps of each run's path to the goal, (done,); inf without it."""
-    return np.where(kit.solved(condition), measures.num_steps(condition), np.inf)
 
 
 def comparisons(results: kit.Results, settings: kit.ReportSettings) -> list[FirstComparison]:
@@ -143,7 +134,7 @@ def _drawings(
         caption = f"Wilson's {100 * settings.confidence:g} % intervals."
         drawn.append(sweep_figures.shares_drawing(results, settings, rows, caption))
     if not scopes:
-        values = {"evaluations to the goal": effort, "steps of the path to it": _steps}
+        values = {"evaluations to the goal": effort, "steps of the path to it": steps_to_goal}
         main = results._replace(conditions=results.main)
         boxes = sweep_figures.values_drawing(main, values)
         by_name = {name: rows for name, _, rows in found}

@@ -1,5 +1,6 @@
 """The page of what Curkovic et al. 2013 leave open: method V beside method I and beside elites."""
 
+from evoexp.papers import run_values
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.records import FloatArray
@@ -57,9 +58,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
 
 
 def _free(judge: kit.Judge, condition: kit.ConditionResults, controls: Controls) -> kit.Claim:
-    certified = int(
-        (condition.summaries["certified"].eq(True) & condition.summaries["solved"]).sum()
-    )
+    certified = run_values.certified(condition).having
     judged = condition.done - condition.verdicts.undecided
     hearing = judge.on(
         "free_motion",

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.papers.curkovic import link_motions, measures
 from evoexp.papers.curkovic.figures import (
     body_distances,
@@ -111,7 +112,7 @@ def _claims(
     judge, found = judging.judge(results, settings, RULES), list[kit.Claim]()
     for c in results.main:
         scene, where = _scene_claim(c)
-        certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
+        certified = run_values.certified(c).having
         for who, holds, judged in (
             ("the paper's model", c.solved, c.done),
             ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),

@@ -1,5 +1,6 @@
 """The assumed numbers of Lavoie & Boudreau 2001, and which headline claims survive others."""
 
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import claims, measures
 from evoexp.papers.lavoie.rules import PAPER, RULES
 from evoexp.report import kit
@@ -14,7 +15,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         return generic.page(results, settings)
     level, unit = settings.confidence, results.with_data[0].condition.length_unit
     # number of joints → the condition as assumed, which is the first one of the arm
-    shipped = {measures.num_joints(c): c for c in reversed(results.main)}
+    shipped = {run_values.num_joints(c): c for c in reversed(results.main)}
 
     def share_below(judge: kit.Judge, condition: kit.ConditionResults, _: Controls) -> kit.Claim:
         """Judge the percentage that is printed for errors below 1, the least bound.
@@ -22,7 +23,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         The percentages of the other arm, as assumed, belong to the same family of tests, so that
         the verdict as assumed is that of the experiment itself.
         """
-        others = [c for joints, c in shipped.items() if joints != measures.num_joints(condition)]
+        others = [c for joints, c in shipped.items() if joints != run_values.num_joints(condition)]
         return claims.percentages(judge, [condition, *others], level)[0]
 
     def no_start(judge: kit.Judge, condition: kit.ConditionResults, _: Controls) -> kit.Claim:

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import Percentage
 from evoexp.papers.lavoie.rules import RULES
@@ -74,7 +73,7 @@ def more_joints_are_better(
     judge: kit.Judge, conditions: Sequence[kit.ConditionResults], level: float
 ) -> Iterator[kit.Claim]:
     """Judge that the arm of ten joints does better than that of seven, where both were run."""
-    by_joints = {measures.num_joints(c): c for c in conditions}
+    by_joints = {run_values.num_joints(c): c for c in conditions}
     for bound in measures.BOUNDS if {7, 10} <= set(by_joints) else ():
         ten, seven = (measures.below(by_joints[joints], bound) for joints in (10, 7))
         p = markdown.p_value(kit.fisher_exact(ten, seven))
@@ -114,8 +113,7 @@ def free_of_collision(
     judge: kit.Judge, condition: kit.ConditionResults, refuted: kit.Proportion, level: float
 ) -> kit.Claim:
     """Judge that accepted motions touch nothing."""
-    certified = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
-    free = kit.counted(np.asarray(kit.solved(condition) & certified)).having
+    free = run_values.certified(condition).having
     planned = condition.planned if condition.solved == condition.done else 0
     evidence = (
         f"{markdown.share(free, refuted.total)} certified; refuted {measures.text(refuted, level)}"

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import measures
 from evoexp.records import FloatArray
 from evoexp.report import kit
@@ -70,7 +71,7 @@ def _less_effort(
     settings: kit.ReportSettings,
 ) -> kit.Claim:
     """Judge that the algorithm takes fewer evaluations per solution than a control."""
-    first, second = _on_common_seeds(own, control)
+    first, second = run_values.on_common_seeds(own, control, kit.by_column("evaluations"))
     expected = [kit.expected_effort(*each) for each in (first, second)]
     low, high = kit.effort_ratio(first, second, settings.confidence, settings.num_resamples)
     ratio = expected[0] / expected[1] if np.isfinite(expected[0]) else np.inf
@@ -96,17 +97,6 @@ def solved_within(own: kit.ConditionResults, control: kit.ConditionResults) -> k
     """
     most = np.median(measures.effort(own))
     return kit.counted(kit.solved(control) & (measures.effort(control) <= most))
-
-
-def _on_common_seeds(own: kit.ConditionResults, control: kit.ConditionResults) -> tuple[Runs, Runs]:
-    """Return the runs of both conditions on the seeds that both have."""
-    common = own.summaries.index.intersection(control.summaries.index)
-    rows = (c.summaries.index.get_indexer(common) for c in (own, control))
-    first, second = (
-        (evaluations[k], ended[k])
-        for k, (evaluations, ended) in zip(rows, map(runs, (own, control)), strict=True)
-    )
-    return first, second
 
 
 def _controls(results: kit.Results, own: kit.ConditionResults) -> list[kit.ConditionResults]:

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.redundant_ga.planner import RedundantGa
@@ -14,6 +15,11 @@ from evoexp.report.kit import body_contacts
 PRINTED_RUNS = 1000  # section 5: "a thousand experiments were conducted for each simulation"
 Contact = tuple[float, str]
 """Instant of a first contact, names of the bodies."""
+
+
+# position error at the end of SP2, (done,) [length unit], and evaluations; inf: no solution
+errors = run_values.where_solved(kit.by_column("term_position_error_sp2"))
+effort = run_values.where_solved(kit.by_column("evaluations"))
 
 
 class Percentage(NamedTuple):
@@ -44,24 +50,9 @@ def fits(results: kit.Results) -> bool:
     return bool(found) and all(isinstance(c.planner, RedundantGa) for c in found)
 
 
-def num_joints(condition: kit.ConditionResults) -> int:
-    """Return how many joints the arm has."""
-    return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
-
-
 def printed(condition: kit.ConditionResults) -> list[Percentage]:
     """Return the percentages that the paper prints for an arm of so many joints."""
-    return [one for one in PRINTED if one.joints == num_joints(condition)]
-
-
-def errors(condition: kit.ConditionResults) -> FloatArray:
-    """Return the position error at the end of SP2, (done,) [length unit]; inf: no solution."""
-    return np.where(kit.solved(condition), condition.column("term_position_error_sp2"), np.inf)
-
-
-def effort(condition: kit.ConditionResults) -> FloatArray:
-    """Return the evaluations that each run took to its solution, (done,); inf: no solution."""
-    return np.where(kit.solved(condition), condition.column("evaluations"), np.inf)
+    return [one for one in PRINTED if one.joints == run_values.num_joints(condition)]
 
 
 def below(condition: kit.ConditionResults, bound: float) -> kit.Proportion:
@@ -75,7 +66,7 @@ def tests_per_second(condition: kit.ConditionResults) -> FloatArray:
     They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
     Chords are not counted.
     """
-    pairs = num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    pairs = run_values.num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
     return np.asarray(pairs * condition.column("collision_queries") / kit.search_seconds(condition))
 
 

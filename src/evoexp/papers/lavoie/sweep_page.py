@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import measures, sweep_claims
 from evoexp.papers.lavoie import page as whole_page
 from evoexp.papers.lavoie.figures import stopping
@@ -57,7 +58,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
 
 def arms(results: kit.Results) -> tuple[tuple[kit.ConditionResults, ...], ...]:
     """Return the conditions arm by arm, told by their numbers of joints."""
-    return kit.grouped(results.with_data, measures.num_joints)
+    return kit.grouped(results.with_data, run_values.num_joints)
 
 
 def compared_arms(results: kit.Results, settings: kit.ReportSettings) -> tuple[ArmComparison, ...]:

@@ -14,12 +14,6 @@ from evoexp.records import FloatArray
 from evoexp.report.kit import Results, groups, quantile, style
 
 SPREAD = 0.2  # [rows] over which points are spread to either side
-BOX = "Boxes: median and quartiles of all runs, whiskers to the last value within 1.5 interquartile"
-CAPTION = (
-    f"{BOX} ranges; every run a point, a cross where the exact verdict refutes its motion; "
-    "diamond: the median if a refuted run counts as worse than any (none: half or more are "
-    "refuted)."
-)
 
 
 def costs_table(results: Results, threshold: float) -> pd.DataFrame:

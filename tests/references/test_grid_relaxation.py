@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evoexp.references.grid_frontier import GridFrontier
-from evoexp.references.grid_networks import Shifts, arrivals_of, hops_of, network_of, shifts_of
+from evoexp.references.grid_networks import arrivals_of, moves_of, network_of
 from evoexp.references.grid_relaxation import Walks, count_excess, find_walks, relaxed_bounds
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
@@ -30,20 +30,15 @@ def all_walks(problem: Any, number: int) -> list[list[int]]:
     return [walk for walk in walks if walk[-1] == goal]
 
 
-def padded(values: np.ndarray, shifts: Shifts) -> np.ndarray:
-    """Return values of nodes as long as the rows of the moves."""
-    return np.pad(values, (0, shifts.width - len(values)))
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_walks_are_the_best_of_all_that_never_go_straight_back(seed: int) -> None:
     epsilon, most, rng = 0.3, 8, np.random.default_rng(seed)
     problem = solvable((4, 3), 0.2, seed, planner())
     network = network_of(problem)
-    shifts = shifts_of(arrivals_of(network, epsilon), hops_of(network))
+    moves = moves_of(arrivals_of(network, epsilon))
     weights = rng.uniform(0.0, 2.0, len(network.unsafeness))
-    walks = Walks.of(most, shifts)
-    find_walks(shifts, padded(weights, shifts), most, walks)
+    walks = Walks.of(most, len(network.unsafeness))
+    find_walks(moves, weights, most, walks)
     lengths = dict(
         zip(zip(network.tails, network.heads, strict=True), network.lengths, strict=True)
     )
@@ -58,7 +53,7 @@ def test_walks_are_the_best_of_all_that_never_go_straight_back(seed: int) -> Non
         if number == most:
             # the excess of visits is that of the best walk
             excess = np.empty(len(weights))
-            count_excess(shifts, walks, most, np.ones(len(weights)), excess)
+            count_excess(moves, walks, most, np.ones(len(weights)), excess)
             visits = Counter(min(costs, key=lambda walk: costs[walk]))
             expected = [visits[node] - 1.0 for node in range(len(weights))]
             np.testing.assert_array_equal(excess, expected)
@@ -71,10 +66,10 @@ def test_any_multipliers_give_a_bound_for_every_number_of_nodes(seed: int) -> No
     problem = solvable((4, 4), 0.2, seed, own)
     network, rng = network_of(problem), np.random.default_rng(seed)
     multipliers = rng.exponential(0.1, len(network.unsafeness))
-    shifts = shifts_of(arrivals_of(network, weights[0]), hops_of(network))
-    walks = Walks.of(most, shifts)
+    moves = moves_of(arrivals_of(network, weights[0]))
+    walks = Walks.of(most, len(network.unsafeness))
     passing = weights[1] / most * network.unsafeness + multipliers
-    find_walks(shifts, padded(passing, shifts), most, walks)
+    find_walks(moves, passing, most, walks)
     bounds = walks.costs - multipliers.sum()
     for path in all_simple_paths(problem):
         if len(path) <= most:
@@ -107,7 +102,7 @@ def test_without_steps_the_floors_stay_and_a_step_raises_them() -> None:
     own = planner((0.05, 2.0))
     problem = solvable((6, 6), 0.1, 3, own)
     network, floors = network_of(problem), np.full(40, 0.5)
-    arguments = arrivals_of(network, 0.05), hops_of(network), 2.0, 10.0, 10.0, floors
+    arguments = arrivals_of(network, 0.05), 2.0, 10.0, 10.0, floors
     np.testing.assert_array_equal(relaxed_bounds(*arguments, 0), floors)
     raised = relaxed_bounds(*arguments, 1)
     assert (raised >= floors).all() and (raised[10:] > floors[10:]).all()
@@ -126,17 +121,17 @@ def test_the_truth_of_the_papers_workspace_is_known_within_one_per_cent(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_walks_in_memory_of_others_are_those_of_new_memory(seed: int) -> None:
-    """Blocks that are left out keep old costs and moves, which no walk to the goal may take."""
+    """Memory that was used before keeps old moves, which no walk may take."""
     most, rng = 30, np.random.default_rng(seed)
     network = network_of(solvable((9, 8), 0.25, seed, planner()))
-    shifts = shifts_of(arrivals_of(network, 0.3), hops_of(network))
-    used, excesses = Walks.of(most, shifts), np.empty((2, len(network.unsafeness)))
+    moves = moves_of(arrivals_of(network, 0.3))
+    used, excesses = Walks.of(most, len(network.unsafeness)), np.empty((2, len(network.unsafeness)))
     for number in (most, 17, 25, 12, 26):
-        weights = padded(rng.uniform(0.0, 2.0, len(network.unsafeness)), shifts)
-        fresh = Walks.of(most, shifts)
+        weights = rng.uniform(0.0, 2.0, len(network.unsafeness))
+        fresh = Walks.of(most, len(network.unsafeness))
         for walks, excess in zip((used, fresh), excesses, strict=True):
-            find_walks(shifts, weights, number, walks)
-            count_excess(shifts, walks, number, np.ones(len(excess)), excess)
+            find_walks(moves, weights, number, walks)
+            count_excess(moves, walks, number, np.ones(len(excess)), excess)
         np.testing.assert_array_equal(used.costs[: number + 1], fresh.costs[: number + 1])
         np.testing.assert_array_equal(*excesses)
         # a walk of so many nodes that costs as much, written plainly, level by level

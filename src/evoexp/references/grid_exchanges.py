@@ -26,21 +26,14 @@ DIGITS = 9  # decimals of a cost: beyond them costs are equal
 
 
 class Terrain(NamedTuple):
-    """Moves and nodes, with their shares of the cost.
+    """Moves and nodes, with their shares of the cost."""
 
-    Attributes:
-        neighbours: (nodes, moves), see `grids.Grid`.
-        coordinates: (nodes, dimensions).
-        lengths: (moves,) length of each move, times ε.
-        unsafeness: (nodes,) times λ.
-        moves: (2 nodes − 1,) the move from one node to another, if it is permitted, by the
-            difference of their indices plus nodes − 1; `NONE` where there is no such move.
-    """
-
-    neighbours: NodeArray
-    coordinates: NodeArray
-    lengths: FloatArray
-    unsafeness: FloatArray
+    neighbours: NodeArray  # (nodes, moves), see `grids.Grid`
+    coordinates: NodeArray  # (nodes, dimensions)
+    lengths: FloatArray  # (moves,) length of each move, times ε
+    unsafeness: FloatArray  # (nodes,) times λ
+    # (2 nodes − 1,) the move from one node to another, if it is permitted, by the difference
+    # of their indices plus nodes − 1; `NONE` where there is no such move
     moves: IntArray
 
     @classmethod
@@ -54,37 +47,23 @@ class Terrain(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """The nodes on the way from a kept node, as `list_pieces` tries them: scratch.
+    """The nodes on the way from a kept node, as `list_pieces` tries them: scratch."""
 
-    Attributes:
-        nodes: (longest + 1,) the kept node first.
-        tried: (longest + 1,) the move last tried from each.
-        lengths: (longest + 1,) ε times the length up to each.
-        unsafeness: (longest + 1,) λ times the sum up to each, the kept node left out.
-    """
-
-    nodes: IntArray
-    tried: IntArray
-    lengths: FloatArray
-    unsafeness: FloatArray
+    nodes: IntArray  # (longest + 1,) the kept node first
+    tried: IntArray  # (longest + 1,) the move last tried from each
+    lengths: FloatArray  # (longest + 1,) ε times the length up to each
+    unsafeness: FloatArray  # (longest + 1,) λ times the sum up to each, the kept node left out
 
 
 class Pieces(NamedTuple):
-    """A table of pieces, written by `list_pieces`.
+    """A table of pieces, written by `list_pieces`."""
 
-    Attributes:
-        nodes: (most pieces, longest) nodes of each piece in order.
-        counts: (most pieces,) number of nodes of each.
-        lengths: (most pieces,) ε times the length from the kept node before to the one behind.
-        unsafeness: (most pieces,) λ times the sum over the nodes.
-        trail: Scratch.
-    """
-
-    nodes: IntArray
-    counts: IntArray
+    nodes: IntArray  # (most pieces, longest) nodes of each piece in order
+    counts: IntArray  # (most pieces,) number of nodes of each
+    # (most pieces,) ε times the length from the kept node before to the one behind
     lengths: FloatArray
-    unsafeness: FloatArray
-    trail: Trail
+    unsafeness: FloatArray  # (most pieces,) λ times the sum over the nodes
+    trail: Trail  # scratch
 
     @classmethod
     def of(cls, terrain: Terrain, longest: int) -> "Pieces":
@@ -97,19 +76,12 @@ class Pieces(NamedTuple):
 
 
 class Exchange(NamedTuple):
-    """The exchange of one piece of a path.
+    """The exchange of one piece of a path."""
 
-    Attributes:
-        cost: Of the path with the other piece.
-        place: Of the kept node before the piece, counted from 0; `NONE`: there is no exchange.
-        removed: How many nodes go.
-        row: Of the other piece in the table.
-    """
-
-    cost: float
-    place: int
-    removed: int
-    row: int
+    cost: float  # of the path with the other piece
+    place: int  # of the kept node before the piece, counted from 0; `NONE`: there is no exchange
+    removed: int  # how many nodes go
+    row: int  # of the other piece in the table
 
 
 def improve(

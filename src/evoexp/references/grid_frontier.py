@@ -22,11 +22,9 @@ from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray, IntArray
 from evoexp.references.grid_exchanges import Terrain, improve
 from evoexp.references.grid_networks import (
-    TILE,
     Arrivals,
     Network,
     arrivals_of,
-    hops_of,
     network_of,
 )
 from evoexp.references.grid_relaxation import relaxed_bounds
@@ -35,41 +33,33 @@ from evoexp.validation import LayoutCount, NonNegativeCount, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
 LANES = 32  # numbers of nodes whose walks are looked for together
-VECTOR = 16  # numbers of them are filled up to a multiple
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS that decides among equally short paths only
 REACHED = 1e-9  # of a cost: a bound so close to it is reached
 
 
 class GridFrontier(Reference):
-    """The best path known, and the bound below all paths.
-
-    Attributes:
-        planner: The path search whose grid and cost it shares.
-        num_weights: Values of μ, from `least_weight` to `greatest_weight` by equal ratios, after
-            the very smallest.
-        least_weight: Of μ [cell].
-        greatest_weight: Of μ [cell].
-        max_nodes: Of the walks; longer walks are not searched, and cannot be better if ε is not
-            very small.
-        exchanged_nodes: No exchange of at most so many nodes improves the best path known.
-        forced_nodes: Exchanges of at most so many nodes are made though they cost more, to improve
-            the path from there.
-        bound_gap: The bound is raised until it is within this part of the best cost known, by every
-            number of nodes [-].
-        bound_steps: Most steps that raise it, by every number of nodes; 0: the bound by walks.
-    """
+    """The best path known, and the bound below all paths."""
 
     component: ClassVar[str] = "grid_frontier"
     revision: ClassVar[int] = 2
 
-    planner: GridPathGa
+    planner: GridPathGa  # the path search whose grid and cost it shares
+    # values of μ, from `least_weight` to `greatest_weight` by equal ratios, after the very
+    # smallest
     num_weights: LayoutCount
-    least_weight: Positive
-    greatest_weight: Positive
+    least_weight: Positive  # of μ [cell]
+    greatest_weight: Positive  # of μ [cell]
+    # of the walks; longer walks are not searched, and cannot be better if ε is not very small
     max_nodes: LayoutCount
+    # no exchange of at most so many nodes improves the best path known
     exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
+    # exchanges of at most so many nodes are made though they cost more, to improve the path
+    # from there
     forced_nodes: Annotated[int, Field(ge=0, le=4)]
+    # the bound is raised until it is within this part of the best cost known, by every number
+    # of nodes [-]
     bound_gap: Annotated[float, Field(ge=0.0, lt=1.0)]
+    # most steps that raise it, by every number of nodes; 0: the bound by walks
     bound_steps: NonNegativeCount
 
     def truth(self, problem: Any) -> Truth:
@@ -162,7 +152,6 @@ class GridFrontier(Reference):
         if not self.planner.revisits:
             floors = relaxed_bounds(
                 arrivals_of(network, epsilon),
-                hops_of(network),
                 lam,
                 known,
                 (1.0 - self.bound_gap) * known,
@@ -270,13 +259,11 @@ def _least_unsafeness(network: Network) -> float:
 
 def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:
     """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, (count + 1, weights)."""
-    # a rest would not be vector code
-    filled = np.pad(weights, (0, -len(weights) % VECTOR), mode="edge")
-    costs = np.full((count + 1, len(filled)), np.inf)
-    present = np.full((len(arrivals.tails), len(filled)), np.inf)
-    present[arrivals.ends[0]] = filled * arrivals.unsafeness[arrivals.ends[0]]
-    _walk_costs(arrivals, filled, costs, present, np.full_like(present, np.inf))
-    return costs[:, : len(weights)]
+    costs = np.full((count + 1, len(weights)), np.inf)
+    present = np.full((len(arrivals.tails), len(weights)), np.inf)
+    present[arrivals.ends[0]] = weights * arrivals.unsafeness[arrivals.ends[0]]
+    _walk_costs(arrivals, weights, costs, present, np.full_like(present, np.inf))
+    return costs
 
 
 @kernel
@@ -302,19 +289,15 @@ def _walk_costs(
         for node in range(num):
             if lengths[node, 0] == np.inf:
                 continue  # no move ends here: infinite at all times
-            own = unsafeness[node]
-            for tile in range(0, tails.shape[1], TILE):
-                # four moves that end here, for all weights
-                a, b = tails[node, tile], tails[node, tile + 1]
-                c, d = tails[node, tile + 2], tails[node, tile + 3]
-                to_a, to_b = lengths[node, tile], lengths[node, tile + 1]
-                to_c, to_d = lengths[node, tile + 2], lengths[node, tile + 3]
+            own = following[node]
+            own[:] = np.inf
+            for move in range(tails.shape[1]):
+                before, length = present[tails[node, move]], lengths[node, move]
                 for lane in range(lanes):
-                    one = min(present[a, lane] + to_a, present[b, lane] + to_b)
-                    two = min(present[c, lane] + to_c, present[d, lane] + to_d)
-                    least = min(one, two) + weights[lane] * own
-                    before = following[node, lane]
-                    following[node, lane] = least if tile == 0 else min(before, least)
+                    cost = before[lane] + length
+                    own[lane] = cost if cost < own[lane] else own[lane]
+            for lane in range(lanes):
+                own[lane] += weights[lane] * unsafeness[node]
         present, following = following, present
         for lane in range(lanes):
             costs[k, lane] = present[ends[1], lane]

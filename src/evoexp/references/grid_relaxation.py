@@ -16,10 +16,6 @@ another, which is the one to go on with where the best would go straight back.
 Walks of n ≤ N nodes at the weight λ / N cost no more than at their own λ / n: one pass of dynamic
 programming bounds the paths of all these numbers at once.
 
-Nodes of a grid are counted so that the difference of two neighbours' indices tells the move
-(`paths.grids`). So eight nodes side by side are looked at together: the nodes from which one move
-leads to them stand side by side, too.
-
 The multipliers are raised at nodes that the best walk passes more than once, and lowered at nodes
 that it leaves out, by subgradient steps of Polyak's length (Held & Karp 1971). Any π gives a true
 bound, however good the steps are.
@@ -28,20 +24,10 @@ bound, however good the steps are.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vector_bytes import (
-    equal_bytes,
-    load_bytes,
-    load_mask,
-    spread_byte,
-    store_bytes,
-)
-from evoexp.numeric.vectors import LANES, load, lower, select, spread, store, upper
-from evoexp.records import FloatArray
-from evoexp.references.grid_networks import NO_MOVE, Arrivals, Hops, Shifts, shifts_of
-from evoexp.robots.kinematics import U
+from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
+from evoexp.references.grid_networks import NO_MOVE, Arrivals, Moves, moves_of
 
 PATIENCE = 10  # steps without a better bound after which they are halved
 SHORTEST_STEP = 1.0 / 64.0  # of Polyak's length, at which a number of nodes is left
@@ -51,32 +37,23 @@ class Walks(NamedTuple):
     """The best walks to every node by every number of nodes, written by `find_walks`.
 
     Costs are kept of two numbers of nodes only, which take turns.
-
-    Attributes:
-        costs: (numbers,) of the best walks to the goal.
-        best: (2 · width,) costs of the best walks; see `Shifts` for the width.
-        second: (2 · width,) of the best whose last but one node is another.
-        moves: (numbers · width,) int8, the last move of the best walks; `NO_MOVE` where there is
-            none.
-        second_moves: (numbers · width,) of the second best.
     """
 
-    costs: FloatArray
-    best: FloatArray
-    second: FloatArray
-    moves: NDArray[np.int8]
-    second_moves: NDArray[np.int8]
+    costs: FloatArray  # (numbers,) of the best walks to the goal
+    best: FloatArray  # (2, nodes) costs of the best walks
+    second: FloatArray  # (2, nodes) of the best whose last but one node is another
+    moves: IntArray  # (numbers, nodes) the last move of the best walks; else `NO_MOVE`
+    second_moves: IntArray  # (numbers, nodes) of the second best
 
     @classmethod
-    def of(cls, most: int, shifts: Shifts) -> "Walks":
+    def of(cls, most: int, num_nodes: int) -> "Walks":
         """Return memory for walks of at most so many nodes on a grid."""
-        moves = np.full((2, (most + 1) * shifts.width), NO_MOVE, dtype=np.int8)
-        return cls(np.full(most + 1, np.inf), *np.full((2, 2 * shifts.width), np.inf), *moves)
+        moves = np.full((2, most + 1, num_nodes), NO_MOVE, dtype=np.int64)
+        return cls(np.full(most + 1, np.inf), *np.full((2, 2, num_nodes), np.inf), *moves)
 
 
 def relaxed_bounds(
     arrivals: Arrivals,
-    hops: Hops,
     lam: float,
     known: float,
     enough: float,
@@ -87,7 +64,6 @@ def relaxed_bounds(
 
     Args:
         arrivals: The moves.
-        hops: Fewest moves between nodes.
         lam: λ.
         known: Cost of some path; steps are as long as if it were the optimum.
         enough: A bound as great is not raised any further.
@@ -97,19 +73,19 @@ def relaxed_bounds(
     Returns:
         (numbers,) bounds, none below its floor.
     """
-    bounds, shifts = floors.copy(), shifts_of(arrivals, hops)
-    walks = Walks.of(len(floors) - 1, shifts)
+    bounds, moves = floors.copy(), moves_of(arrivals)
+    walks = Walks.of(len(floors) - 1, len(arrivals.unsafeness))
     multipliers = np.zeros(len(arrivals.unsafeness))
     # from the greatest number down: the multipliers of one are good ones of the next
     for number in range(len(floors) - 1, 1, -1):
         if bounds[number] < enough:
-            raise_bound(shifts, lam, known, enough, number, most_steps, multipliers, walks, bounds)
+            raise_bound(moves, lam, known, enough, number, most_steps, multipliers, walks, bounds)
     return bounds
 
 
 @kernel
 def raise_bound(
-    shifts: Shifts,
+    moves: Moves,
     lam: float,
     known: float,
     enough: float,
@@ -122,7 +98,7 @@ def raise_bound(
     """Raise the bounds of a number of nodes and of all smaller ones by subgradient steps.
 
     Args:
-        shifts: The moves.
+        moves: The moves.
         lam: λ.
         known: Cost of some path.
         enough: A bound as great ends the steps.
@@ -134,11 +110,11 @@ def raise_bound(
     """
     length, since, best = 1.0, 0, -np.inf
     best_multipliers = multipliers.copy()
-    weights, excess = np.zeros(shifts.width), np.empty(len(multipliers))
+    weights, excess = np.zeros(len(multipliers)), np.empty(len(multipliers))
     for _ in range(most_steps):
         for node in range(len(multipliers)):
-            weights[node] = lam / number * shifts.unsafeness[node] + multipliers[node]
-        find_walks(shifts, weights, number, walks)
+            weights[node] = lam / number * moves.unsafeness[node] + multipliers[node]
+        find_walks(moves, weights, number, walks)
         # L_N(π), and bounds of smaller numbers
         total = multipliers.sum()
         value = walks.costs[number] - total
@@ -155,7 +131,7 @@ def raise_bound(
         if bounds[number] >= enough or length < SHORTEST_STEP:
             break
         # a step along the excess of visits
-        square = count_excess(shifts, walks, number, multipliers, excess)
+        square = count_excess(moves, walks, number, multipliers, excess)
         if square == 0.0:
             break
         step = length * max(known - value, 1e-9 * abs(known)) / square
@@ -165,82 +141,111 @@ def raise_bound(
 
 
 @kernel
-def find_walks(shifts: Shifts, weights: FloatArray, number: int, walks: Walks) -> None:
+def find_walks(moves: Moves, weights: FloatArray, number: int, walks: Walks) -> None:
     """Write the best walks of 1 … `number` nodes that never go straight back.
 
-    Blocks of nodes are left out until the start reaches them, and as soon as they cannot reach the
-    goal by `number` nodes any more: costs that they keep from before lead to no other block that
-    can.
+    Nodes whose index is too far from that of the start, or of the goal, to be on such a walk are
+    left out: costs that they keep from before lead to no node that can be.
 
     Args:
-        shifts: The moves.
-        weights: (width,) cost of passing a node.
+        moves: The moves.
+        weights: (nodes,) cost of passing a node.
         number: Most nodes.
         walks: Written.
     """
-    shifts, weights, walks = borrowed((shifts, weights, walks))
-    (start, goal), width = shifts.ends, shifts.width
+    start, goal = moves.ends
     walks.best[:], walks.second[:] = np.inf, np.inf
-    walks.moves[: 2 * width] = NO_MOVE
-    walks.best[width + start] = weights[start]
-    walks.costs[0], walks.costs[1] = np.inf, walks.best[width + goal]
+    walks.moves[:2] = NO_MOVE
+    walks.best[1, start] = weights[start]
+    walks.costs[0], walks.costs[1] = np.inf, walks.best[1, goal]
+    farthest = np.abs(moves.differences).max()
     for k in range(2, number + 1):
-        for block in range(len(shifts.to_goal)):
-            if shifts.from_start[block] < k and shifts.to_goal[block] <= number - k:
-                _extend_walks(shifts, weights, k, block, walks)
-        walks.costs[k] = walks.best[(k & 1) * width + goal]
+        since, left = (k - 1) * farthest, (number - k) * farthest
+        _extend_walks(
+            moves,
+            max(moves.first, start - since, goal - left),
+            min(moves.stop, start + since + 1, goal + left + 1),
+            weights,
+            walks.best[(k + 1) & 1],
+            walks.second[(k + 1) & 1],
+            walks.moves[k - 1],
+            walks.best[k & 1],
+            walks.second[k & 1],
+            walks.moves[k],
+            walks.second_moves[k],
+        )
+        walks.costs[k] = walks.best[k & 1, goal]
 
 
-@inlined
-def _extend_walks(shifts: Shifts, weights: FloatArray, k: int, block: int, walks: Walks) -> None:
-    """Write the best walks of k nodes to a block of nodes, from those of one node less.
+@kernel
+def _extend_walks(
+    moves: Moves,
+    first: int,
+    stop: int,
+    weights: FloatArray,
+    best: FloatArray,
+    second: FloatArray,
+    last: IntArray,
+    longer: FloatArray,
+    longer_second: FloatArray,
+    longer_last: IntArray,
+    longer_second_last: IntArray,
+) -> None:
+    """Write the best walks of one node more, and their last moves.
 
     Args:
-        shifts: The moves.
-        weights: (width,) cost of passing a node.
-        k: Number of nodes of the walks.
-        block: Which nodes.
-        walks: Written.
+        moves: The moves.
+        first: The walks are those to nodes from this one on.
+        stop: And before this one.
+        weights: (nodes,) cost of passing a node.
+        best: (nodes,) costs of the best walks, and `second`, of the second best.
+        last: (nodes,) last moves of the best walks.
+        longer: (nodes,) written, and so are the three others.
     """
-    width, kinds = shifts.width, len(shifts.differences)
-    node = shifts.first + block * LANES
-    before, to = ((k + 1) & 1) * width + node, (k & 1) * width + node
-    moves_before = (k - 1) * width + node
-    one, two = spread(np.inf), spread(np.inf)
-    move_one, move_two = spread_byte(NO_MOVE), spread_byte(NO_MOVE)
-    for move in range(kinds):
-        difference = shifts.differences[move]
-        at = U(before - difference)
-        # the best walk, or the second best where the best one would go straight back
-        is_back = equal_bytes(
-            load_bytes(walks.moves, U(moves_before - difference)), shifts.backward[move]
+    count = max(0, stop - first)
+    one, two = longer[first:stop], longer_second[first:stop]
+    move_one, move_two = longer_last[first:stop], longer_second_last[first:stop]
+    value, own = np.empty(count), weights[first:stop]
+    one[:], two[:], move_one[:], move_two[:] = np.inf, np.inf, NO_MOVE, NO_MOVE
+    # loops over few arrays each, which compilers turn into vector code
+    for move in range(len(moves.differences)):
+        before = slice(first - moves.differences[move], stop - moves.differences[move])
+        best_before, second_before, last_before = best[before], second[before], last[before]
+        back, length, barred = (
+            moves.backward[move],
+            moves.lengths[move],
+            moves.barred[move, first:stop],
         )
-        value = select(is_back, load(walks.second, at), load(walks.best, at))
-        value = value + shifts.lengths[move]
-        # the best so far, then the second best
-        permitted = load_mask(shifts.permitted, U(block * kinds + move))
-        value = select(permitted, value, spread(np.inf))
-        is_one, is_two = value < one, value < two
-        own = spread_byte(move)
-        move_two = select(is_two, select(is_one, move_one, own), move_two)
-        move_one = select(is_one, own, move_one)
-        two = lower(two, upper(one, value))
-        one = lower(one, value)
-    weight = load(weights, U(node))
-    store(walks.best, U(to), one + weight)
-    store(walks.second, U(to), two + weight)
-    store_bytes(walks.moves, U(k * width + node), move_one)
-    store_bytes(walks.second_moves, U(k * width + node), move_two)
+        # the best walk, or the second best where the best one would go straight back
+        for n in range(count):
+            straight, other = best_before[n], second_before[n]
+            cost = other if last_before[n] == back else straight
+            value[n] = cost + length + barred[n]
+        # the last moves, then the costs: of the best so far and of the second best
+        for n in range(count):
+            cost, first_move, second_move = value[n], move_one[n], move_two[n]
+            is_one, is_two = cost < one[n], cost < two[n]
+            kept = first_move if is_one else move
+            move_two[n] = kept if is_two else second_move
+            move_one[n] = move if is_one else first_move
+        for n in range(count):
+            cost, lowest, next_lowest = value[n], one[n], two[n]
+            greater = lowest if cost < lowest else cost
+            two[n] = greater if greater < next_lowest else next_lowest
+            one[n] = cost if cost < lowest else lowest
+    for n in range(count):
+        one[n] += own[n]
+        two[n] += own[n]
 
 
 @kernel
 def count_excess(
-    shifts: Shifts, walks: Walks, number: int, multipliers: FloatArray, excess: FloatArray
+    moves: Moves, walks: Walks, number: int, multipliers: FloatArray, excess: FloatArray
 ) -> float:
     """Write how much oftener than once the best walk passes each node.
 
     Args:
-        shifts: The moves.
+        moves: The moves.
         walks: Of `find_walks`.
         number: Nodes of the walk.
         multipliers: (nodes,); nodes that the walk leaves out count if theirs can still be lowered.
@@ -250,16 +255,16 @@ def count_excess(
         The sum of squares; 0 if there is no walk of so many nodes.
     """
     excess[:] = -1.0
-    node, is_second, width = shifts.ends[1], False, shifts.width
+    node, is_second = moves.ends[1], False
     if walks.costs[number] == np.inf:
         return 0.0
     for k in range(number, 1, -1):
         excess[node] += 1.0
-        moves = walks.second_moves if is_second else walks.moves
-        move = moves[k * width + node]
+        last_moves = walks.second_moves if is_second else walks.moves
+        move = last_moves[k, node]
         # the walk to the node before that does not come from this one
-        node -= shifts.differences[move]
-        is_second = walks.moves[(k - 1) * width + node] == shifts.backward[move]
+        node -= moves.differences[move]
+        is_second = walks.moves[k - 1, node] == moves.backward[move]
     excess[node] += 1.0
     square = 0.0
     for other in range(len(excess)):

@@ -36,18 +36,13 @@ class PlacementConventional(Reference):
 
     Terms: `<method>_evaluations`, of E per start; the exact derivatives of `newton` and `bounded`
     are not counted.
-
-    Attributes:
-        num_starts: Number of starts.
-        num_steps: Steps of the subgradient method.
-        first_step: Length of its first one; the k-th is shorter by √k [rad].
     """
 
     component: ClassVar[str] = "placement_conventional"
 
-    num_starts: LayoutCount
-    num_steps: Count
-    first_step: Positive
+    num_starts: LayoutCount  # number of starts
+    num_steps: Count  # steps of the subgradient method
+    first_step: Positive  # length of its first one; the k-th is shorter by √k [rad]
 
     def truth(self, problem: Any) -> Truth:
         """Run all methods."""

@@ -16,13 +16,11 @@ class PlacementLandscape(Reference):
 
     Arrays: `theta_1` and `theta_2` (angles,) [deg]; `cost` (angles of θ1, angles of θ2): E, NaN
     where infeasible.
-
-    Attributes:
-        num_angles: Values of either angle, both ends of their range included.
     """
 
     component: ClassVar[str] = "placement_landscape"
 
+    # values of either angle, both ends of their range included
     num_angles: Annotated[int, Field(ge=2, le=10_000)]
 
     def memory(self, problem: Any) -> int:

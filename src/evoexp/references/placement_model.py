@@ -16,25 +16,15 @@ TURN = 360.0  # [deg]
 
 
 class Directions(NamedTuple):
-    """Task, weights and limits of the criteria over the links' directions.
+    """Task, weights and limits of the criteria over the links' directions."""
 
-    Attributes:
-        lengths: (3,) l1, l2, l3.
-        target: (2,) X_e, Y_e.
-        force: (2,).
-        weights: ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11.
-        avoided: (n, 5) γ, link, place, X_o, Y_o of Eq. 12.
-        joint_limits: (3, 2) θ1, θ2, θ3 [rad].
-        torque_limits: (3, 2).
-    """
-
-    lengths: FloatArray
-    target: FloatArray
-    force: FloatArray
-    weights: FloatArray
-    avoided: FloatArray
-    joint_limits: FloatArray
-    torque_limits: FloatArray
+    lengths: FloatArray  # (3,) l1, l2, l3
+    target: FloatArray  # (2,) X_e, Y_e
+    force: FloatArray  # (2,)
+    weights: FloatArray  # ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11
+    avoided: FloatArray  # (n, 5) γ, link, place, X_o, Y_o of Eq. 12
+    joint_limits: FloatArray  # (3, 2) θ1, θ2, θ3 [rad]
+    torque_limits: FloatArray  # (3, 2)
 
     def bounds(self) -> FloatArray:
         """Return the finite limits, (m, 3); see `placement_programme.measure`."""

@@ -24,16 +24,13 @@ class PlacementOptimum(Reference):
 
     Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first. The optimum has 15 digits,
     more than any code of 16 bits per angle.
-
-    Attributes:
-        num_angles: Values of either angle that the dense search takes.
-        num_polished: Minima of the dense search that are polished, the lowest ones.
     """
 
     component: ClassVar[str] = "placement_optimum"
 
+    # values of either angle that the dense search takes
     num_angles: Annotated[int, Field(ge=8, le=10_000)]
-    num_polished: Count
+    num_polished: Count  # minima of the dense search that are polished, the lowest ones
 
     def memory(self, problem: Any) -> int:
         """Return the memory of the dense search, besides the planner's."""

@@ -13,17 +13,11 @@ MOST_STEPS = 12  # of Newton's method; it takes three or four
 
 
 class End(NamedTuple):
-    """The end of an optimiser's way.
+    """The end of an optimiser's way."""
 
-    Attributes:
-        x: (3,) directions of the links [rad].
-        cost: E there, without any cap.
-        evaluations: Evaluations of the cost.
-    """
-
-    x: FloatArray
-    cost: float
-    evaluations: int
+    x: FloatArray  # (3,) directions of the links [rad]
+    cost: float  # E there, without any cap
+    evaluations: int  # evaluations of the cost
 
 
 def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:

@@ -19,24 +19,17 @@ from evoexp.references.one_thread import one_thread
 
 
 class Truth(NamedTuple):
-    """The result of a reference.
+    """The result of a reference."""
 
-    Attributes:
-        best: Flat solution in the shape of the planner beside it.
-        cost: Its cost, as the planner's own; lower is better, inf: there is none.
-        solved: Whether the planner's own model accepts it.
-        evaluations: Evaluations of the planner's cost that it took.
-        terms: Numbers of its own (the share of starts that end at the optimum, say), beside those
-            of `evaluate`.
-        arrays: Arrays for figures and tables, by name: attached to the log as `<name>.npy`, any
-            shape, float64 or int64.
-    """
-
-    best: FloatArray
-    cost: float
-    solved: bool
-    evaluations: int
+    best: FloatArray  # flat solution in the shape of the planner beside it
+    cost: float  # its cost, as the planner's own; lower is better, inf: there is none
+    solved: bool  # whether the planner's own model accepts it
+    evaluations: int  # evaluations of the planner's cost that it took
+    # numbers of its own (the share of starts that end at the optimum, say), beside those of
+    # `evaluate`
     terms: Mapping[str, float] = {}
+    # arrays for figures and tables, by name: attached to the log as `<name>.npy`, any shape,
+    # float64 or int64
     arrays: Mapping[str, np.ndarray] = {}
 
 

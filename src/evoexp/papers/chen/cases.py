@@ -16,23 +16,14 @@ CLOSE = (0.001, 0.01)  # [-] gaps to the optimum; shares of runs within them are
 
 
 class PrintedPosture(NamedTuple):
-    """The numbers that the paper prints of the best posture by one criterion.
+    """The numbers that the paper prints of the best posture by one criterion."""
 
-    Attributes:
-        figure: The paper's figure.
-        term: Name of the printed number, as the planner's `evaluate` names it.
-        value: The number; NaN if only angles are printed.
-        angles: θ1, θ2 [deg]; None if they are not printed.
-        torques: τ1, τ2, τ3; None if they are not printed.
-        ratio: Greatest over least torque, by size; NaN if it is not printed.
-    """
-
-    figure: str
-    term: str
-    value: float
-    angles: tuple[float, float] | None = None
-    torques: tuple[float, float, float] | None = None
-    ratio: float = np.nan
+    figure: str  # the paper's figure
+    term: str  # name of the printed number, as the planner's `evaluate` names it
+    value: float  # the number; NaN if only angles are printed
+    angles: tuple[float, float] | None = None  # θ1, θ2 [deg]; None if they are not printed
+    torques: tuple[float, float, float] | None = None  # τ1, τ2, τ3; None if they are not printed
+    ratio: float = np.nan  # greatest over least torque, by size; NaN if it is not printed
 
 
 PRINTED = {
@@ -49,25 +40,15 @@ PRINTED = {
 
 
 class Case(NamedTuple):
-    """The conditions of one criterion; None where a condition is absent or has no data.
+    """The conditions of one criterion; None where a condition is absent or has no data."""
 
-    Attributes:
-        name: The criterion, a key of PRINTED; else the label of the first condition.
-        plain: The genetic algorithm without elitism.
-        elitist: The genetic algorithm with elitism.
-        search: Random search at equal evaluations.
-        optimum: The exact optimum.
-        conventional: Local methods from many starts.
-        landscape: E over θ1 and θ2.
-    """
-
-    name: str
-    plain: ConditionResults | None = None
-    elitist: ConditionResults | None = None
-    search: ConditionResults | None = None
-    optimum: ConditionResults | None = None
-    conventional: ConditionResults | None = None
-    landscape: ConditionResults | None = None
+    name: str  # the criterion, a key of PRINTED; else the label of the first condition
+    plain: ConditionResults | None = None  # the genetic algorithm without elitism
+    elitist: ConditionResults | None = None  # the genetic algorithm with elitism
+    search: ConditionResults | None = None  # random search at equal evaluations
+    optimum: ConditionResults | None = None  # the exact optimum
+    conventional: ConditionResults | None = None  # local methods from many starts
+    landscape: ConditionResults | None = None  # E over θ1 and θ2
 
     @property
     def conditions(self) -> tuple[ConditionResults, ...]:
@@ -140,8 +121,7 @@ class Case(NamedTuple):
 def cases(results: Results) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
     groups = grouped(
-        results.with_data,
-        lambda c: (c.condition.robot, c.condition.scenario, c.planner.objective),
+        results.with_data, lambda c: (c.condition.robot, c.condition.scenario, c.planner.objective)
     )
     return [Case(_name(own[0]), **{_role(c): c for c in reversed(own)}) for own in groups]
 

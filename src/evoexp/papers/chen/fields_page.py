@@ -7,21 +7,10 @@ import numpy as np
 import pandas as pd
 
 from evoexp.papers.chen.figures import field_grids
-from evoexp.papers.chen.rules import RULES
+from evoexp.papers.chen.rules import PAPER, RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Drawing,
-    Judge,
-    Page,
-    ReportSettings,
-    Results,
-    generic,
-    groups,
-    judging,
-    records,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging
 
 PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")
@@ -31,15 +20,9 @@ SLIPS = {
     field_grids.MISSING: PLACE + ": {0.computed} is left out",
     field_grids.SURPLUS: PLACE + ": a {0.printed} too many before it",
 }
-INTRODUCTION = (
-    "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from "
-    "obstacles and the boundary, which is a ring of nodes outside the grid. The potential of "
-    "obstacles is the paper's unsafeness of a node. Obstacles of Fig. 1 are taken "
-    "from both printed grids together; all other numbers are computed."
-)
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the potential fields, or the generic page if there are none."""
     shown = [c for c in results.references if isinstance(c.planner, GridPathGa)]
     if not shown:
@@ -47,20 +30,22 @@ def page(results: Results, settings: ReportSettings) -> Page:
     tables = {c.label: _compared(c) for c in shown if _fields(c)[0].shape == (16, 16)}
     judge, compared = judging.judge(results, settings, RULES), tables.values()
     numbers = (_numbers(c, tables[c.label]) for c in shown if c.label in tables)
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
-        claims=tuple(_claim(judge, *own) for table in compared for own in groups(table, "field")),
-        checks=tuple(_slips(*own) for table in compared for own in groups(table, "field")),
+    return PAPER.page(
+        results,
+        "fields",
+        claims=tuple(
+            _claim(judge, *own) for table in compared for own in kit.groups(table, "field")
+        ),
+        checks=tuple(_slips(*own) for table in compared for own in kit.groups(table, "field")),
         drawings=(*numbers, *map(_map, shown)),
     )
 
 
-def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
+def _fields(condition: kit.ConditionResults) -> tuple[np.ndarray, np.ndarray]:
     return condition.array("goal_field"), condition.array("unsafeness")
 
 
-def _compared(condition: ConditionResults) -> pd.DataFrame:
+def _compared(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return all nodes of both fields beside the printed ones; see `field_grids.compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
@@ -69,7 +54,7 @@ def _compared(condition: ConditionResults) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
+def _claim(judge: kit.Judge, name: str, table: pd.DataFrame) -> kit.Claim:
     """Judge that a field is printed as the wave front computes it."""
     total = int((table["slip"] != field_grids.SURPLUS).sum())
     same, wrong, missing, surplus = (
@@ -86,7 +71,7 @@ def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
 
 def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:
     """Return the row of checks on a field: its slips in words."""
-    slips = records(table[table["slip"] != ""])
+    slips = kit.records(table[table["slip"] != ""])
     told = "; ".join(
         (SLIPS[row.slip].format(row) + _alike(row, table)).replace("*", "\\*") for row in slips
     )
@@ -107,15 +92,9 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
     return f" (or any equal one of columns {first} to {last})" if first < last else ""
 
 
-def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:
-    return Drawing(
-        "fig_1_fields",
-        "Fig. 1: two numerical potential fields",
-        "Number of every node as the wave fronts give it; black: obstacles (in (b) those with a "
-        "free node beside them have o₀ = 10, as printed). Framed: where the print differs.",
-        partial(_compared_table, table),
-        field_grids.draw_fields,
-        (condition,),
+def _numbers(condition: kit.ConditionResults, table: pd.DataFrame) -> kit.Drawing:
+    return PAPER.drawing(
+        "fig_1_fields", partial(_compared_table, table), field_grids.draw_fields, (condition,)
     )
 
 
@@ -124,19 +103,18 @@ def _compared_table(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _map(condition: ConditionResults) -> Drawing:
-    return Drawing(
-        f"fields_{'_'.join(map(str, _fields(condition)[0].shape))}",
-        f"{condition.label}: the fields as maps",
-        "Dark grey: obstacles. The potential of the goal weighs the draws of random walks; no path "
-        "follows it downhill.",
+def _map(condition: kit.ConditionResults) -> kit.Drawing:
+    return PAPER.drawing(
+        "fields_map",
         partial(_map_table, condition),
         field_grids.draw_maps,
         (condition,),
+        shape="_".join(map(str, _fields(condition)[0].shape)),
+        label=condition.label,
     )
 
 
-def _map_table(condition: ConditionResults) -> pd.DataFrame:
+def _map_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
     x, y = (axis.ravel() for axis in np.indices(goal.shape))

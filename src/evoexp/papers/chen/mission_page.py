@@ -5,55 +5,32 @@ from functools import partial
 import numpy as np
 
 from evoexp.papers.chen.figures import missions
+from evoexp.papers.chen.rules import PAPER
 from evoexp.planners.two_stage.planner import TwoStage
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    Proportion,
-    ReportSettings,
-    Results,
-    by_column,
-    generic,
-    markdown,
-    planned_by,
-    run_measures,
-)
-
-INTRODUCTION = (
-    "Two searches, one motion: the placement search (section 3) chooses docking place and "
-    "posture of the arm, the path search (section 2) a path over the floor to the node nearest "
-    "to it. The platform drives along the path, on to the docking place, and the arm goes from "
-    "its travel posture to the docking posture. The exact verdict covers the whole motion: "
-    "platform and links against all obstacles, and against each other. The cost is E (Eq. 14) + "
-    "C (Eq. 1)."
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown, run_measures
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the missions, or the generic page if another planner was run."""
     found = results.with_data
-    if not planned_by(results, TwoStage):
+    if not kit.planned_by(results, TwoStage):
         return generic.page(results, settings)
-    row, column = partial(generic.quantity, results), by_column
+    row, column = partial(generic.quantity, results), kit.by_column
     clearance = "clearance of the bodies over the whole motion (exact)"
-    drawing = Drawing(
+    drawing = PAPER.drawing(
         "mission",
-        "Path and docking posture",
-        "Per condition the run of median cost. Left: the floor, obstacles from centre to centre "
-        "of their outermost nodes. Right: the platform at its docking place, the arm as it "
-        "drives and as it docks, the force that acts.",
         partial(missions.missions_table, found),
         missions.draw_missions,
         found,
         tuple(
-            PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c))) for c in found
+            kit.PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c)))
+            for c in found
         ),
     )
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "mission",
         quantities=(
             row("cost E + C", "–", column("best_cost")),
             row("path cost C", "–", column("term_path_cost")),
@@ -73,10 +50,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _checks(condition: ConditionResults, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
+def _checks(
+    condition: kit.ConditionResults, settings: kit.ReportSettings
+) -> tuple[tuple[str, str], ...]:
     """Return the rows on a condition's exact verdicts and on its docking places."""
     label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
-    free = Proportion(found.certified, found.judged)
+    free = kit.Proportion(found.certified, found.judged)
     nearest = condition.summaries["clearance_pair"].value_counts()
     places = np.round(condition.column("term_platform_x"), 3)
     near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]

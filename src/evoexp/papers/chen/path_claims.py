@@ -8,27 +8,15 @@ from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.path_measures import Group
 from evoexp.papers.chen.rules import RULES
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Judge,
-    ReportSettings,
-    Results,
-    by_column,
-    compared,
-    evidence,
-    judging,
-    markdown,
-    verdicts,
-)
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown, verdicts
 
 DISTANCE, UNSAFENESS, COST = "term_distance", "term_unsafeness", "best_cost"
 
 
 def judge_paths(
-    results: Results, settings: ReportSettings, groups: tuple[Group, ...]
-) -> tuple[Claim, ...]:
+    results: kit.Results, settings: kit.ReportSettings, groups: tuple[Group, ...]
+) -> tuple[kit.Claim, ...]:
     """Judge the claims of Fig. 2: they need its three weightings, in their order."""
     judge = judging.judge(results, settings, RULES)
     return (
@@ -44,14 +32,14 @@ def judge_paths(
     )
 
 
-def excess_of(condition: ConditionResults, shortest: float) -> FloatArray:
+def excess_of(condition: kit.ConditionResults, shortest: float) -> FloatArray:
     """Return the excess of each run's length over the shortest one, (done,) [%]."""
     return np.asarray(100.0 * (condition.column(DISTANCE) / shortest - 1.0))
 
 
 def nearly_shortest(
-    judge: Judge, condition: ConditionResults, label: str, shortest: float
-) -> Claim:
+    judge: kit.Judge, condition: kit.ConditionResults, label: str, shortest: float
+) -> kit.Claim:
     """Judge that paths are nearly shortest without safety."""
     excess, limit = excess_of(condition, shortest), RULES["nearly_shortest"].limits["near_percent"]
     near = int(np.count_nonzero(excess <= limit))
@@ -65,8 +53,8 @@ def nearly_shortest(
 
 
 def nearly_best(
-    judge: Judge, condition: ConditionResults, label: str, known: float, bound: float
-) -> Claim:
+    judge: kit.Judge, condition: kit.ConditionResults, label: str, known: float, bound: float
+) -> kit.Claim:
     """Judge that costs are near that of the best path known."""
     gaps, limit = measures.gaps(condition, known), RULES["nearly_best"].limits["near_percent"]
     near = int(np.count_nonzero(gaps <= limit))
@@ -81,12 +69,12 @@ def nearly_best(
 
 
 def much_longer(
-    judge: Judge,
-    condition: ConditionResults,
+    judge: kit.Judge,
+    condition: kit.ConditionResults,
     label: str,
     shortest: float,
-    truth: ConditionResults | None,
-) -> Claim:
+    truth: kit.ConditionResults | None,
+) -> kit.Claim:
     """Judge that the safe path is much longer, and tell how long the best path known is."""
     excess, limit = excess_of(condition, shortest), RULES["much_longer"].limits["much_percent"]
     longer = int(np.count_nonzero(excess > limit))
@@ -98,14 +86,14 @@ def much_longer(
 
 
 def _compromise(
-    judge: Judge, settings: ReportSettings, groups: tuple[Group, ...]
-) -> tuple[Claim, ...]:
+    judge: kit.Judge, settings: kit.ReportSettings, groups: tuple[Group, ...]
+) -> tuple[kit.Claim, ...]:
     """Judge the claims that compare the three weightings."""
     a, b, c = (group.main for group in groups)
     safer = _compared(b, a, UNSAFENESS, settings)
     shorter = _compared(b, c, DISTANCE, settings)
     told = "; ".join(
-        f"against {other.label}: {evidence(row, word)}"
+        f"against {other.label}: {kit.evidence(row, word)}"
         for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
         for row in rows
     )
@@ -120,7 +108,7 @@ def _compromise(
     )
 
 
-def _converges(judge: Judge, condition: ConditionResults) -> Claim:
+def _converges(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     """Judge that the best cost decreases, and that the average cost converges toward it."""
     rows = condition.generations.sort_values("index").groupby("replicate")
     first, last = rows.first(), rows.last()
@@ -135,7 +123,9 @@ def _converges(judge: Judge, condition: ConditionResults) -> Claim:
     )
 
 
-def _evolution_of(judge: Judge, settings: ReportSettings, group: Group) -> Iterator[Claim]:
+def _evolution_of(
+    judge: kit.Judge, settings: kit.ReportSettings, group: Group
+) -> Iterator[kit.Claim]:
     """Judge the genetic algorithm, without and with elitism, against all controls."""
     controls = tuple(c for c in group.conditions if c.is_control)
     if controls:
@@ -145,20 +135,20 @@ def _evolution_of(judge: Judge, settings: ReportSettings, group: Group) -> Itera
 
 
 def evolution(
-    judge: Judge,
-    settings: ReportSettings,
-    own: ConditionResults,
+    judge: kit.Judge,
+    settings: kit.ReportSettings,
+    own: kit.ConditionResults,
     label: str,
-    controls: tuple[ConditionResults, ...],
-) -> Claim:
+    controls: tuple[kit.ConditionResults, ...],
+) -> kit.Claim:
     """Judge that evolution helps, and tell its gain over the best control."""
-    rows = compared([(own, c) for c in controls], by_column(COST), settings)
+    rows = kit.compared([(own, c) for c in controls], kit.by_column(COST), settings)
     medians = {control_name(c): float(np.median(c.column(COST))) for c in controls}
     best, median = min(medians, key=lambda name: medians[name]), float(np.median(own.column(COST)))
     gain = medians[best] - median
     told = "; ".join(
         f"against {control_name(c)} (median {markdown.number(medians[control_name(c)])}): "
-        f"{evidence(row, 'lower cost')}"
+        f"{kit.evidence(row, 'lower cost')}"
         for c in controls
         for row in rows
         if row.quantity == c.label
@@ -173,14 +163,17 @@ def evolution(
     )
 
 
-def control_name(condition: ConditionResults) -> str:
+def control_name(condition: kit.ConditionResults) -> str:
     """Return the name of a control in sentences."""
     component = str(condition.condition.planner.component)
     return {"random_search": "random walks"}.get(component, component.replace("_", " "))
 
 
 def _compared(
-    first: ConditionResults, second: ConditionResults, column: str, settings: ReportSettings
-) -> tuple[Comparison, ...]:
+    first: kit.ConditionResults,
+    second: kit.ConditionResults,
+    column: str,
+    settings: kit.ReportSettings,
+) -> tuple[kit.Comparison, ...]:
     """Compare two conditions in a column; empty if they have no common seed."""
-    return compared([(first, second)], by_column(column), settings)
+    return kit.compared([(first, second)], kit.by_column(column), settings)

@@ -15,21 +15,14 @@ Routes = dict[str, tuple[Any, ...]]
 
 
 class Group(NamedTuple):
-    """Conditions of one weighting and one rule for loops.
+    """Conditions of one weighting and one rule for loops."""
 
-    Attributes:
-        name: Label of the first condition: (a), (b), …, as in the paper's Fig. 2.
-        weights: ε and λ.
-        revisits: Whether nodes may be passed again.
-        conditions: GA first, then with elitism, then the controls; without the reference.
-        truth: The reference; None if it has no data.
-    """
-
-    name: str
-    weights: tuple[float, float]
-    revisits: bool
+    name: str  # label of the first condition: (a), (b), …, as in the paper's Fig. 2
+    weights: tuple[float, float]  # ε and λ
+    revisits: bool  # whether nodes may be passed again
+    # GA first, then with elitism, then the controls; without the reference
     conditions: tuple[ConditionResults, ...]
-    truth: ConditionResults | None
+    truth: ConditionResults | None  # the reference; None if it has no data
 
     @property
     def main(self) -> ConditionResults:

@@ -11,68 +11,20 @@ from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.figures import grid_paths
 from evoexp.papers.chen.figures.grid_paths import FAINT, Line
 from evoexp.papers.chen.path_measures import Group, Routes
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    Quantity,
-    ReportSettings,
-    Results,
-    Values,
-    by_column,
-    compared,
-    counted,
-    generic,
-    markdown,
-    run_measures,
-)
-
-INTRODUCTION = (
-    "Individuals are paths from node to node, of any length, valid by construction. The cost is "
-    "C = ε D + λ S (Eq. 1): D is the length in cells (Eq. 2), S the mean unsafeness of the "
-    "path's nodes (Eq. 3); lower is better. Best path known: for λ = 0 the shortest path "
-    "(Dijkstra), exact; for λ > 0 paths of the frontier of D + μ ΣS over μ, improved until no "
-    "insertion, removal or exchange of up to three nodes helps. Below all paths without loops is "
-    "a bound by Lagrangian relaxation (the best walk of every number of nodes, with multipliers "
-    "that punish further visits of a node): the truth lies between the two. Controls at equal "
-    "evaluations: random walks, drawn as the first generation; and path climbing, which "
-    "regenerates pieces of five random walks as the mutation does and keeps what costs no more, "
-    "without selection and crossover."
-)
-LINGERING = (
-    "The unsafeness of a path is the mean over its nodes (Eq. 3): every further step in a safe "
-    "place lowers it. Where nodes may be passed again, the best path waits there; the cost of "
-    "its length alone ends it. The paper does not say whether nodes may be passed again; "
-    "everywhere else loops are erased. For paths with revisits the best walk is exact (dynamic "
-    "programming over the number of nodes); without them the truth lies between the best path "
-    "known and a bound by Lagrangian relaxation."
-)
-CHECKS = (
-    (
-        "Lingering in safe nodes, which the mean of Eq. 3 rewards",
-        "`evoexp run experiment=chen_lingering`",
-    ),
-    (
-        "Places of the obstacles of Fig. 2",
-        "are assumed: the text says of the map only that it is cluttered; the platform is a "
-        "cylinder of an assumed radius, "
-        "obstacles are boxes between the centres of their outermost nodes: every permitted "
-        "move is free, past corners, too",
-    ),
-)
+from evoexp.papers.chen.rules import PAPER
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown, run_measures
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the grid paths, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
     groups = measures.group_list(results)
     found = measures.route_list(groups)
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "path",
         quantities=quantities(results, groups),
         claims=path_claims.judge_paths(results, settings, groups),
         checks=checks(groups, settings, found),
@@ -81,13 +33,13 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, ...]:
+def quantities(results: kit.Results, groups: tuple[Group, ...]) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), by_column
+    row, column = partial(generic.quantity, results), kit.by_column
     group_of = {c.label: group for group in groups for c in group.all}
     above = "cost above the best path known (below 0: better than it)"
 
-    def gap(truth: str) -> Values:
+    def gap(truth: str) -> kit.Values:
         return lambda c: measures.gaps(c, getattr(group_of[c.label], truth))
 
     return (
@@ -106,7 +58,7 @@ def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, .
 
 
 def checks(
-    groups: tuple[Group, ...], settings: ReportSettings, found: Routes
+    groups: tuple[Group, ...], settings: kit.ReportSettings, found: Routes
 ) -> tuple[tuple[str, str], ...]:
     """Return the rows on gaps, on weightings that are nearly the same, and on routes."""
     gaps = [
@@ -127,14 +79,14 @@ def checks(
         )
         for group in groups
     ]
-    return (*gaps, *_same_problem(groups), *routes, *CHECKS)
+    return (*gaps, *_same_problem(groups), *routes, *PAPER.checks("path"))
 
 
-def _gap_text(condition: ConditionResults, group: Group, settings: ReportSettings) -> str:
+def _gap_text(condition: kit.ConditionResults, group: Group, settings: kit.ReportSettings) -> str:
     """Describe the gaps of a condition's runs above the best path known."""
     gaps, shares = measures.gaps(condition, group.optimum), []
     for bound in (0, 1, 5):  # [%]
-        found = counted(gaps <= bound + 1e-9)
+        found = kit.counted(gaps <= bound + 1e-9)
         interval = markdown.percent(found.interval(settings.confidence))
         name = f"within {bound} %" if bound else "equal or better"
         shares.append(f"{name} {markdown.share(*found)} ({interval})")
@@ -176,19 +128,21 @@ def _same_problem(groups: tuple[Group, ...]) -> Iterator[tuple[str, str]]:
 
 
 def comparisons(
-    groups: tuple[Group, ...], settings: ReportSettings
-) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    groups: tuple[Group, ...], settings: kit.ReportSettings
+) -> tuple[tuple[str, tuple[kit.Comparison, ...]], ...]:
     """Compare the costs of the first condition of each weighting with those of its others."""
-    values = by_column("best_cost")
+    values = kit.by_column("best_cost")
     return tuple(
         (f"cost: {group.main.label} against …", rows)
         for group in groups
-        for rows in (compared([(group.main, c) for c in group.conditions[1:]], values, settings),)
+        for rows in (
+            kit.compared([(group.main, c) for c in group.conditions[1:]], values, settings),
+        )
         if rows
     )
 
 
-def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
+def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[kit.Drawing, ...]:
     """Return the figures."""
     shown = tuple(c for group in groups for c in group.all)
     faint = {
@@ -196,43 +150,22 @@ def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
     }
     panels = [(g.title, g.main, [*faint[g.name], *grid_paths.known_lines(g)]) for g in groups]
     of_routes = [(g.title, g.main, _route_lines(g, found)) for g in groups]
-    gaps = Drawing(
-        "gaps",
-        "Gaps to the best path known",
-        "Share of runs whose cost is at most so far above the best path known (dotted line at 0). "
-        "Dash-dotted: the bound below all paths.",
-        partial(grid_paths.gaps_table, groups),
-        grid_paths.draw_gaps,
-        shown,
+    gaps = PAPER.drawing(
+        "gaps", partial(grid_paths.gaps_table, groups), grid_paths.draw_gaps, shown
     )
     return (
-        Drawing(
-            "fig_2_costs",
-            "Fig. 2: path cost against generations",
-            "Best so far: median and quartiles of the runs; dashed: average of a generation. "
-            "Random search draws as many random walks; path climbing regenerates pieces of five of "
-            "them and keeps what costs no more. Dotted and dash-dotted: cost of "
-            "the best path known, and the bound below which no path is.",
-            partial(grid_paths.costs_table, groups),
-            grid_paths.draw_costs,
-            shown,
+        PAPER.drawing(
+            "fig_2_costs", partial(grid_paths.costs_table, groups), grid_paths.draw_costs, shown
         ),
-        Drawing(
+        PAPER.drawing(
             "fig_2_paths",
-            "Fig. 2: paths",
-            "All runs of the genetic algorithm, the one of median cost, and the best path known. "
-            "Grey: obstacles, from centre to centre of their outermost nodes.",
             partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             shown,
-            tuple(PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
+            tuple(kit.PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
         ),
-        Drawing(
+        PAPER.drawing(
             "routes",
-            "Routes",
-            "Paths that pass the same sides of all obstacles are one route; of each the run of "
-            "median cost, as wide as the route is frequent. A is the most frequent one over all "
-            "panels.",
             partial(grid_paths.paths_table, of_routes),
             grid_paths.draw_routes,
             tuple(group.main for group in groups),
@@ -255,14 +188,14 @@ def _route_lines(group: Group, found: Routes) -> list[Line]:
     ]
 
 
-def lingering_page(results: Results, settings: ReportSettings) -> Page:
+def lingering_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of lingering paths, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
     groups = measures.group_list(results)
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=LINGERING,
+    return PAPER.page(
+        results,
+        "lingering",
         quantities=quantities(results, groups),
         checks=(
             *((f"{g.name}: lingering", _lingering(g, groups)) for g in groups if g.revisits),
@@ -311,24 +244,18 @@ def _repeated(path: np.ndarray) -> int:
     return len(path) - len(np.unique(path, axis=0))
 
 
-def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
+def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[kit.Drawing, ...]:
     panels = [(group.name, group.main, grid_paths.known_lines(group)) for group in groups]
     return (
-        Drawing(
+        PAPER.drawing(
             "paths",
-            "Paths with and without revisits",
-            "Run of median cost of the genetic algorithm, and the best path known. Lines that go "
-            "back and forth lie on each other: the next figure counts nodes.",
             partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             tuple(c for group in groups for c in group.all),
-            tuple(PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
+            tuple(kit.PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
         ),
-        Drawing(
+        PAPER.drawing(
             "lingering",
-            "Nodes by their unsafeness",
-            "Nodes of the best solution of every run: mean number per unsafeness of the node, "
-            "counted as often as they are passed.",
             partial(grid_paths.places_table, groups),
             grid_paths.draw_places,
             tuple(group.main for group in groups),

@@ -7,22 +7,13 @@ import numpy as np
 from evoexp.papers.chen.cases import METHODS, Case
 from evoexp.papers.chen.posture_claims import judge_printed
 from evoexp.papers.chen.rules import RULES
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Judge,
-    Proportion,
-    ReportSettings,
-    Results,
-    by_column,
-    compared,
-    fisher_exact,
-    judging,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown
 
 
-def judge_cases(results: Results, cases: list[Case], settings: ReportSettings) -> tuple[Claim, ...]:
+def judge_cases(
+    results: kit.Results, cases: list[Case], settings: kit.ReportSettings
+) -> tuple[kit.Claim, ...]:
     """Judge all claims; the optimum of every case is known."""
     judge = judging.judge(results, settings, RULES)
     minimax = [case for case in cases if case.name == "minimax torque"]
@@ -34,7 +25,9 @@ def judge_cases(results: Results, cases: list[Case], settings: ReportSettings) -
     )
 
 
-def _against_search(judge: Judge, cases: list[Case], settings: ReportSettings) -> list[Claim]:
+def _against_search(
+    judge: kit.Judge, cases: list[Case], settings: kit.ReportSettings
+) -> list[kit.Claim]:
     """Judge that the genetic algorithm, with and without elitism, beats random search."""
     pairs = {
         own.label: (case, name, own, case.search)
@@ -42,9 +35,9 @@ def _against_search(judge: Judge, cases: list[Case], settings: ReportSettings) -
         for name, own in (("without elitism", case.plain), ("with elitism", case.elitist))
         if own is not None and case.search is not None
     }
-    rows = compared(
+    rows = kit.compared(
         [(own, search) for _, _, own, search in pairs.values()],
-        by_column("best_cost"),
+        kit.by_column("best_cost"),
         settings,
         named=lambda own, _: own.label,
     )
@@ -58,12 +51,14 @@ def _against_search(judge: Judge, cases: list[Case], settings: ReportSettings) -
     return claims
 
 
-def _against_conventional(judge: Judge, case: Case, settings: ReportSettings) -> Iterator[Claim]:
+def _against_conventional(
+    judge: kit.Judge, case: Case, settings: kit.ReportSettings
+) -> Iterator[kit.Claim]:
     """Judge that conventional methods get stuck, and that the genetic algorithm does better."""
     close = RULES["gets_stuck"].limits["near_percent"] / 100.0
     for method, ends in case.ends().items():
         at_best = case.within(ends[:, 2], close)
-        stuck = Proportion(at_best.total - at_best.having, at_best.total)
+        stuck = kit.Proportion(at_best.total - at_best.having, at_best.total)
         yield judge.on("gets_stuck", case=case.name, method=method).own(
             f"{stuck.having} of {stuck.total} starts "
             f"({markdown.percent(stuck.interval(settings.confidence))})",
@@ -75,8 +70,12 @@ def _against_conventional(judge: Judge, case: Case, settings: ReportSettings) ->
 
 
 def _better(
-    judge: Judge, case: Case, elitist: ConditionResults, method: str, at_best: Proportion
-) -> Iterator[Claim]:
+    judge: kit.Judge,
+    case: Case,
+    elitist: kit.ConditionResults,
+    method: str,
+    at_best: kit.Proportion,
+) -> Iterator[kit.Claim]:
     """Judge a run of the genetic algorithm against one start of a method, and their efforts."""
     assert case.conventional is not None
     close = RULES["per_success"].limits["near_percent"] / 100.0
@@ -86,8 +85,8 @@ def _better(
     yield judge.on("better_than_a_start", case=case.name, method=method).greater(
         f"within {100 * close:g} % of the optimum: {100 * own.share:.0f} % of runs with "
         f"elitism, {100 * at_best.share:.0f} % of starts, p = "
-        f"{markdown.p_value(fisher_exact(own, at_best))}; a run takes {of_run:.0f} evaluations, "
-        f"a start {of_start:.0f}",
+        f"{markdown.p_value(kit.fisher_exact(own, at_best))}; a run takes {of_run:.0f} "
+        f"evaluations, a start {of_start:.0f}",
         own,
         at_best,
     )
@@ -102,7 +101,7 @@ def _better(
     )
 
 
-def _seconds(judge: Judge, name: str, condition: ConditionResults) -> Claim:
+def _seconds(judge: kit.Judge, name: str, condition: kit.ConditionResults) -> kit.Claim:
     """Judge that the minimax problem takes seconds."""
     seconds = float(np.median(condition.column("cpu_s")))
     return judge.on("seconds", case=name).own(

@@ -8,82 +8,25 @@ import numpy as np
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import CLOSE, Case, cases
 from evoexp.papers.chen.figures import placements
+from evoexp.papers.chen.rules import PAPER
 from evoexp.planners.placement_ga.planner import PlacementGa
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    ReportSettings,
-    Results,
-    Table,
-    generic,
-    markdown,
-    planned_by,
-    spread,
-)
-
-INTRODUCTION = (
-    "Two angles of a three-link arm on a platform are searched; θ3 (the better of its two "
-    "values) and the platform's place follow from the target of the end-effector. The cost is E "
-    "(Eq. 14), lower is better; the paper's fitness is f = 250 − E. Infeasible postures cost "
-    "250. The paper mentions no elitism; runs with and without it are shown. Exact optima: a "
-    "dense search over both angles, every minimum polished; conventional methods: local ones, from "
-    "the same feasible starts spread evenly. Without an obstacle every posture has a mirror image "
-    "of the same cost."
-)
-RESULTS = (
-    "criterion",
-    "paper",
-    "exact optimum",
-    "GA",
-    "GA, elitism",
-    "random search",
-    "conventional, by start",
-)
-NOTE = (
-    "Paper: the printed number of its best posture, and E at the printed angles. GA and "
-    "random search: median [quartiles] of the best E of a run; in brackets shares of runs (for "
-    "conventional methods: of starts) within 0.1 % and 1 % of the optimum."
-)
-POSTURES = (
-    "criterion",
-    "posture",
-    "θ1, θ2, θ3 [deg]",
-    "X_p",
-    "τ1, τ2, τ3",
-    "E1",
-    "E2",
-    "Σ γ E_obs",
-    "E_man",
-    "E",
-)
-LANDSCAPES = (
-    "criterion",
-    "pairs of angles that are feasible",
-    "local minima",
-    "(θ1, θ2): E",
-    "best run of the GA",
-)
-LANDSCAPES_INTRODUCTION = (
-    "E over θ1 and θ2, at the better θ3 of each pair; white: no posture reaches the target. The "
-    "paper draws the fitness 250 − E as a surface. The criteria are judged where all methods "
-    "stand side by side: `evoexp run experiment=chen_placement`."
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the placements, or the generic page if another planner was run."""
-    if not planned_by(results, PlacementGa):
+    if not kit.planned_by(results, PlacementGa):
         return generic.page(results, settings)
     found = cases(results)
     exact = [case for case in found if case.optimum is not None]
     postures = tuple(row for case in found for row in _posture_rows(case))
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "placement",
         tables=(
-            Table("Results", RESULTS, tuple(map(_result_row, found)), NOTE),
-            Table("Postures", POSTURES, postures),
+            PAPER.table("results", tuple(map(_result_row, found))),
+            PAPER.table("postures", postures),
         ),
         claims=placement_claims.judge_cases(results, exact, settings),
         checks=tuple(row for case in found for row in _checks(case)),
@@ -91,26 +34,22 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def landscapes_page(results: Results, settings: ReportSettings) -> Page:
+def landscapes_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the landscapes (Fig. 9), or that of the placements if there are none."""
-    found = cases(results) if planned_by(results, PlacementGa) else []
+    found = cases(results) if kit.planned_by(results, PlacementGa) else []
     shown = [case for case in found if case.landscape is not None]
     if not shown:
         return page(results, settings)
-    drawing = Drawing(
+    drawing = PAPER.drawing(
         "fig_9_landscapes",
-        "Fig. 9: landscapes",
-        "Points: the best of every run of the genetic algorithm; stars: the exact optimum and "
-        "its mirror image; triangles: the other local minima; cross: the angles that the paper "
-        "prints.",
         partial(placements.landscape_table, shown),
         placements.draw_landscape,
         tuple(c for case in shown for c in case.conditions),
     )
-    return Page(
-        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=LANDSCAPES_INTRODUCTION,
-        tables=(Table("Landscapes", LANDSCAPES, tuple(map(_landscape_row, shown))),),
+    return PAPER.page(
+        results,
+        "landscapes",
+        tables=(PAPER.table("landscapes", tuple(map(_landscape_row, shown))),),
         drawings=(drawing,),
     )
 
@@ -141,12 +80,12 @@ def _paper(case: Case) -> str:
     return "; ".join(told)
 
 
-def _run(case: Case, condition: ConditionResults | None) -> str:
+def _run(case: Case, condition: kit.ConditionResults | None) -> str:
     """Return the spread of the best E of a condition's runs, and shares near the optimum."""
     if condition is None:
         return "–"
     costs = condition.column("best_cost")
-    return f"{markdown.spread(spread(costs))} {_shares(case, costs)}"
+    return f"{markdown.spread(kit.spread(costs))} {_shares(case, costs)}"
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:
@@ -202,42 +141,25 @@ def _checks(case: Case) -> list[tuple[str, str]]:
     return rows
 
 
-def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
+def _drawings(cases: list[Case]) -> tuple[kit.Drawing, ...]:
     """Return the figures: postures, and where optima are known, fitness and gaps."""
     exact = [case for case in cases if case.optimum is not None and case.evolved]
     shown = tuple(c for case in cases for c in case.conditions)
     found = (
-        Drawing(
+        PAPER.drawing(
             "fig_3_to_8_postures",
-            "Figs. 3–8: postures",
-            "Thick: the exact optimum; thin: the best run of the genetic algorithm, with elitism "
-            "where it was run; where the paper prints angles, its posture. Where two differ, "
-            "they are often mirror images. The platform's size and the obstacle of Fig. 7 are "
-            "assumed.",
             partial(placements.postures_table, cases),
             placements.draw_postures,
             shown,
         ),
-        Drawing(
+        PAPER.drawing(
             "fig_4_to_8_fitness",
-            "Figs. 4–8: the best of a run against generations",
-            "Median and quartiles over runs of the best so far, at equal evaluations; "
-            "dash-dotted: the exact optimum. For the least torque norm the paper draws the "
-            "torque norm itself (lower is better), else the fitness f = 250 − E (higher is "
-            "better).",
             partial(placements.fitness_table, exact),
             placements.draw_fitness,
             shown,
         ),
-        Drawing(
-            "gaps",
-            "Gaps to the exact optimum",
-            "Share of runs, or of starts of a conventional method (dashed), that end closer to "
-            "the optimum than x; dotted: 0.1 % and 1 %. Smaller gaps than 1e-6 are drawn as 1e-6; "
-            "plateaus on the right are local minima.",
-            partial(placements.gaps_table, exact),
-            placements.draw_gaps,
-            shown,
+        PAPER.drawing(
+            "placement_gaps", partial(placements.gaps_table, exact), placements.draw_gaps, shown
         ),
     )
     return found if exact else found[:1]

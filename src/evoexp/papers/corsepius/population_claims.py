@@ -1,33 +1,19 @@
 """The claims of Corsépius 2001 on the size of the population, judged metric by metric."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.rules import RULES
-from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Interval,
-    Judge,
-    ReportSettings,
-    Values,
-    effort_ratio,
-    expected_effort,
-    fisher_exact,
-    holm,
-    markdown,
-    solved,
-    success,
-    verdicts,
-)
+from evoexp.report import kit
+from evoexp.report.kit import markdown, verdicts
 
 RECOMMENDED = 100.0  # individuals (section 5)
-METRICS: dict[str, Values] = {
+METRICS: dict[str, kit.Values] = {
     "cycles": measures.cycles,
     "evaluations": measures.evaluations,
     "CPU time": measures.usual_seconds,
@@ -35,21 +21,13 @@ METRICS: dict[str, Values] = {
 
 
 class SizeComparison(NamedTuple):
-    """The effort of a size over that of the recommended one, expected running times both.
+    """The effort of a size over that of the recommended one, expected running times both."""
 
-    Attributes:
-        task: Name of the task.
-        value: The size.
-        ratio: Ratio of the expected efforts.
-        interval: Its interval.
-        bound: The ratio that it is compared with: 1, or a proportional increase.
-    """
-
-    task: str
-    value: float
-    ratio: float
-    interval: Interval
-    bound: float
+    task: str  # name of the task
+    value: float  # the size
+    ratio: float  # ratio of the expected efforts
+    interval: kit.Interval  # its interval
+    bound: float  # the ratio that it is compared with: 1, or a proportional increase
 
     @property
     def says(self) -> int:
@@ -58,19 +36,12 @@ class SizeComparison(NamedTuple):
 
 
 def judge_study(
-    judge: Judge,
+    judge: kit.Judge,
     found: tuple[Task, ...],
     compared: dict[str, list[SizeComparison]],
-    settings: ReportSettings,
-) -> tuple[Claim, ...]:
-    """Judge the claims on the size.
-
-    Args:
-        judge: The judge of the experiment.
-        found: Tasks with one condition per size.
-        compared: Metric → every size against the recommended one.
-        settings: Levels and resamples.
-    """
+    settings: kit.ReportSettings,
+) -> tuple[kit.Claim, ...]:
+    """Judge the claims on the size."""
     larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in compared.items()}
     smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in compared.items()}
     return (
@@ -87,7 +58,7 @@ def judge_study(
 
 def _beside_recommended(
     found: tuple[Task, ...],
-) -> Iterator[tuple[str, float, ConditionResults, ConditionResults]]:
+) -> Iterator[tuple[str, float, kit.ConditionResults, kit.ConditionResults]]:
     """Yield (task, size, its condition, that of the recommended size) where either solves it."""
     for task in found:
         own = task.by_value.get(RECOMMENDED)
@@ -97,7 +68,7 @@ def _beside_recommended(
 
 
 def compare_sizes(
-    found: tuple[Task, ...], metric: str, settings: ReportSettings
+    found: tuple[Task, ...], metric: str, settings: kit.ReportSettings
 ) -> list[SizeComparison]:
     """Compare every size with the recommended one, task by task.
 
@@ -108,25 +79,13 @@ def compare_sizes(
     level = 1.0 - (1.0 - settings.confidence) / max(1, len(pairs))
     rows = []
     for name, value, c, own in pairs:
-        one, two = _on_common_seeds(c, own, METRICS[metric])
-        above, below = expected_effort(*one), expected_effort(*two)
+        one, two = run_values.on_common_seeds(c, own, METRICS[metric])
+        above, below = kit.expected_effort(*one), kit.expected_effort(*two)
         ratio = above / below if np.isfinite(below) else 0.0
         proportional = RECOMMENDED / value if metric == "cycles" and value < RECOMMENDED else 1.0
-        interval = effort_ratio(one, two, level, settings.num_resamples)
+        interval = kit.effort_ratio(one, two, level, settings.num_resamples)
         rows.append(SizeComparison(name, value, ratio, interval, proportional))
     return rows
-
-
-def _on_common_seeds(
-    one: ConditionResults, two: ConditionResults, values: Values
-) -> list[tuple[FloatArray, Any]]:
-    """Return effort and success of the replicates that both have."""
-    common = one.summaries.index.intersection(two.summaries.index)
-    return [
-        (values(c)[rows], solved(c)[rows])
-        for c in (one, two)
-        for rows in (c.summaries.index.get_indexer(common),)
-    ]
 
 
 def _ratios(rows: list[SizeComparison], says: int) -> str:
@@ -147,7 +106,7 @@ def _unless(against: object, favour: object) -> bool | None:
     return False if against else True if favour else None
 
 
-def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
+def _no_faster(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
     """Judge that nothing larger is faster, on any task."""
     says = [row.says for row in rows]
     told = (
@@ -158,7 +117,7 @@ def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, 1 in says))
 
 
-def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
+def _not_necessarily(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
     """Judge the weaker reading: there are tasks on which nothing larger is faster."""
     says = {name: [row.says for row in rows if row.task == name] for name in (r.task for r in rows)}
     never = [name for name, own in says.items() if min(own) >= 0]
@@ -171,7 +130,7 @@ def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> C
     return hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
 
 
-def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
+def _over_proportional(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
@@ -183,18 +142,23 @@ def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) ->
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
 
-def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSettings) -> Claim:
+def _converges_less(
+    judge: kit.Judge, found: tuple[Task, ...], settings: kit.ReportSettings
+) -> kit.Claim:
     """Judge that smaller populations meet their goals less often."""
     pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
-    adjusted = holm([fisher_exact(success(c), success(own)) for _, _, c, own in pairs])
+    adjusted = kit.holm(
+        [kit.fisher_exact(kit.success(c), kit.success(own)) for _, _, c, own in pairs]
+    )
     says = [
-        verdicts.greater(success(own), success(c), p, settings.significance)
+        verdicts.greater(kit.success(own), kit.success(c), p, settings.significance)
         for (_, _, c, own), p in zip(pairs, adjusted, strict=True)
     ]
     clear = [pair for pair, said in zip(pairs, says, strict=True) if said]
     less, more = says.count(1), says.count(-1)
     texts = (
-        f"{name} {value:g}: {markdown.share(*success(c))} for {markdown.share(*success(own))}"
+        f"{name} {value:g}: {markdown.share(*kit.success(c))} for "
+        f"{markdown.share(*kit.success(own))}"
         for name, value, c, own in clear
     )
     told = (
@@ -205,11 +169,15 @@ def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSetti
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 
-def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Values) -> Claim:
+def _reasonable(
+    judge: kit.Judge, metric: str, found: tuple[Task, ...], values: kit.Values
+) -> kit.Claim:
     """Judge that 100 is a reasonable size on every task that can be solved."""
     factors = {}
     for task in found:
-        efforts = {v: expected_effort(values(c), solved(c)) for v, c in task.by_value.items()}
+        efforts = {
+            v: kit.expected_effort(values(c), kit.solved(c)) for v, c in task.by_value.items()
+        }
         best = min(efforts, key=lambda value: efforts[value])
         if RECOMMENDED in efforts and np.isfinite(efforts[best]):
             factors[task.name] = efforts[RECOMMENDED] / efforts[best], best

@@ -2,108 +2,40 @@
 
 from functools import partial
 
-import numpy as np
-
+from evoexp.papers import run_values
 from evoexp.papers.corsepius import measures, population_claims
 from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius.figures import population_effort
 from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
-from evoexp.papers.corsepius.rules import RULES
+from evoexp.papers.corsepius.rules import PAPER, RULES
 from evoexp.planners.posture_es.planner import PostureEs
-from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    ReportSettings,
-    Results,
-    Table,
-    compared,
-    expected_effort,
-    expected_interval,
-    fisher_exact,
-    grouped,
-    holm,
-    judging,
-    markdown,
-    planned_by,
-    solved,
-    spread,
-    success,
-    sweep_figures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown, sweep_figures
 
 PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
-INTRODUCTION = (
-    "Conditions of one task differ in one setting and share their seeds. Effort of a run that "
-    "does not meet its goal counts as infinite where runs are compared, and as spent where "
-    "expected running times are formed. The paper sweeps nothing; it says that the setting "
-    "scales the algorithm (section 5) or is a next step (section 6)."
-)
-SHARES = (
-    "condition",
-    "goal met",
-    "p",
-    "of these refuted",
-    "p",
-    "steps beyond the scope, of a path",
-)
-NOTE = (
-    "p: against the first condition of the task, Fisher's exact test, Holm over the task's "
-    "conditions."
-)
-FLOOR = (
-    "The goal's tolerance is too small to be met, so every search ends by stagnation; "
-    "drawn is its distance to the goal then: to the surface of an object, and to a point. Points: "
-    "runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands "
-    "nearer than some share of it. A surface fixes one coordinate, a point three, which a random "
-    "step must meet at once: its floor is far higher."
-)
 EFFECTS = (
     f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
     "one; dashed: no difference."
 )
 SETTING = "num_offspring"
-SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, " [ms]")}
-SIZES = (
-    "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds "
-    "included. Expected running time: the effort of all runs, failed ones included, over the "
-    "number of runs that met the goal: the price of a success if one starts again after every "
-    "failure. Cycles stand for planning time on as many processors as individuals, evaluations "
-    "for time on one; CPU time is that of the search here, at the median run's price of an "
-    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ "
-    "is not only less search per cycle: selection is weaker, too (5 of λ)."
-)
-SIZE_CHECKS = (
-    (
-        "Intervals of ratios",
-        "by Bonferroni over all of a metric, so that the verdicts of one metric hold together; "
-        "on common seeds",
-    ),
-    (
-        "A task that no size solves",
-        "says nothing of effort: the local minimum, `evoexp run experiment=corsepius_wall`",
-    ),
-    (
-        "The narrow gate at the recommended size",
-        "is a matter of the scope, too: `evoexp run experiment=corsepius_gate_narrow`",
-    ),
-)
+SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # quantity, first condition of a task, its comparisons with the others
-FirstComparison = tuple[str, str, tuple[Comparison, ...]]
+FirstComparison = tuple[str, str, tuple[kit.Comparison, ...]]
+# evaluations to the goal, and steps of the path to it, (done,); inf without it
+effort = run_values.where_solved(measures.evaluations)
+steps_to_goal = run_values.where_solved(measures.num_steps)
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or that of the tasks if there is nothing to compare."""
-    if not planned_by(results, PostureEs) or len(results.main) < 2:
+    if not kit.planned_by(results, PostureEs) or len(results.main) < 2:
         return whole_page.page(results, settings)
     found = comparisons(results, settings)
     slope = "slope of log residual over log scope {:.2f}; 1: proportional"
-    return Page(
-        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "sweep",
         quantities=whole_page.quantities(results),
         tables=(_table(results, settings), *_floors(results)),
         checks=tuple(
@@ -115,17 +47,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def effort(condition: ConditionResults) -> FloatArray:
-    """Return the evaluations to the goal of each run, (done,); inf without it."""
-    return np.where(solved(condition), measures.evaluations(condition), np.inf)
-
-
-def _steps(condition: ConditionResults) -> FloatArray:
-    """Return the steps of each run's path to the goal, (done,); inf without it."""
-    return np.where(solved(condition), measures.num_steps(condition), np.inf)
-
-
-def comparisons(results: Results, settings: ReportSettings) -> list[FirstComparison]:
+def comparisons(results: kit.Results, settings: kit.ReportSettings) -> list[FirstComparison]:
     """Compare the first condition of every task with each other one.
 
     P-values are adjusted over each task. If no run meets its goal, distances to it are compared.
@@ -134,50 +56,50 @@ def comparisons(results: Results, settings: ReportSettings) -> list[FirstCompari
     name = "evaluations to the goal" if reaching else "distance to the goal"
     values = effort if reaching else measures.residuals
     found = (
-        (name, first.label, compared([(first, other) for other in others], values, settings))
-        for first, *others in grouped(results.with_data, measures.scene)
+        (name, first.label, kit.compared([(first, other) for other in others], values, settings))
+        for first, *others in kit.grouped(results.with_data, measures.scene)
     )
     return [one for one in found if one[2]]
 
 
-def _table(results: Results, settings: ReportSettings) -> Table:
+def _table(results: kit.Results, settings: kit.ReportSettings) -> kit.Table:
     """Return success, verdicts and oversized steps of every condition."""
     rows, level = [], settings.confidence
-    for first, *others in grouped(results.with_data, measures.scene):
+    for first, *others in kit.grouped(results.with_data, measures.scene):
         met, touching = (
             [
                 "–",
                 *map(
-                    markdown.p_value, holm([fisher_exact(count(first), count(c)) for c in others])
+                    markdown.p_value,
+                    kit.holm([kit.fisher_exact(count(first), count(c)) for c in others]),
                 ),
             ]
-            for count in (success, measures.refuted)
+            for count in (kit.success, measures.refuted)
         )
         for c, p_met, p_touching in zip((first, *others), met, touching, strict=True):
-            goal_met, refuted = success(c).with_interval(level), measures.refuted(c)
-            beyond = markdown.spread(spread(c.column("term_oversized_steps")))
+            goal_met, refuted = kit.success(c).with_interval(level), measures.refuted(c)
+            beyond = markdown.spread(kit.spread(c.column("term_oversized_steps")))
             told = goal_met, p_met, refuted.with_interval(level), p_touching, beyond
             rows.append((c.label, *told))
-    return Table("Shares of runs", SHARES, tuple(rows), NOTE)
+    return PAPER.table("shares", rows)
 
 
-def _floors(results: Results) -> tuple[Table, ...]:
+def _floors(results: kit.Results) -> tuple[kit.Table, ...]:
     """Return the distances at which searches stagnate, if no goal can be met."""
     if not _scopes(results):
         return ()
     rows = tuple(
         (
             c.label,
-            markdown.spread(spread(1e3 * measures.residuals(c))),
-            markdown.spread(spread(measures.cycles(c))),
+            markdown.spread(kit.spread(1e3 * measures.residuals(c))),
+            markdown.spread(kit.spread(measures.cycles(c))),
         )
         for c in results.main
     )
-    headers = ("condition", f"residual [1e−3 {results.main[0].condition.length_unit}]", "cycles")
-    return (Table("Residual floors", headers, rows, "Median [quartiles] over all runs."),)
+    return (PAPER.table("floors", rows, unit=results.main[0].condition.length_unit),)
 
 
-def _scopes(results: Results) -> tuple[Task, ...]:
+def _scopes(results: kit.Results) -> tuple[Task, ...]:
     """Return the tasks whose scopes differ and that never end by reaching the goal."""
     if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
         return ()
@@ -186,15 +108,13 @@ def _scopes(results: Results) -> tuple[Task, ...]:
 
 
 def _drawings(
-    results: Results, settings: ReportSettings, found: list[FirstComparison]
-) -> tuple[Drawing, ...]:
+    results: kit.Results, settings: kit.ReportSettings, found: list[FirstComparison]
+) -> tuple[kit.Drawing, ...]:
     """Return the figures that the settings in which conditions differ allow."""
     scopes, parents = _scopes(results), measures.tasks(results, "num_parents")
     drawn = [
-        Drawing(
+        PAPER.drawing(
             "floor",
-            "Residual floor",
-            FLOOR,
             partial(population_effort.floor_table, scopes),
             population_effort.draw_floor,
             tuple(c for task in scopes for c in task.conditions),
@@ -205,7 +125,7 @@ def _drawings(
         return (*drawn, _effort(parents, settings))
     shown = results.with_data
     if any(c.solved for c in shown):
-        counts = {"goal met": success, "of these: touch between postures": measures.refuted}
+        counts = {"goal met": kit.success, "of these: touch between postures": measures.refuted}
         rows = [
             (name, results.position(c.label), c.label, count(c))
             for name, count in counts.items()
@@ -214,7 +134,7 @@ def _drawings(
         caption = f"Wilson's {100 * settings.confidence:g} % intervals."
         drawn.append(sweep_figures.shares_drawing(results, settings, rows, caption))
     if not scopes:
-        values = {"evaluations to the goal": effort, "steps of the path to it": _steps}
+        values = {"evaluations to the goal": effort, "steps of the path to it": steps_to_goal}
         main = results._replace(conditions=results.main)
         boxes = sweep_figures.values_drawing(main, values)
         by_name = {name: rows for name, _, rows in found}
@@ -226,96 +146,84 @@ def _drawings(
     return tuple(drawn)
 
 
-def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
+def _effort(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Drawing:
     """Return the figure of success and effort by the number of parents."""
     levels = settings.confidence, settings.num_resamples
-    counts, efforts = {"goal met": success}, {"evaluations [-]": measures.evaluations}
-    return Drawing(
-        "effort",
-        "Success and effort against the number of parents",
-        "Left: share of runs that meet the goal; right: expected running time, failures counted; "
-        f"{100 * settings.confidence:g} % intervals. Dashed: {PRINTED_PARENTS:g}, which the paper "
-        "names typical.",
+    counts, efforts = {"goal met": kit.success}, {"evaluations [-]": measures.evaluations}
+    return PAPER.drawing(
+        "parents_effort",
         partial(population_effort.effort_table, found, counts, efforts, *levels),
         partial(population_effort.draw_effort, setting="parents μ [-]", marked=PRINTED_PARENTS),
         tuple(c for task in found for c in task.conditions),
+        level=100 * settings.confidence,
+        size=PRINTED_PARENTS,
     )
 
 
-def population_page(results: Results, settings: ReportSettings) -> Page:
+def population_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of sizes, or that of the tasks if no size differs."""
-    found = measures.tasks(results, SETTING) if planned_by(results, PostureEs) else ()
+    found = measures.tasks(results, SETTING) if kit.planned_by(results, PostureEs) else ()
     if not found:
         return whole_page.page(results, settings)
     sizes = {metric: population_claims.compare_sizes(found, metric, settings) for metric in METRICS}
     judge = judging.judge(results, settings, RULES)
-    return Page(
-        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
-        introduction=SIZES,
+    return PAPER.page(
+        results,
+        "sizes",
         quantities=whole_page.effort_quantities(results),
         tables=(_size_table(found, settings),),
         claims=population_claims.judge_study(judge, found, sizes, settings),
-        checks=SIZE_CHECKS,
+        checks=PAPER.checks("sizes"),
         drawings=_size_drawings(found, sizes, settings),
     )
 
 
-def _size_table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
+def _size_table(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Table:
     """Return success and expected running times with their intervals, a row per task and size."""
     level = settings.confidence
     rows = tuple(
         (
             task.name,
             f"{value:g}",
-            success(c).with_interval(level),
+            kit.success(c).with_interval(level),
             measures.refuted(c).with_interval(level),
             *(_expected(c, metric, settings) for metric in METRICS),
         )
         for task in found
         for value, c in task.by_value.items()
     )
-    note = (
-        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of "
-        f"{settings.num_resamples} resamples of seeds for expected running times; "
-        f"{sum(c.done for task in found for c in task.conditions)} runs."
-    )
-    names = (f"expected {metric}{SCALES[metric][1]}" for metric in METRICS)
-    headers = ("task", "λ", "goal met", "of these refuted", *names)
-    return Table("Success and expected running times", headers, rows, note)
+    runs = sum(c.done for task in found for c in task.conditions)
+    words = {"level": 100 * level, "resamples": settings.num_resamples, "runs": runs}
+    return PAPER.table("sizes", rows, **words)
 
 
-def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
+def _expected(condition: kit.ConditionResults, metric: str, settings: kit.ReportSettings) -> str:
     """Return the expected running time with its interval."""
     if not condition.solved:
         return "∞"
-    runs = METRICS[metric](condition), solved(condition)
-    interval = expected_interval(*runs, settings.confidence, settings.num_resamples)
+    runs = METRICS[metric](condition), kit.solved(condition)
+    interval = kit.expected_interval(*runs, settings.confidence, settings.num_resamples)
     expected, low, high = (
-        markdown.number(float(f"{SCALES[metric][0] * value:.3g}"))
-        for value in (expected_effort(*runs), *interval)
+        markdown.number(float(f"{SCALES[metric] * value:.3g}"))
+        for value in (kit.expected_effort(*runs), *interval)
     )
     return f"{expected} [{low}, {high}]"
 
 
 def _size_drawings(
-    found: tuple[Task, ...], sizes: dict[str, list[SizeComparison]], settings: ReportSettings
-) -> tuple[Drawing, ...]:
+    found: tuple[Task, ...], sizes: dict[str, list[SizeComparison]], settings: kit.ReportSettings
+) -> tuple[kit.Drawing, ...]:
     """Return the figures of effort, and of ratios where there are any."""
     level = f"{100 * settings.confidence:g} %"
     shown = tuple(c for task in found for c in task.conditions)
     units = (f"{metric} [{'s' if metric == 'CPU time' else '-'}]" for metric in METRICS)
     effort = dict(zip(units, METRICS.values(), strict=True))
-    shares = {"goal met": success, "of these: in contact between postures": measures.refuted}
+    shares = {"goal met": kit.success, "of these: in contact between postures": measures.refuted}
     levels = settings.confidence, settings.num_resamples
     names = [task.name for task in found]
     drawn = (
-        Drawing(
-            "effort",
-            "Success and effort against the size",
-            "a: share of runs that meet the goal; b: of these, the share whose path touches "
-            f"something between two postures; Wilson's {level} intervals. c–e: expected running "
-            f"times, {level} bootstrap intervals; sizes without a success have no point. Dashed: "
-            f"{RECOMMENDED:g}, which the paper recommends.",
+        PAPER.drawing(
+            "size_effort",
             partial(population_effort.effort_table, found, shares, effort, *levels),
             partial(
                 population_effort.draw_effort,
@@ -323,17 +231,15 @@ def _size_drawings(
                 marked=RECOMMENDED,
             ),
             shown,
+            level=level,
+            size=RECOMMENDED,
         ),
-        Drawing(
+        PAPER.drawing(
             "ratios",
-            f"Effort against that of {RECOMMENDED:g}",
-            f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on "
-            "common seeds, Bonferroni's over a panel. Above 1: worse. Dotted: as many more "
-            "cycles as there are fewer individuals; above it the increase is over-proportional. "
-            "Where one of the two never succeeds, there is no point.",
             partial(population_effort.ratios_table, sizes, names, RECOMMENDED),
             partial(population_effort.draw_ratios, setting="λ [-]"),
             shown,
+            size=RECOMMENDED,
         ),
     )
     return drawn if any(sizes.values()) else drawn[:1]

@@ -4,27 +4,18 @@ from collections.abc import Callable, Sequence
 
 from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.papers.curkovic.rules import RULES
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Judge,
-    ReportSettings,
-    Results,
-    judging,
-    markdown,
-    spread,
-)
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown
 
 MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
 READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetric"}
 
 
 def of_sweep(
-    results: Results, settings: ReportSettings, found: Sequence[FamilyComparison]
-) -> tuple[Claim, ...]:
+    results: kit.Results, settings: kit.ReportSettings, found: Sequence[FamilyComparison]
+) -> tuple[kit.Claim, ...]:
     """Return the claims that a sweep can judge, chosen by the settings that differ."""
-    claims_of: Callable[[Judge, Results, Sequence[FamilyComparison]], list[Claim]]
+    claims_of: Callable[[kit.Judge, kit.Results, Sequence[FamilyComparison]], list[kit.Claim]]
     varied = _varied(results)
     if varied == {"ga.hall_depth"}:
         claims_of = _depth
@@ -36,7 +27,7 @@ def of_sweep(
     return tuple(claims_of(judge, results, [one for one in found if one.measure.converges]))
 
 
-def _varied(results: Results) -> set[str]:
+def _varied(results: kit.Results) -> set[str]:
     """Return the settings of the planner in which conditions differ, `ga.…` among them."""
     given = [c.planner.canonical() for c in results.with_data]
     flat = [
@@ -45,11 +36,13 @@ def _varied(results: Results) -> set[str]:
     return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
 
 
-def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
+def _depth(
+    judge: kit.Judge, results: kit.Results, found: Sequence[FamilyComparison]
+) -> list[kit.Claim]:
     first, *others = results.with_data
     judged = []
     for one in found:
-        own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
+        own, *medians = (kit.spread(one.measure.values(c)).median for c in (first, *others))
         best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
         evidence = (
             f"median {markdown.number(own)}; best of the others {best.label}: "
@@ -60,7 +53,9 @@ def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) ->
     return judged
 
 
-def _mutation(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
+def _mutation(
+    judge: kit.Judge, results: kit.Results, found: Sequence[FamilyComparison]
+) -> list[kit.Claim]:
     judged = []
     for one in (one for one in found if one.rows):
         first = one.family.pairs[0][0]
@@ -75,7 +70,9 @@ def _mutation(judge: Judge, results: Results, found: Sequence[FamilyComparison])
     return judged
 
 
-def _outcomes(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
+def _outcomes(
+    first: kit.ConditionResults, rows: Sequence[kit.Comparison], significance: float
+) -> str:
     """List the conditions that the first is better than, worse than, or not told from."""
     words = {
         1: "is significantly better than",

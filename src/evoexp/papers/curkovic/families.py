@@ -4,61 +4,38 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from evoexp.papers.curkovic import measures
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    ReportSettings,
-    Results,
-    Values,
-    by_column,
-    compared,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import markdown
 
 
 class Family(NamedTuple):
-    """Conditions that are compared with each other.
+    """Conditions that are compared with each other."""
 
-    Attributes:
-        name: Of the first ones in the comparisons.
-        pairs: (first, other).
-    """
-
-    name: str
-    pairs: tuple[tuple[ConditionResults, ConditionResults], ...]
+    name: str  # of the first ones in the comparisons
+    pairs: tuple[tuple[kit.ConditionResults, kit.ConditionResults], ...]  # (first, other)
 
 
 class Measure(NamedTuple):
-    """A quantity that conditions are compared in; lower is better.
+    """A quantity that conditions are compared in; lower is better."""
 
-    Attributes:
-        name: With unit where it has one.
-        values: Of a condition, (done,).
-        converges: Whether it says how fast or how far a method converges; else it is about the
-            motions found.
-    """
-
-    name: str
-    values: Values
+    name: str  # with unit where it has one
+    values: kit.Values  # of a condition, (done,)
+    # whether it says how fast or how far a method converges; else it is about the motions
+    # found
     converges: bool = True
 
 
 class FamilyComparison(NamedTuple):
-    """A family compared in one quantity.
+    """A family compared in one quantity."""
 
-    Attributes:
-        measure: The quantity.
-        family: The conditions.
-        rows: One per pair that shares seeds, each named by its other condition; p-values are
-            adjusted over them.
-    """
-
-    measure: Measure
-    family: Family
-    rows: tuple[Comparison, ...]
+    measure: Measure  # the quantity
+    family: Family  # the conditions
+    # one per pair that shares seeds, each named by its other condition; p-values are adjusted
+    # over them
+    rows: tuple[kit.Comparison, ...]
 
 
-def families(results: Results) -> tuple[Family, ...]:
+def families(results: kit.Results) -> tuple[Family, ...]:
     """Return the families of a sweep.
 
     Conditions that differ in collision substeps are compared with their twins; if there are none,
@@ -80,31 +57,25 @@ def families(results: Results) -> tuple[Family, ...]:
 
 
 def tested(
-    results: Results, settings: ReportSettings, threshold: float
+    results: kit.Results, settings: kit.ReportSettings, threshold: float
 ) -> tuple[FamilyComparison, ...]:
-    """Return all comparisons of a sweep.
-
-    Args:
-        results: Of the sweep.
-        settings: Levels and resamples.
-        threshold: Cost that "generations to a team" means.
-    """
+    """Return all comparisons of a sweep."""
     return tuple(
-        FamilyComparison(one, family, compared(family.pairs, one.values, settings))
+        FamilyComparison(one, family, kit.compared(family.pairs, one.values, settings))
         for one in _measures(results, threshold)
         for family in families(results)
     )
 
 
-def curved(results: Results) -> bool:
+def curved(results: kit.Results) -> bool:
     """Return whether any motion is executed as a curve."""
     return any(c.planner.interpolation == "cubic" for c in results.with_data)
 
 
-def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
+def _measures(results: kit.Results, threshold: float) -> tuple[Measure, ...]:
     to = f"to a team of cost ≤ {markdown.number(threshold)}"
     found = [
-        Measure("best cost", by_column("best_cost")),
+        Measure("best cost", kit.by_column("best_cost")),
         Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
         Measure(measures.CERTIFIED, measures.certified_cost),
     ]
@@ -124,10 +95,10 @@ def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
     return tuple(found)
 
 
-def _substeps(condition: ConditionResults) -> int:
+def _substeps(condition: kit.ConditionResults) -> int:
     return int(condition.planner.collision.collision_substeps)
 
 
-def _without_substeps(condition: ConditionResults) -> str:
+def _without_substeps(condition: kit.ConditionResults) -> str:
     planner: dict[str, Any] = condition.planner.canonical()
     return repr(planner | {"collision": planner["collision"] | {"collision_substeps": None}})

@@ -9,32 +9,10 @@ import pandas as pd
 from evoexp.papers.curkovic import hall_shares, measures, sweep_page
 from evoexp.papers.curkovic.figures import elitism_shares
 from evoexp.papers.curkovic.hall_shares import EFFORT, Corner, Measure, Share
-from evoexp.papers.curkovic.rules import RULES
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Judge,
-    Page,
-    ReportSettings,
-    Results,
-    Table,
-    Values,
-    by_column,
-    compared,
-    judging,
-    markdown,
-)
+from evoexp.papers.curkovic.rules import PAPER, RULES
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown
 
-INTRODUCTION = (
-    "Method V with neither hall nor elites, with elites of each population instead of the hall, "
-    "and with the hall, under both readings of Eq. 9 and two mutation rates; all share their "
-    "seeds. A hall of distinct genomes counts copies of an individual as one, and offers its "
-    "members again; a hall of distinct indices does neither (the paper is silent). The cost of a "
-    "team is C2 + C3 + C4 summed over the robots, free of collision at the configurations, lower "
-    "is better; the exact verdict judges the motion between them, too."
-)
 NOTE = (
     "The gain of the hall is the quantity without hall and elites less that with the hall; the "
     "share is the gain by elites over it, with its bootstrap interval over the seeds: 100 % means "
@@ -44,7 +22,7 @@ NOTE = (
 )
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the hall, or that of a sweep if conditions for the question are missing."""
     corners = hall_shares.corners(results.with_data) if measures.fits(results) else ()
     base = sweep_page.page(results, settings)
@@ -61,18 +39,17 @@ def page(results: Results, settings: ReportSettings) -> Page:
         for elites in corner.elites
         for hall in _halls(corner)
     }
-    drawing = Drawing(
+    drawing = PAPER.drawing(
         "elitism",
-        "What elitism explains of the hall's gain",
-        "Share of the gain by a hall of distinct genomes that elites have without a hall, with its "
-        f"{100 * settings.confidence:g} % bootstrap interval over the seeds; dashed: all of it. "
-        "Arrows: further out.",
         partial(_drawn, corners, gained, shared),
         elitism_shares.draw_shares,
         results.with_data,
+        level=100 * settings.confidence,
     )
-    return base._replace(
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "hall",
+        base,
         claims=_claims(results, settings, corners, threshold, shared, gained),
         tables=(_table(corners, gained, shared), *base.tables),
         comparisons=_comparisons(settings, corners, threshold, gained),
@@ -83,24 +60,27 @@ def page(results: Results, settings: ReportSettings) -> Page:
 Shared = dict[tuple[str, str, str, str], Share]
 
 
-def _halls(corner: Corner) -> tuple[ConditionResults, ...]:
+def _halls(corner: Corner) -> tuple[kit.ConditionResults, ...]:
     return (corner.hall,) if corner.by_index is None else (corner.hall, corner.by_index)
 
 
 def _comparisons(
-    settings: ReportSettings, corners: Sequence[Corner], threshold: float, gained: Sequence[Measure]
-) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    settings: kit.ReportSettings,
+    corners: Sequence[Corner],
+    threshold: float,
+    gained: Sequence[Measure],
+) -> tuple[tuple[str, tuple[kit.Comparison, ...]], ...]:
     """Compare the hall of distinct genomes with all else of its reading and rate."""
     found = []
     for name, values, _ in judged_by(threshold, gained):
         for corner in corners:
             others = (corner.nothing, *corner.elites, *_halls(corner)[1:], *corner.others)
-            rows = compared([(corner.hall, other) for other in others], values, settings)
+            rows = kit.compared([(corner.hall, other) for other in others], values, settings)
             found.append((f"{name}: {corner.hall.label} against …", rows))
     return tuple(found)
 
 
-def _value(measure: Measure, condition: ConditionResults) -> str:
+def _value(measure: Measure, condition: kit.ConditionResults) -> str:
     found = hall_shares.of_all_runs(measure, condition)
     return markdown.number(float(np.rint(np.exp(found))) if measure.short == EFFORT else found)
 
@@ -114,7 +94,7 @@ def _told(share: Share) -> str:
     return text
 
 
-def _table(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared) -> Table:
+def _table(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared) -> kit.Table:
     """Return the table of quantities, of shares by elitism, and of the runs behind them."""
     rows = []
     for corner in corners:
@@ -151,7 +131,7 @@ def _table(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared)
         f"n (nothing, {elites[-1]}, hall)",
     )
     note = f"{NOTE} Effort: gains are differences of logarithms, since efforts differ by factors."
-    return Table("What elitism explains of the hall's gain", headers, tuple(rows), note)
+    return kit.Table("What elitism explains of the hall's gain", headers, tuple(rows), note)
 
 
 def _drawn(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared) -> pd.DataFrame:
@@ -167,14 +147,14 @@ def _drawn(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared)
 
 
 def _claims(
-    results: Results,
-    settings: ReportSettings,
+    results: kit.Results,
+    settings: kit.ReportSettings,
     corners: Sequence[Corner],
     threshold: float,
     shared: Shared,
     gained: Sequence[Measure],
-) -> tuple[Claim, ...]:
-    judge, found = judging.judge(results, settings, RULES), list[Claim]()
+) -> tuple[kit.Claim, ...]:
+    judge, found = judging.judge(results, settings, RULES), list[kit.Claim]()
     for name, values, measure in judged_by(threshold, gained):
         for corner in corners:
             shares = []
@@ -188,39 +168,30 @@ def _claims(
 
 def judged_by(
     threshold: float, gained: Sequence[Measure]
-) -> tuple[tuple[str, Values, Measure], ...]:
+) -> tuple[tuple[str, kit.Values, Measure], ...]:
     """Return name and values of the quantities that claims are judged by, and their gains."""
     effort = partial(measures.evaluations_to, threshold=threshold)
     to = f"evaluations to a team of cost ≤ {markdown.number(threshold)}"
     return (
-        ("best cost", by_column("best_cost"), gained[0]),
+        ("best cost", kit.by_column("best_cost"), gained[0]),
         (to, effort, gained[1]),
         (measures.CERTIFIED, measures.certified_cost, gained[2]),
     )
 
 
 def of_corner(
-    judge: Judge,
-    settings: ReportSettings,
+    judge: kit.Judge,
+    settings: kit.ReportSettings,
     corner: Corner,
     name: str,
-    values: Values,
+    values: kit.Values,
     shares: str,
-) -> list[Claim]:
-    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity.
-
-    Args:
-        judge: Of the paper's claims.
-        settings: Levels and resamples.
-        corner: The conditions.
-        name: Of the quantity.
-        values: Of a condition, (done,).
-        shares: What elites explain of the hall's gain, in words.
-    """
+) -> list[kit.Claim]:
+    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
     who, hall = f"{corner.name}: ", corner.hall
     elites = " and than ".join(c.label.rpartition(", ")[2] for c in corner.elites)
-    over_nothing = compared([(hall, corner.nothing)], values, settings)
-    over_elites = compared([(hall, c) for c in corner.elites], values, settings)
+    over_nothing = kit.compared([(hall, corner.nothing)], values, settings)
+    over_elites = kit.compared([(hall, c) for c in corner.elites], values, settings)
     told = "; ".join(
         f"against {row.quantity} {judging.evidence(row, 'lower')}" for row in over_elites
     )
@@ -233,10 +204,10 @@ def of_corner(
         ),
     ]
     if corner.by_index is not None:
-        row = next(iter(compared([(hall, corner.by_index)], values, settings)), None)
+        row = next(iter(kit.compared([(hall, corner.by_index)], values, settings)), None)
         found.append(judge.on("distinct_genomes", who=who, measure=name).better(row, "lower"))
     for other in corner.others:
         if other.planner.ga.hall_frozen:
-            row = next(iter(compared([(hall, other)], values, settings)), None)
+            row = next(iter(kit.compared([(hall, other)], values, settings)), None)
             found.append(judge.on("frozen_hall", who=who, measure=name).better(row, "lower"))
     return found

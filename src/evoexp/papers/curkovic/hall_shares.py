@@ -7,72 +7,45 @@ import numpy as np
 
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    BOOTSTRAP_SEED,
-    ConditionResults,
-    Interval,
-    ReportSettings,
-    grouped,
-    quantile,
-)
+from evoexp.report import kit
 
 EFFORT = "effort (logarithm)"
-Statistic = Callable[[ConditionResults, np.ndarray], FloatArray]
+Statistic = Callable[[kit.ConditionResults, np.ndarray], FloatArray]
 
 
 class Corner(NamedTuple):
-    """A reading of Eq. 9 with a mutation rate, and what may keep good individuals.
+    """A reading of Eq. 9 with a mutation rate, and what may keep good individuals."""
 
-    Attributes:
-        name: "one-sided, Eq. 10".
-        nothing: Neither hall nor elites.
-        elites: With elites instead of a hall, by growing number.
-        hall: With a hall of distinct genomes.
-        by_index: With a hall of distinct indices; None: not run.
-        others: Other halls: those that forget, or never change.
-    """
-
-    name: str
-    nothing: ConditionResults
-    elites: tuple[ConditionResults, ...]
-    hall: ConditionResults
-    by_index: ConditionResults | None
-    others: tuple[ConditionResults, ...]
+    name: str  # "one-sided, Eq. 10"
+    nothing: kit.ConditionResults  # neither hall nor elites
+    elites: tuple[kit.ConditionResults, ...]  # with elites instead of a hall, by growing number
+    hall: kit.ConditionResults  # with a hall of distinct genomes
+    by_index: kit.ConditionResults | None  # with a hall of distinct indices; None: not run
+    others: tuple[kit.ConditionResults, ...]  # other halls: those that forget, or never change
 
 
 class Measure(NamedTuple):
-    """A quantity whose gain is shared out.
+    """A quantity whose gain is shared out."""
 
-    Attributes:
-        name: With unit where it has one.
-        short: The same in a few words.
-        statistic: (condition, (resamples, runs) numbers of runs) → its value, (resamples,).
-        runs: The number of runs that count.
-    """
-
-    name: str
-    short: str
-    statistic: Statistic
-    runs: Callable[[ConditionResults], int]
+    name: str  # with unit where it has one
+    short: str  # the same in a few words
+    statistic: Statistic  # (condition, (resamples, runs) numbers of runs) → its value, (resamples,)
+    runs: Callable[[kit.ConditionResults], int]  # the number of runs that count
 
 
 class Share(NamedTuple):
-    """The share of a hall's gain that elites have, too.
+    """The share of a hall's gain that elites have, too."""
 
-    Attributes:
-        value: (nothing − elites) / (nothing − hall); NaN where the hall gains nothing.
-        interval: Over resampled seeds; NaN where the hall's gain cannot be told from none.
-        n: Runs of nothing, elites and hall that count.
-    """
-
-    value: float
-    interval: Interval
-    n: tuple[int, int, int]
+    value: float  # (nothing − elites) / (nothing − hall); NaN where the hall gains nothing
+    interval: (
+        kit.Interval
+    )  # over resampled seeds; NaN where the hall's gain cannot be told from none
+    n: tuple[int, int, int]  # runs of nothing, elites and hall that count
 
 
-def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
+def corners(conditions: Sequence[kit.ConditionResults]) -> tuple[Corner, ...]:
     """Group conditions that differ in hall and elites only; groups that lack one are left out."""
-    found = grouped(
+    found = kit.grouped(
         conditions,
         lambda c: [
             getattr(c.planner.ga, name)
@@ -85,9 +58,9 @@ def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
 def share(
     corner: Corner,
     measure: Measure,
-    elites: ConditionResults,
-    hall: ConditionResults,
-    settings: ReportSettings,
+    elites: kit.ConditionResults,
+    hall: kit.ConditionResults,
+    settings: kit.ReportSettings,
 ) -> Share:
     """Return the share of a hall's gain that elites have, too.
 
@@ -97,25 +70,25 @@ def share(
     three = (corner.nothing, elites, hall)
     values = [of_all_runs(measure, c) for c in three]
     n = tuple(measure.runs(c) for c in three)
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+    rng = np.random.Generator(np.random.PCG64(kit.BOOTSTRAP_SEED))
     count = min(c.done for c in three)
     draws = rng.integers(0, count, (settings.num_resamples, count))
     nothing, some, full = (measure.statistic(c, draws) for c in three)
     gains = full < nothing
     tail = 0.5 * (1.0 - settings.confidence)
-    interval = Interval(np.nan, np.nan)
+    interval = kit.Interval(np.nan, np.nan)
     if np.mean(~gains) <= tail:
         shares = _shares(nothing[gains], some[gains], full[gains])
-        interval = Interval(quantile(shares, tail), quantile(shares, 1.0 - tail))
+        interval = kit.Interval(kit.quantile(shares, tail), kit.quantile(shares, 1.0 - tail))
     one = np.array(values)[:, None]
     value = float(_shares(*one)[0]) if values[2] < values[0] else np.nan
     return Share(value, interval, (n[0], n[1], n[2]))
 
 
-def medians(column: Callable[[ConditionResults], FloatArray]) -> Statistic:
+def medians(column: Callable[[kit.ConditionResults], FloatArray]) -> Statistic:
     """Return the statistic "median of a column"; NaN is left out, inf is a value."""
 
-    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
+    def statistic(condition: kit.ConditionResults, draws: np.ndarray) -> FloatArray:
         drawn = column(condition)[draws]
         found, known = np.full(len(drawn), np.nan), ~np.isnan(drawn).all(axis=1)
         found[known] = np.nanmedian(drawn[known], axis=1)
@@ -127,7 +100,7 @@ def medians(column: Callable[[ConditionResults], FloatArray]) -> Statistic:
 def log_effort(threshold: float) -> Statistic:
     """Return the statistic "logarithm of the expected running time to a team of that cost"."""
 
-    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
+    def statistic(condition: kit.ConditionResults, draws: np.ndarray) -> FloatArray:
         first = measures.evaluations_to(condition, threshold)
         reached = np.isfinite(first)
         spent = np.where(reached, first, condition.column("evaluations"))
@@ -140,12 +113,7 @@ def log_effort(threshold: float) -> Statistic:
 
 
 def gain_measures(threshold: float, told: str) -> tuple[Measure, ...]:
-    """Return the quantities in which gains are shared out.
-
-    Args:
-        threshold: Cost that counts as reached.
-        told: The same in words.
-    """
+    """Return the quantities in which gains are shared out."""
     return (
         Measure(
             "best cost", "best cost", medians(lambda c: c.column("best_cost")), lambda c: c.done
@@ -171,13 +139,13 @@ def gain_measures(threshold: float, told: str) -> tuple[Measure, ...]:
     )
 
 
-def not_refuted(condition: ConditionResults) -> FloatArray:
+def not_refuted(condition: kit.ConditionResults) -> FloatArray:
     """Return each run's best cost, (done,); NaN where its motion is refuted."""
     found = measures.certified_cost(condition)
     return np.where(np.isfinite(found), found, np.nan)
 
 
-def _corner(own: Sequence[ConditionResults]) -> Corner | None:
+def _corner(own: Sequence[kit.ConditionResults]) -> Corner | None:
     plain = [c for c in own if not c.planner.ga.hall_depth]
     halls = [c for c in own if c.planner.ga.hall_depth]
     nothing = [c for c in plain if not c.planner.ga.num_elites]
@@ -195,7 +163,7 @@ def _corner(own: Sequence[ConditionResults]) -> Corner | None:
     return Corner(name, nothing[0], tuple(elites), genomes[0], by_index, others)
 
 
-def of_all_runs(measure: Measure, condition: ConditionResults) -> float:
+def of_all_runs(measure: Measure, condition: kit.ConditionResults) -> float:
     """Return a quantity over all runs of a condition."""
     return float(measure.statistic(condition, np.arange(condition.done)[None, :])[0])
 

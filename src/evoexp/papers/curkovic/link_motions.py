@@ -13,16 +13,11 @@ from evoexp.report.kit import motion_geometry, wrapped
 
 
 class SampledMotion(NamedTuple):
-    """A motion at many instants.
+    """A motion at many instants."""
 
-    Attributes:
-        instants: (samples,), whole numbers are the configurations.
-        links: (samples, robots, 2) absolute link angles from +x [deg].
-        speeds: (samples, robots, 2) their turns per instant, at the right of each instant [deg].
-    """
-
-    instants: FloatArray
-    links: FloatArray
+    instants: FloatArray  # (samples,), whole numbers are the configurations
+    links: FloatArray  # (samples, robots, 2) absolute link angles from +x [deg]
+    # (samples, robots, 2) their turns per instant, at the right of each instant [deg]
     speeds: FloatArray
 
     @property
@@ -60,12 +55,7 @@ def executed(prepared: Prepared, solution: FloatArray) -> Motion:
 
 
 def sampled(motion: Motion, samples: int) -> SampledMotion:
-    """Sample a motion in absolute link angles.
-
-    Args:
-        motion: Of `executed`.
-        samples: Per segment.
-    """
+    """Sample a motion in absolute link angles."""
     segments = motion.num_segments
     instants = np.arange(segments * samples + 1) / samples
     before = np.minimum(instants.astype(np.int64), segments - 1)

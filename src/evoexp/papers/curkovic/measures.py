@@ -7,20 +7,8 @@ import numpy as np
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    ConditionResults,
-    Proportion,
-    Quantity,
-    Results,
-    by_column,
-    counted,
-    expected_effort,
-    generic,
-    markdown,
-    quantile,
-    search_seconds,
-    solved,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 REFUTED = "collides between its configurations (exact verdict)"
@@ -31,13 +19,13 @@ CERTIFIED = "best cost, a refuted motion counting as worse than any"
 BOUND = "Lower bound of a team's cost: straight end-effector paths, least turns of the links"
 
 
-def fits(results: Results) -> bool:
+def fits(results: kit.Results) -> bool:
     """Return whether there are results, and all of co-evolving robots."""
     problems = [c.prepared.problem for c in results.with_data]
     return bool(problems) and all(isinstance(problem, Problem) for problem in problems)
 
 
-def lower_bound(condition: ConditionResults) -> float:
+def lower_bound(condition: kit.ConditionResults) -> float:
     """Return a lower bound of a team's cost: straight paths, least turns, no unevenness."""
     problem, objective = condition.problem(Problem), condition.planner.objective
     arms, total = link_motions.arms(condition.prepared), 0.0
@@ -49,30 +37,30 @@ def lower_bound(condition: ConditionResults) -> float:
     return total
 
 
-def generations_to(condition: ConditionResults, threshold: float) -> FloatArray:
+def generations_to(condition: kit.ConditionResults, threshold: float) -> FloatArray:
     """Return each run's first generation with a team at or below a cost, (done,); inf: none."""
     return _first(condition, threshold, "index")
 
 
-def evaluations_to(condition: ConditionResults, threshold: float) -> FloatArray:
+def evaluations_to(condition: kit.ConditionResults, threshold: float) -> FloatArray:
     """Return each run's evaluations to a team at or below a cost, (done,); inf: none."""
     return _first(condition, threshold, "evaluations")
 
 
-def expected_evaluations(condition: ConditionResults, threshold: float) -> float:
+def expected_evaluations(condition: kit.ConditionResults, threshold: float) -> float:
     """Return the expected running time to a team at or below a cost, in evaluations."""
     first = evaluations_to(condition, threshold)
     reached = np.isfinite(first)
-    return expected_effort(np.where(reached, first, condition.column("evaluations")), reached)
+    return kit.expected_effort(np.where(reached, first, condition.column("evaluations")), reached)
 
 
-def expected_seconds(condition: ConditionResults, threshold: float) -> float:
+def expected_seconds(condition: kit.ConditionResults, threshold: float) -> float:
     """Return the expected running time in seconds, at the median run's price of an evaluation."""
-    price = quantile(search_seconds(condition) / condition.column("evaluations"), 0.5)
+    price = kit.quantile(kit.search_seconds(condition) / condition.column("evaluations"), 0.5)
     return expected_evaluations(condition, threshold) * price
 
 
-def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
+def effort_quantities(results: kit.Results, threshold: float) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results about the effort to a team at or below a cost."""
     row, to = partial(generic.quantity, results), f"team of cost ≤ {markdown.number(threshold)}"
     expected = f"to a {to}, failures included (expected running time)"
@@ -90,14 +78,10 @@ def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...
     )
 
 
-def team_quantities(results: Results, threshold: float, *more: Quantity) -> tuple[Quantity, ...]:
-    """Return the rows of the table of results that methods and sweeps share.
-
-    Args:
-        results: With data.
-        threshold: Cost that counts as reached.
-        more: Rows that follow the clearance.
-    """
+def team_quantities(
+    results: kit.Results, threshold: float, *more: kit.Quantity
+) -> tuple[kit.Quantity, ...]:
+    """Return the rows of the table of results that methods and sweeps share."""
     row = partial(generic.quantity, results)
     cost, _, *effort = generic.quantities(results)
     return (
@@ -106,31 +90,31 @@ def team_quantities(results: Results, threshold: float, *more: Quantity) -> tupl
         clearance_quantity(results),
         *more,
         *effort,
-        row("CPU time of a run", "s", by_column("cpu_s")),
+        row("CPU time of a run", "s", kit.by_column("cpu_s")),
     )
 
 
-def clearance_quantity(results: Results) -> Quantity:
+def clearance_quantity(results: kit.Results) -> kit.Quantity:
     """Return the row of the exact clearance."""
     name, unit = "clearance of the bodies over the whole motion (exact)", results.with_data[0]
-    return generic.quantity(results, name, unit.condition.length_unit, by_column("clearance"))
+    return generic.quantity(results, name, unit.condition.length_unit, kit.by_column("clearance"))
 
 
-def refuted(condition: ConditionResults) -> FloatArray:
+def refuted(condition: kit.ConditionResults) -> FloatArray:
     """Return 1 for each run whose solved motion the exact verdict refutes, else 0, (done,).
 
     NaN where nothing is solved.
     """
     found = condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=np.float64)
-    return np.where(solved(condition), found, np.nan)
+    return np.where(kit.solved(condition), found, np.nan)
 
 
-def certified_cost(condition: ConditionResults) -> FloatArray:
+def certified_cost(condition: kit.ConditionResults) -> FloatArray:
     """Return each run's best cost, (done,); inf where the exact verdict refutes its motion."""
     return np.where(refuted(condition) == 1.0, np.inf, condition.column("best_cost"))
 
 
-def exemplar(condition: ConditionResults) -> int:
+def exemplar(condition: kit.ConditionResults) -> int:
     """Return the replicate of lowest cost that is not refuted; if all are, of lowest cost."""
     costs = certified_cost(condition)
     if not np.isfinite(costs).any():
@@ -138,7 +122,7 @@ def exemplar(condition: ConditionResults) -> int:
     return int(condition.summaries.index[int(np.argmin(costs))])
 
 
-def rates(condition: ConditionResults) -> dict[str, Proportion]:
+def rates(condition: kit.ConditionResults) -> dict[str, kit.Proportion]:
     """Count the solved motions that have each of the known defects."""
     columns = [str(name) for name in condition.summaries if "term_out_of_range" in str(name)]
     beyond = [np.zeros(condition.done), *(condition.column(name) for name in columns)]
@@ -147,24 +131,24 @@ def rates(condition: ConditionResults) -> dict[str, Proportion]:
         LEAVES: np.max(beyond, axis=0) > ROUNDING,
         TOO_FAST: times_over_limit(condition) > 1.0,
     }
-    return {name: counted(has[solved(condition)]) for name, has in found.items()}
+    return {name: kit.counted(has[kit.solved(condition)]) for name, has in found.items()}
 
 
-def times_over_limit(condition: ConditionResults) -> FloatArray:
+def times_over_limit(condition: kit.ConditionResults) -> FloatArray:
     """Return each run's greatest speed of a link over its limit by Eq. 2, (done,) [-]."""
     prepared = condition.prepared
     solutions = [condition.solutions[int(k)] for k in condition.summaries.index]
     return np.array([link_motions.times_over_limit(prepared, solution) for solution in solutions])
 
 
-def rates_check(results: Results, defect: str) -> tuple[str, str]:
+def rates_check(results: kit.Results, defect: str) -> tuple[str, str]:
     """Return a check of one defect in all conditions: "I: 9 of 20; II: …"."""
     found = ((c.label, rates(c)[defect]) for c in results.with_data)
     told = "; ".join(f"{label}: {markdown.share(*rate)}" for label, rate in found)
     return f"Solved motions that fail: {defect}", told
 
 
-def _first(condition: ConditionResults, threshold: float, column: str) -> FloatArray:
+def _first(condition: kit.ConditionResults, threshold: float, column: str) -> FloatArray:
     rows = condition.generations
     first = rows[rows["best_cost"] <= threshold].groupby("replicate")[column].min()
     return first.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.papers.curkovic import link_motions, measures
 from evoexp.papers.curkovic.figures import (
     body_distances,
@@ -12,35 +13,17 @@ from evoexp.papers.curkovic.figures import (
     link_intersection,
     robot_motions,
 )
-from evoexp.papers.curkovic.rules import RULES
+from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    ReportSettings,
-    Results,
-    compared,
-    generic,
-    judging,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown
 
-INTRODUCTION = (
-    "Link angles are absolute, from the positive x-axis; one instant is one sampling step from a "
-    "configuration to the next. The search looks for collisions at the configurations (and at "
-    "collision substeps between them, where a condition has them); the exact verdict judges the "
-    "executed curve, straight or cubic between configurations."
-)
 SAMPLES = 20  # per segment, where the distance of end-effectors from other robots is measured
 KEPT = "least distance of an end-effector from another robot's links"
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of motions, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -49,9 +32,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
     tools = _tools(results, settings)
     speed = "greatest speed of a link over what Eq. 2 allows"
     kept = generic.quantity(results, f"{KEPT}, its centre line", unit, tool_distance)
-    return base._replace(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "motion",
+        base,
         quantities=(
             base.quantities[0]._replace(name="best cost of a collision-free team"),
             measures.clearance_quantity(results),
@@ -69,7 +53,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def tool_distance(condition: ConditionResults) -> FloatArray:
+def tool_distance(condition: kit.ConditionResults) -> FloatArray:
     """Return how near any end-effector comes to a link of another robot, (done,) [length unit].
 
     Links and end-effectors have no thickness here.
@@ -100,22 +84,22 @@ def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
     return float(np.sqrt(((points - start - share[:, None] * along) ** 2).sum(axis=1)).min())
 
 
-def _by_radius(results: Results) -> dict[int, list[ConditionResults]]:
+def _by_radius(results: kit.Results) -> dict[int, list[kit.ConditionResults]]:
     """Return collision substeps → conditions by growing radius; nothing if no radius differs."""
-    found: dict[int, list[ConditionResults]] = {}
+    found: dict[int, list[kit.ConditionResults]] = {}
     for c in sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius)):
         found.setdefault(c.planner.collision.collision_substeps, []).append(c)
     several = len({c.planner.collision.tcp_radius for c in results.main}) > 1
     return found if several else {}
 
 
-def _tools(results: Results, settings: ReportSettings) -> tuple[Comparison, ...]:
+def _tools(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Comparison, ...]:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
     pairs = [(own[-1], own[0]) for own in _by_radius(results).values() if len(own) > 1]
-    return compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
+    return kit.compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
 
 
-def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:
+def _pair(largest: kit.ConditionResults, smallest: kit.ConditionResults) -> str:
     """Name the comparison of two radii."""
     substeps = largest.planner.collision.collision_substeps
     tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
@@ -123,12 +107,12 @@ def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:
 
 
 def _claims(
-    results: Results, settings: ReportSettings, tools: tuple[Comparison, ...]
-) -> tuple[Claim, ...]:
-    judge, found = judging.judge(results, settings, RULES), list[Claim]()
+    results: kit.Results, settings: kit.ReportSettings, tools: tuple[kit.Comparison, ...]
+) -> tuple[kit.Claim, ...]:
+    judge, found = judging.judge(results, settings, RULES), list[kit.Claim]()
     for c in results.main:
         scene, where = _scene_claim(c)
-        certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
+        certified = run_values.certified(c).having
         for who, holds, judged in (
             ("the paper's model", c.solved, c.done),
             ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
@@ -142,7 +126,7 @@ def _claims(
     return tuple(found)
 
 
-def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
+def _scene_claim(condition: kit.ConditionResults) -> tuple[str, str]:
     """Return the claim that the paper makes of a scene, and its source."""
     problem = condition.problem(Problem)
     if len(problem.start) > 2:
@@ -156,13 +140,13 @@ def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
     return "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
 
 
-def _enveloped(condition: ConditionResults) -> bool:
+def _enveloped(condition: kit.ConditionResults) -> bool:
     """Return whether the search tests more of the robots than their lines."""
     collision = condition.planner.collision
     return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
 
 
-def _checks(results: Results) -> tuple[tuple[str, str], ...]:
+def _checks(results: kit.Results) -> tuple[tuple[str, str], ...]:
     first = results.with_data[0]
     checks = [measures.rates_check(results, defect) for defect in measures.DEFECTS]
     if _enveloped(first):
@@ -177,17 +161,13 @@ def _checks(results: Results) -> tuple[tuple[str, str], ...]:
     return (*checks, *(("Length of the chromosome (Eqs. 2, 3)", note) for note in notes))
 
 
-def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
+def _drawings(results: kit.Results, settings: kit.ReportSettings) -> list[kit.Drawing]:
     first, drawn = results.main[0], []
     problem = first.problem(Problem)
     if len(problem.start) == 2 and not _enveloped(first) and problem.moving.all():
         drawn.append(
-            Drawing(
+            PAPER.drawing(
                 "fig_7_intersection",
-                "Fig. 7: the intersection of the top links",
-                "The paper defines the vectors and the parameters μ and ν (Eqs. 11, 12). Here: "
-                "both robots on the straight line from start to goal in link angles, where their "
-                "top links cross best.",
                 partial(link_intersection.intersection_table, first),
                 link_intersection.draw_intersection,
                 (first,),
@@ -198,13 +178,8 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
     if radii := _by_radius(results):
         shown = tuple(c for conditions in radii.values() for c in conditions)
         drawn.append(
-            Drawing(
+            PAPER.drawing(
                 "fig_11_safety",
-                "Fig. 11: the safety factor of the end-effector",
-                "The paper shows three trajectories, which move away from the other robot by "
-                "various amounts. Here: end-effectors of each condition's cheapest motion that the "
-                "exact verdict does not refute (dashed: all are refuted), with a circle of its "
-                "radius at each configuration.",
                 partial(robot_motions.tools_table, shown),
                 robot_motions.draw_tools,
                 shown,
@@ -212,12 +187,8 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
         )
     shown = results.main
     drawn.append(
-        Drawing(
+        PAPER.drawing(
             "distances",
-            "Least distance of bodies along the motions",
-            "Of links (and tools) of different robots, and of robots from obstacles; at the "
-            "configurations, where the paper looks, and between them. Sampled; the counts are "
-            "the exact verdict's.",
             partial(body_distances.distances_table, shown, settings.samples_per_segment),
             body_distances.draw_distances,
             shown,
@@ -226,38 +197,26 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
     return drawn
 
 
-def _of_condition(results: Results, condition: ConditionResults, suffix: str) -> list[Drawing]:
+def _of_condition(
+    results: kit.Results, condition: kit.ConditionResults, suffix: str
+) -> list[kit.Drawing]:
     problem = condition.problem(Problem)
-    name = f" ({condition.label})" if suffix else ""
     if not problem.moving.all():
         number, title = "10", "Fig. 10: one robot stands still"
     elif len(problem.start) > 2 or _by_radius(results):
         number, title = "", f"Motion of {len(problem.start)} robots"
     else:
         number, title = "8", "Fig. 8: motion of the two robots"
+    best = (kit.PlayedRun(condition, condition.best_replicate),)
+    motion = {"stem": f"fig_{number}_motion" if number else "motion", "title": title}
+    joints = {"stem": "fig_9_joints", "what": "Fig. 9: link"}
+    if number != "8":
+        joints = {"stem": "joints", "what": "Link"}
+    table, draw = partial(robot_motions.motion_table, condition), robot_motions.draw_motion
+    angles = partial(joint_values.joints_table, condition)
     return [
-        Drawing(
-            f"fig_{number}_motion{suffix}" if number else f"motion{suffix}",
-            f"{title}{name}",
-            "As the paper draws it: trail of the arms, end-effectors as points, a circle at the "
-            "start, a cross at the goal. a) best replicate (lowest cost); thin lines: postures "
-            "at equal times, boundaries of links and circles of tools at the configurations. b) "
-            "end-effectors of all replicates. Dark red crosses: where bodies first touch in the "
-            "motions that the exact verdict refutes.",
-            partial(robot_motions.motion_table, condition),
-            robot_motions.draw_motion,
-            (condition,),
-            (PlayedRun(condition, condition.best_replicate),),
-        ),
-        Drawing(
-            f"fig_9_joints{suffix}" if number == "8" else f"joints{suffix}",
-            f"{'Fig. 9: link' if number == '8' else 'Link'} angles and their speeds{name}",
-            "The paper interpolates the configurations by a polynomial of the third order and "
-            "asks for a check of its gradient. Here: best replicate; b) turns per sampling step; "
-            "dotted: limits by Eq. 2's formula (the angles that the paper states beside it are "
-            "twice as large).",
-            partial(joint_values.joints_table, condition),
-            joint_values.draw_joints,
-            (condition,),
+        PAPER.drawing("motion", table, draw, (condition,), best, suffix, **motion),
+        PAPER.drawing(
+            "joints", angles, joint_values.draw_joints, (condition,), (), suffix, **joints
         ),
     ]

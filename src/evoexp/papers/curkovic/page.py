@@ -5,36 +5,15 @@ from functools import partial
 import numpy as np
 
 from evoexp.papers.curkovic import measures
-from evoexp.papers.curkovic.figures import cost_boxes, methods
-from evoexp.papers.curkovic.rules import RULES
-from evoexp.report.kit import (
-    Comparison,
-    Drawing,
-    Page,
-    ReportSettings,
-    Results,
-    by_column,
-    compared,
-    generic,
-    judging,
-    markdown,
-    verdicts,
-)
+from evoexp.papers.curkovic.figures import methods
+from evoexp.papers.curkovic.rules import PAPER, RULES
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown, verdicts
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
-INTRODUCTION = (
-    "One population of paths per robot; a path's cost is C1 + C2 + C3 + C4, where C1 counts "
-    "collisions with all paths of the other populations. The answer is a team: one path per "
-    "robot, free of collision with each other; its cost is C2 + C3 + C4 (end-effector paths, "
-    "turns of the links, unevenness) summed over the robots, lower is better. Methods I–IV are "
-    "generational with a roulette wheel, V–VIII keep a hall of fame of pairs and lower the "
-    "mutation rate. The search looks for collisions at the configurations; the exact verdict "
-    "judges the motion between them, too, and a refuted run counts as worse than any where costs "
-    "are compared so."
-)
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of methods, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -43,18 +22,15 @@ def page(results: Results, settings: ReportSettings) -> Page:
     by_label = {c.label: c for c in results.with_data}
     pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
     matched = partial(
-        compared,
-        pairs,
-        settings=settings,
-        named=lambda a, b: f"{a.label} against {b.label}",
+        kit.compared, pairs, settings=settings, named=lambda a, b: f"{a.label} against {b.label}"
     )
-    costs = matched(by_column("best_cost"))
+    costs = matched(kit.by_column("best_cost"))
     generations = matched(partial(measures.generations_to, threshold=threshold))
     certified = matched(measures.certified_cost)
     one_scene = len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
-    return Page(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "methods",
         quantities=(
             *measures.team_quantities(results, threshold),
             *generic.term_quantities(results),
@@ -77,11 +53,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 
 def _claims(
-    results: Results,
-    settings: ReportSettings,
-    generations: tuple[Comparison, ...],
-    costs: tuple[Comparison, ...],
-    certified: tuple[Comparison, ...],
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    generations: tuple[kit.Comparison, ...],
+    costs: tuple[kit.Comparison, ...],
+    certified: tuple[kit.Comparison, ...],
     threshold: float,
 ) -> tuple[verdicts.Claim, ...]:
     judge = judging.judge(results, settings, RULES)
@@ -105,7 +81,7 @@ def _claims(
     return (*found, judge.on("in_time").every(told, in_time, done, planned))
 
 
-def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
+def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
     at_first = "; ".join(
         f"{c.label}: {int((c.column('first_feasible_generation') == 0).sum())} of {c.done}"
         for c in results.with_data
@@ -122,14 +98,9 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _methods(results: Results, bound: float, threshold: float) -> Drawing:
-    return Drawing(
+def _methods(results: kit.Results, bound: float, threshold: float) -> kit.Drawing:
+    return PAPER.drawing(
         "fig_6_methods",
-        "Fig. 6: convergence of the methods, and their results",
-        "The paper shows the cost of 20 runs per method with standard deviation, and a box plot. "
-        "Here: a) the cheapest collision-free team so far, mean and standard deviation over the "
-        "runs that have one by then, in matched pairs (dashed: without hall); b) the cost at the "
-        f"end of each run. {cost_boxes.CAPTION}",
         partial(methods.methods_table, results, PAIRS, bound, threshold),
         methods.draw_methods,
         results.with_data,

@@ -7,30 +7,15 @@ import numpy as np
 from evoexp.evolution.pareto import pareto_front
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import pareto_fronts
+from evoexp.papers.curkovic.rules import PAPER
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    Quantity,
-    ReportSettings,
-    Results,
-    generic,
-    markdown,
-    spread,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 
-INTRODUCTION = (
-    "One population of paths per robot. An individual is on the front of its population if no "
-    "other one is at least as good in all of C1 (collisions with all paths of the other "
-    "populations), C2 (end-effector's path), C3 (turns of the links) and C4 (longest step of the "
-    "end-effector less its shortest), and better in one."
-)
 
-
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of fronts, or the generic page if no log holds a front."""
     if not measures.fits(results):
         return generic.page(results, settings)
@@ -41,9 +26,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
     base = generic.basis(results, settings)
     populations = range(max(len(rows) for c in drawn for rows in fronts[c.label].values()))
     sizes = [(p, {c.label: _sizes(fronts[c.label], p) for c in drawn}) for p in populations]
-    return base._replace(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "fronts",
+        base,
         quantities=(*(_quantity(results, p, of) for p, of in sizes), *base.quantities),
         checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
         drawings=(
@@ -53,13 +39,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
+def read_fronts(
+    results: kit.Results, condition: kit.ConditionResults, replicate: int
+) -> list[FrontRow]:
     """Return the criteria of a finished replicate's populations, one record per population.
-
-    Args:
-        results: The results that the condition is part of.
-        condition: The condition.
-        replicate: Number of the replicate.
 
     Raises:
         CorruptLog: If the log cannot be trusted.
@@ -69,7 +52,7 @@ def read_fronts(results: Results, condition: ConditionResults, replicate: int) -
     ).fronts
 
 
-def _fronts(results: Results, condition: ConditionResults) -> dict[int, list[FrontRow]]:
+def _fronts(results: kit.Results, condition: kit.ConditionResults) -> dict[int, list[FrontRow]]:
     """Return the fronts of every finished replicate."""
     return {int(k): read_fronts(results, condition, int(k)) for k in condition.summaries.index}
 
@@ -86,15 +69,15 @@ def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
     )
 
 
-def _quantity(results: Results, population: int, sizes: dict[str, FloatArray]) -> Quantity:
-    spreads = {c.label: spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
-    return Quantity(
+def _quantity(results: kit.Results, population: int, sizes: dict[str, FloatArray]) -> kit.Quantity:
+    spreads = {c.label: kit.spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
+    return kit.Quantity(
         f"individuals on the front of robot {population + 1}'s population", "–", spreads
     )
 
 
 def _checks(
-    condition: ConditionResults, fronts: dict[int, list[FrontRow]]
+    condition: kit.ConditionResults, fronts: dict[int, list[FrontRow]]
 ) -> list[tuple[str, str]]:
     ga = condition.planner.ga
     sizes = np.array([_size(front) for rows in fronts.values() for front in rows])
@@ -119,19 +102,17 @@ def _checks(
 
 
 def _drawing(
-    results: Results, condition: ConditionResults, fronts: dict[int, list[FrontRow]]
-) -> Drawing:
+    results: kit.Results, condition: kit.ConditionResults, fronts: dict[int, list[FrontRow]]
+) -> kit.Drawing:
     best, several = condition.best_replicate, len(results.with_data) > 1
     generation = fronts[best][0].generation
     suffix = f"_{results.position(condition.label) + 1}" if several else ""
-    return Drawing(
-        f"fig_5_fronts{suffix}",
-        f"Fig. 5: fronts at generation {generation}, criterion against criterion"
-        + (f" ({condition.label})" if several else ""),
-        "The paper shows non-dominated individuals red, dominated ones blue. Here: both robots' "
-        f"populations of replicate {best} (lowest cost), all four criteria judged at once; so a "
-        "front looks scattered in two of them.",
+    return PAPER.drawing(
+        "fig_5_fronts",
         partial(pareto_fronts.fronts_table, fronts[best], best, condition.condition.length_unit),
         pareto_fronts.draw_fronts,
         (condition,),
+        suffix=suffix,
+        generation=generation,
+        replicate=best,
     )

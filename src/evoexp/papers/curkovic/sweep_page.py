@@ -10,27 +10,11 @@ from matplotlib.figure import Figure
 from evoexp.papers.curkovic import claims, families, measures
 from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.papers.curkovic.figures import cost_boxes, facets
-from evoexp.report.kit import (
-    Drawing,
-    Page,
-    Quantity,
-    ReportSettings,
-    Results,
-    generic,
-    markdown,
-    shares,
-    sweep_figures,
-)
+from evoexp.papers.curkovic.rules import PAPER
+from evoexp.report import kit
+from evoexp.report.kit import generic, markdown, shares, sweep_figures
 
 NAMES = {"quantity": "defect", "having": "failing", "total": "solved"}  # of shares, of defects
-INTRODUCTION = (
-    "Each condition changes one part of a method; all share their seeds. The cost of a team is "
-    "C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, "
-    "free of collision, lower is better. Generations and evaluations are those until a team's "
-    "cost is at or below a threshold; a run that never gets there counts as infinite. The search "
-    "looks for collisions at the configurations; where costs are compared with a refuted motion "
-    "counting as worse than any, the exact verdict on the motion between them counts, too."
-)
 SHORT = {
     measures.REFUTED: "collide in between",
     measures.LEAVES: "leave [0, π]",
@@ -39,16 +23,17 @@ SHORT = {
 EFFECTS = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or the generic page if there is nothing to compare."""
     if not measures.fits(results) or len(results.with_data) < 2:
         return generic.page(results, settings)
     bound = measures.lower_bound(results.with_data[0])
     threshold = settings.threshold_ratio * bound
     found = families.tested(results, settings, threshold)
-    return generic.basis(results, settings)._replace(
-        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "sweep",
+        generic.basis(results, settings),
         quantities=_quantities(results, threshold),
         claims=claims.of_sweep(results, settings, found),
         checks=_checks(results, bound),
@@ -61,14 +46,14 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
+def _quantities(results: kit.Results, threshold: float) -> tuple[kit.Quantity, ...]:
     speed = "greatest speed of a link over what Eq. 2 allows"
     return measures.team_quantities(
         results, threshold, generic.quantity(results, speed, "–", measures.times_over_limit)
     )
 
 
-def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
+def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
     slowest = "; ".join(
         f"{c.label}: {markdown.number(float(c.column('cpu_s').max()))} s" for c in results.with_data
     )
@@ -80,8 +65,11 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
 
 
 def _drawings(
-    results: Results, settings: ReportSettings, found: Sequence[FamilyComparison], threshold: float
-) -> tuple[Drawing, ...]:
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    found: Sequence[FamilyComparison],
+    threshold: float,
+) -> tuple[kit.Drawing, ...]:
     names = dict.fromkeys(one.measure.name for one in found if one.measure.converges)
     by_name = {
         name: [row for one in found if one.measure.name == name for row in one.rows]
@@ -91,51 +79,32 @@ def _drawings(
     bound = markdown.number(threshold / settings.threshold_ratio)
     table = partial(facets.facet_table, results, threshold)
     return (
-        Drawing(
+        PAPER.drawing(
             "costs",
-            "Best costs of all runs",
-            f"{cost_boxes.CAPTION} Dashed: the threshold, {told}.",
             partial(cost_boxes.costs_table, results, threshold),
             cost_boxes.draw_costs,
             shown,
+            threshold=told,
         ),
-        Drawing(
-            "effort",
-            f"Effort to a team of cost ≤ {told}",
-            facets.CURVES,
-            table,
-            facets.draw_effort,
-            shown,
-        ),
-        Drawing(
-            "convergence",
-            "Convergence",
-            f"Median of the best cost so far over all runs. Dashed: the threshold, {told}; lower "
-            f"bound {bound}.",
-            table,
-            facets.draw_convergence,
-            shown,
+        PAPER.drawing("effort", table, facets.draw_effort, shown, threshold=told),
+        PAPER.drawing(
+            "convergence", table, facets.draw_convergence, shown, threshold=told, bound=bound
         ),
         *sweep_figures.effects_drawings(
             results, settings, by_name, "the first condition of a family", EFFECTS
         ),
-        Drawing(
+        PAPER.drawing(
             "defects",
-            "Motions that the paper's model accepts and that fail",
-            f"Share of the solved motions, with Wilson's {100 * settings.confidence:g} % interval.",
             partial(rates_table, results, settings.confidence),
             draw_rates,
             results.with_data,
+            level=100 * settings.confidence,
         ),
     )
 
 
-def rates_table(results: Results, confidence: float) -> pd.DataFrame:
+def rates_table(results: kit.Results, confidence: float) -> pd.DataFrame:
     """Return the shares of solved motions that have a defect; without curves only one varies.
-
-    Args:
-        results: With data.
-        confidence: Level of Wilson's intervals.
 
     Returns:
         Columns defect, position, condition, failing, solved, lower, upper, share.

@@ -2,24 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import Percentage
 from evoexp.papers.lavoie.rules import RULES
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Judge,
-    Proportion,
-    counted,
-    fisher_exact,
-    holm,
-    markdown,
-    newcombe,
-    solved,
-    success,
-)
+from evoexp.report import kit
+from evoexp.report.kit import markdown
 
 ELSEWHERE = (
     ("more_solutions", {"who": "", "control": ""}),
@@ -28,37 +16,34 @@ ELSEWHERE = (
 )
 
 
-def percentages(judge: Judge, conditions: Sequence[ConditionResults], level: float) -> list[Claim]:
+def percentages(
+    judge: kit.Judge, conditions: Sequence[kit.ConditionResults], level: float
+) -> list[kit.Claim]:
     """Judge the percentages printed for arms of so many joints, as one family of tests.
 
     Both percentages are samples: a printed one is contradicted where Fisher's exact test, adjusted
     by Holm over all percentages judged here, tells it from ours.
-
-    Args:
-        judge: The judge of the experiment.
-        conditions: The conditions whose runs they are judged by.
-        level: Level of the intervals.
     """
     pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
     ours = [measures.below(condition, printed.bound) for condition, printed in pairs]
     compared = [
-        fisher_exact(own, one.proportion) for own, (_, one) in zip(ours, pairs, strict=True)
+        kit.fisher_exact(own, one.proportion) for own, (_, one) in zip(ours, pairs, strict=True)
     ]
     return [
         _percentage(judge, *pair, own, level, p, len(pairs))
-        for pair, own, p in zip(pairs, ours, holm(compared), strict=True)
+        for pair, own, p in zip(pairs, ours, kit.holm(compared), strict=True)
     ]
 
 
 def _percentage(
-    judge: Judge,
-    condition: ConditionResults,
+    judge: kit.Judge,
+    condition: kit.ConditionResults,
     printed: Percentage,
-    own: Proportion,
+    own: kit.Proportion,
     level: float,
     p_adjusted: float,
     num_tests: int,
-) -> Claim:
+) -> kit.Claim:
     theirs = printed.proportion
     within, their_own = own.interval(level), theirs.interval(level)
     each = 1.0 - (1.0 - level) / num_tests  # Bonferroni: all intervals together have the level
@@ -74,9 +59,9 @@ def _percentage(
     return hearing.same_share(evidence, own, theirs, p_adjusted)
 
 
-def _difference(own: Proportion, theirs: Proportion, level: float) -> str:
+def _difference(own: kit.Proportion, theirs: kit.Proportion, level: float) -> str:
     """Return how many points more our share has than the paper's, with its interval."""
-    low, high = newcombe(own, theirs, level)
+    low, high = kit.newcombe(own, theirs, level)
     points = (
         f"ours − printed {100 * (own.share - theirs.share):+.1f} "
         f"[{100 * low:+.1f}, {100 * high:+.1f}] points"
@@ -85,19 +70,21 @@ def _difference(own: Proportion, theirs: Proportion, level: float) -> str:
 
 
 def more_joints_are_better(
-    judge: Judge, conditions: Sequence[ConditionResults], level: float
-) -> Iterator[Claim]:
+    judge: kit.Judge, conditions: Sequence[kit.ConditionResults], level: float
+) -> Iterator[kit.Claim]:
     """Judge that the arm of ten joints does better than that of seven, where both were run."""
-    by_joints = {measures.num_joints(c): c for c in conditions}
+    by_joints = {run_values.num_joints(c): c for c in conditions}
     for bound in measures.BOUNDS if {7, 10} <= set(by_joints) else ():
         ten, seven = (measures.below(by_joints[joints], bound) for joints in (10, 7))
-        p = markdown.p_value(fisher_exact(ten, seven))
+        p = markdown.p_value(kit.fisher_exact(ten, seven))
         told = " against ".join(measures.text(share, level) for share in (ten, seven))
         evidence = f"{told}; Fisher's exact p = {p}, two-sided"
         yield judge.on("longer_arm", bound=f"{bound:g}").greater(evidence, ten, seven)
 
 
-def no_start_needed(judge: Judge, condition: ConditionResults, level: float) -> Claim | None:
+def no_start_needed(
+    judge: kit.Judge, condition: kit.ConditionResults, level: float
+) -> kit.Claim | None:
     """Judge that random populations are a good enough start.
 
     The paper's own runs do not all end with a solution. An error of 2 or more is none (the
@@ -110,9 +97,9 @@ def no_start_needed(judge: Judge, condition: ConditionResults, level: float) -> 
     printed = [one for one in measures.printed(condition) if one.bound == max(measures.BOUNDS)]
     if not printed:
         return None
-    own, theirs = success(condition), printed[0].proportion
+    own, theirs = kit.success(condition), printed[0].proportion
     hearing = judge.on("no_start", who=condition.label)
-    low, high = newcombe(own, theirs, level)
+    low, high = kit.newcombe(own, theirs, level)
     margin = -0.01 * hearing.rule.limits["margin"]
     holds = None if low <= margin <= high else low > margin
     evidence = (
@@ -123,11 +110,10 @@ def no_start_needed(judge: Judge, condition: ConditionResults, level: float) -> 
 
 
 def free_of_collision(
-    judge: Judge, condition: ConditionResults, refuted: Proportion, level: float
-) -> Claim:
+    judge: kit.Judge, condition: kit.ConditionResults, refuted: kit.Proportion, level: float
+) -> kit.Claim:
     """Judge that accepted motions touch nothing."""
-    certified = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
-    free = counted(np.asarray(solved(condition) & certified)).having
+    free = run_values.certified(condition).having
     planned = condition.planned if condition.solved == condition.done else 0
     evidence = (
         f"{markdown.share(free, refuted.total)} certified; refuted {measures.text(refuted, level)}"
@@ -136,7 +122,7 @@ def free_of_collision(
     return hearing.every(evidence, free, refuted.total, planned)
 
 
-def judged_elsewhere(judge: Judge) -> list[Claim]:
+def judged_elsewhere(judge: kit.Judge) -> list[kit.Claim]:
     """Return the claims that need controls or a sweep, not judged."""
     told = "judged by `evoexp run experiment={}`"
     return [

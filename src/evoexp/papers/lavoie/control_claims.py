@@ -8,69 +8,50 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import measures
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Judge,
-    Proportion,
-    ReportSettings,
-    Results,
-    counted,
-    effort_ratio,
-    expected_effort,
-    fisher_exact,
-    holm,
-    markdown,
-    newcombe,
-    solved,
-    success,
-)
+from evoexp.report import kit
+from evoexp.report.kit import markdown
 
 Runs = tuple[FloatArray, np.ndarray]
 """Evaluations of every run, and whether it ended with a solution."""
 
 
-def judge_controls(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
+def judge_controls(
+    judge: kit.Judge, results: kit.Results, settings: kit.ReportSettings
+) -> Iterator[kit.Claim]:
     """Judge every condition against the best of its controls, in solutions and in effort."""
     pairs = [
         (own, best_control(controls))
         for own in results.with_data
         if not own.is_control and (controls := _controls(results, own))
     ]
-    p_values = holm([fisher_exact(success(own), success(control)) for own, control in pairs])
+    p_values = kit.holm(
+        [kit.fisher_exact(kit.success(own), kit.success(control)) for own, control in pairs]
+    )
     for (own, control), p_adjusted in zip(pairs, p_values, strict=True):
         yield more_solutions(judge, own, control, settings, p_adjusted, f"{own.label}: ")
         yield _less_effort(judge, own, control, settings)
 
 
-def best_control(controls: Sequence[ConditionResults]) -> ConditionResults:
+def best_control(controls: Sequence[kit.ConditionResults]) -> kit.ConditionResults:
     """Return the control that solves most; of equal ones that of the least expected effort."""
-    return min(controls, key=lambda c: (-success(c).share, expected_effort(*runs(c))))
+    return min(controls, key=lambda c: (-kit.success(c).share, kit.expected_effort(*runs(c))))
 
 
 def more_solutions(
-    judge: Judge,
-    own: ConditionResults,
-    control: ConditionResults,
-    settings: ReportSettings,
+    judge: kit.Judge,
+    own: kit.ConditionResults,
+    control: kit.ConditionResults,
+    settings: kit.ReportSettings,
     p_adjusted: float | None = None,
     who: str = "",
-) -> Claim:
-    """Judge that the algorithm finds more solutions than a control.
-
-    Args:
-        judge: The judge of the experiment.
-        own: The condition of the algorithm.
-        control: Its best control.
-        settings: Level of the intervals.
-        p_adjusted: Of the test of both shares where it is one of several.
-        who: Stands before the claim.
-    """
-    level, one, two = settings.confidence, success(own), success(control)
-    p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
-    low, high = newcombe(one, two, level)
+) -> kit.Claim:
+    """Judge that the algorithm finds more solutions than a control."""
+    level, one, two = settings.confidence, kit.success(own), kit.success(control)
+    p_value = kit.fisher_exact(one, two) if p_adjusted is None else p_adjusted
+    low, high = kit.newcombe(one, two, level)
     within = solved_within(own, control)
     evidence = (
         f"runs with a solution: {measures.text(one, level)} against {measures.text(two, level)} "
@@ -84,12 +65,15 @@ def more_solutions(
 
 
 def _less_effort(
-    judge: Judge, own: ConditionResults, control: ConditionResults, settings: ReportSettings
-) -> Claim:
+    judge: kit.Judge,
+    own: kit.ConditionResults,
+    control: kit.ConditionResults,
+    settings: kit.ReportSettings,
+) -> kit.Claim:
     """Judge that the algorithm takes fewer evaluations per solution than a control."""
-    first, second = _on_common_seeds(own, control)
-    expected = [expected_effort(*each) for each in (first, second)]
-    low, high = effort_ratio(first, second, settings.confidence, settings.num_resamples)
+    first, second = run_values.on_common_seeds(own, control, kit.by_column("evaluations"))
+    expected = [kit.expected_effort(*each) for each in (first, second)]
+    low, high = kit.effort_ratio(first, second, settings.confidence, settings.num_resamples)
     ratio = expected[0] / expected[1] if np.isfinite(expected[0]) else np.inf
     told = " against ".join(_whole(value) for value in expected)
     evidence = (
@@ -101,32 +85,21 @@ def _less_effort(
     return hearing.own(evidence, f"{len(first[0])} pairs", holds)
 
 
-def runs(condition: ConditionResults) -> Runs:
+def runs(condition: kit.ConditionResults) -> Runs:
     """Return the evaluations of all runs, and which of them ended with a solution."""
-    return condition.column("evaluations"), solved(condition)
+    return condition.column("evaluations"), kit.solved(condition)
 
 
-def solved_within(own: ConditionResults, control: ConditionResults) -> Proportion:
+def solved_within(own: kit.ConditionResults, control: kit.ConditionResults) -> kit.Proportion:
     """Count the control's runs that are solved within the algorithm's median effort.
 
     The effort of a run of the algorithm without a solution is infinite.
     """
     most = np.median(measures.effort(own))
-    return counted(solved(control) & (measures.effort(control) <= most))
+    return kit.counted(kit.solved(control) & (measures.effort(control) <= most))
 
 
-def _on_common_seeds(own: ConditionResults, control: ConditionResults) -> tuple[Runs, Runs]:
-    """Return the runs of both conditions on the seeds that both have."""
-    common = own.summaries.index.intersection(control.summaries.index)
-    rows = (c.summaries.index.get_indexer(common) for c in (own, control))
-    first, second = (
-        (evaluations[k], ended[k])
-        for k, (evaluations, ended) in zip(rows, map(runs, (own, control)), strict=True)
-    )
-    return first, second
-
-
-def _controls(results: Results, own: ConditionResults) -> list[ConditionResults]:
+def _controls(results: kit.Results, own: kit.ConditionResults) -> list[kit.ConditionResults]:
     """Return the controls that stand beside this very planner in the same scene."""
     same = own.condition.robot, own.condition.scenario, own.planner
     return [

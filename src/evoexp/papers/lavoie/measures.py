@@ -4,42 +4,35 @@ from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.papers import run_values
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    ConditionResults,
-    Proportion,
-    Results,
-    body_contacts,
-    counted,
-    search_seconds,
-    solved,
-)
+from evoexp.report import kit
+from evoexp.report.kit import body_contacts
 
 PRINTED_RUNS = 1000  # section 5: "a thousand experiments were conducted for each simulation"
 Contact = tuple[float, str]
 """Instant of a first contact, names of the bodies."""
 
 
+# position error at the end of SP2, (done,) [length unit], and evaluations; inf: no solution
+errors = run_values.where_solved(kit.by_column("term_position_error_sp2"))
+effort = run_values.where_solved(kit.by_column("evaluations"))
+
+
 class Percentage(NamedTuple):
-    """A percentage that the paper prints beside Fig. 3.
+    """A percentage that the paper prints beside Fig. 3."""
 
-    Attributes:
-        joints: Number of joints of the arm.
-        bound: x of P(position error < x) [length unit].
-        having: Number of the thousand runs with a smaller error.
-    """
-
-    joints: int
-    bound: float
-    having: int
+    joints: int  # number of joints of the arm
+    bound: float  # x of P(position error < x) [length unit]
+    having: int  # number of the thousand runs with a smaller error
 
     @property
-    def proportion(self) -> Proportion:
+    def proportion(self) -> kit.Proportion:
         """Proportion of the paper's own runs, which are a sample, too."""
-        return Proportion(self.having, PRINTED_RUNS)
+        return kit.Proportion(self.having, PRINTED_RUNS)
 
 
 PRINTED = (
@@ -51,57 +44,37 @@ PRINTED = (
 BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
-def fits(results: Results) -> bool:
+def fits(results: kit.Results) -> bool:
     """Return whether there are results, all of arms that go by a via point into a box."""
     found = results.with_data
     return bool(found) and all(isinstance(c.planner, RedundantGa) for c in found)
 
 
-def num_joints(condition: ConditionResults) -> int:
-    """Return how many joints the arm has."""
-    return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
-
-
-def printed(condition: ConditionResults) -> list[Percentage]:
+def printed(condition: kit.ConditionResults) -> list[Percentage]:
     """Return the percentages that the paper prints for an arm of so many joints."""
-    return [one for one in PRINTED if one.joints == num_joints(condition)]
+    return [one for one in PRINTED if one.joints == run_values.num_joints(condition)]
 
 
-def errors(condition: ConditionResults) -> FloatArray:
-    """Return the position error at the end of SP2, (done,) [length unit]; inf: no solution."""
-    return np.where(solved(condition), condition.column("term_position_error_sp2"), np.inf)
-
-
-def effort(condition: ConditionResults) -> FloatArray:
-    """Return the evaluations that each run took to its solution, (done,); inf: no solution."""
-    return np.where(solved(condition), condition.column("evaluations"), np.inf)
-
-
-def below(condition: ConditionResults, bound: float) -> Proportion:
+def below(condition: kit.ConditionResults, bound: float) -> kit.Proportion:
     """Count the runs that have a solution with a position error below a bound."""
-    return counted(errors(condition) < bound)
+    return kit.counted(errors(condition) < bound)
 
 
-def tests_per_second(condition: ConditionResults) -> FloatArray:
+def tests_per_second(condition: kit.ConditionResults) -> FloatArray:
     """Return the tests of a link against an ellipse per second of each search, (done,) [1/s].
 
     They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
     Chords are not counted.
     """
-    pairs = num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
-    return np.asarray(pairs * condition.column("collision_queries") / search_seconds(condition))
+    pairs = run_values.num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    return np.asarray(pairs * condition.column("collision_queries") / kit.search_seconds(condition))
 
 
-def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> list[Contact]:
+def contacts(condition: kit.ConditionResults, replicate: int, verdict: Contact) -> list[Contact]:
     """Return the first contacts on both sub-paths, as far as there are any.
 
     A verdict names the first contact of the whole motion only; if that is on SP1, the planner's
     motion on SP2 is judged by itself.
-
-    Args:
-        condition: The condition of the replicate.
-        replicate: The replicate.
-        verdict: The first contact of its motion.
     """
     if verdict[0] >= 1.0:
         return [verdict]
@@ -112,12 +85,12 @@ def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> l
     return [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
 
 
-def touches(condition: ConditionResults) -> np.ndarray:
+def touches(condition: kit.ConditionResults) -> np.ndarray:
     """Return whether the exact verdict refutes each run's motion, (done,)."""
     return condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=bool)
 
 
-def refuted_paths(condition: ConditionResults) -> np.ndarray:
+def refuted_paths(condition: kit.ConditionResults) -> np.ndarray:
     """Return which sub-paths of each run's motion the exact verdict refutes, (done, 2)."""
     refuted = np.zeros((condition.done, 2), dtype=bool)
     for replicate, verdict in body_contacts.refuted(condition).items():
@@ -128,25 +101,19 @@ def refuted_paths(condition: ConditionResults) -> np.ndarray:
 
 
 class RefutedMotions(NamedTuple):
-    """Counts of a condition's accepted motions that touch an obstacle.
+    """Counts of a condition's accepted motions that touch an obstacle."""
 
-    Attributes:
-        anywhere: Motions that touch on either sub-path, of all solved runs.
-        sp1: Motions that touch on the first sub-path.
-        sp2: Motions that touch on the second one.
-    """
-
-    anywhere: Proportion
-    sp1: Proportion
-    sp2: Proportion
+    anywhere: kit.Proportion  # motions that touch on either sub-path, of all solved runs
+    sp1: kit.Proportion  # motions that touch on the first sub-path
+    sp2: kit.Proportion  # motions that touch on the second one
 
 
-def refuted(condition: ConditionResults) -> RefutedMotions:
+def refuted(condition: kit.ConditionResults) -> RefutedMotions:
     """Count the solved runs whose motion the exact verdict refutes, by sub-path."""
-    paths = refuted_paths(condition)[solved(condition)]
-    return RefutedMotions(counted(paths.any(axis=1)), *map(counted, paths.T))
+    paths = refuted_paths(condition)[kit.solved(condition)]
+    return RefutedMotions(kit.counted(paths.any(axis=1)), *map(kit.counted, paths.T))
 
 
-def text(proportion: Proportion, confidence: float) -> str:
+def text(proportion: kit.Proportion, confidence: float) -> str:
     """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
     return proportion.with_interval(confidence, 1)

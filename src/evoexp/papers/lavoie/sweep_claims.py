@@ -10,30 +10,15 @@ from evoexp.papers.lavoie import control_claims, measures
 from evoexp.papers.lavoie.claims import percentages
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import RULES
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Judge,
-    Proportion,
-    ReportSettings,
-    Results,
-    Values,
-    compared,
-    evidence,
-    fisher_exact,
-    grouped,
-    holm,
-    judging,
-    markdown,
-    success,
-)
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown
 
-Group = tuple[ConditionResults, ...]
+Group = tuple[kit.ConditionResults, ...]
 
 
 def judge_sweep(
-    results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
-) -> tuple[Claim, ...]:
+    results: kit.Results, settings: kit.ReportSettings, refuted: dict[str, RefutedMotions]
+) -> tuple[kit.Claim, ...]:
     """Judge the claims about the settings in which conditions differ."""
     judge = judging.judge(results, settings, RULES)
     return (
@@ -47,7 +32,7 @@ def judge_sweep(
     )
 
 
-def groups_but_for(results: Results, *path: str) -> list[Group]:
+def groups_but_for(results: kit.Results, *path: str) -> list[Group]:
     """Return groups of conditions that agree in all settings of the planner but one.
 
     Args:
@@ -55,7 +40,7 @@ def groups_but_for(results: Results, *path: str) -> list[Group]:
         path: Names that lead to the setting: "ga", "num_generations".
     """
 
-    def key(condition: ConditionResults) -> tuple[Any, ...]:
+    def key(condition: kit.ConditionResults) -> tuple[Any, ...]:
         part = planner = condition.planner.canonical()
         for name in path[:-1]:
             part[name] = part = dict(part[name])
@@ -63,32 +48,38 @@ def groups_but_for(results: Results, *path: str) -> list[Group]:
         scene = condition.condition.robot, condition.condition.scenario
         return *(one.canonical() for one in scene), planner
 
-    return [group for group in grouped(results.main, key) if len(group) > 1]
+    return [group for group in kit.grouped(results.main, key) if len(group) > 1]
 
 
-def _success(judge: Judge, results: Results, settings: ReportSettings) -> list[Claim]:
+def _success(
+    judge: kit.Judge, results: kit.Results, settings: kit.ReportSettings
+) -> list[kit.Claim]:
     """Judge the printed percentages by either reading of a success, each a family of tests."""
-    by_reading: dict[str, list[ConditionResults]] = {}
+    by_reading: dict[str, list[kit.ConditionResults]] = {}
     for condition in itertools.chain(*groups_but_for(results, "success")):
         by_reading.setdefault(condition.planner.success, []).append(condition)
     families = (percentages(judge, own, settings.confidence) for own in by_reading.values())
     return list(itertools.chain(*families))
 
 
-def _precision(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
+def _precision(
+    judge: kit.Judge, results: kit.Results, settings: kit.ReportSettings
+) -> Iterator[kit.Claim]:
     """Judge that smaller stopping values give smaller errors, step by step."""
     for group in groups_but_for(results, "stop_cost_sp2"):
         own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
         steps = [(small, large) for large, small in itertools.pairwise(own)]
-        rows = compared(steps, measures.errors, settings, named=_against)
+        rows = kit.compared(steps, measures.errors, settings, named=_against)
         medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)
-        told = "; ".join(f"{row.quantity}: {evidence(row, 'smaller')}" for row in rows)
+        told = "; ".join(f"{row.quantity}: {kit.evidence(row, 'smaller')}" for row in rows)
         where = f": at most {own[0].planner.ga.num_generations} generations"
         told = f"median errors: {', '.join(medians)}; step by step: {told}"
         yield judge.on("precision", where=where).better_than_all(told, rows)
 
 
-def _generations(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
+def _generations(
+    judge: kit.Judge, results: kit.Results, settings: kit.ReportSettings
+) -> Iterator[kit.Claim]:
     """Judge that more generations are needed at the smallest stopping value."""
     level = settings.confidence
     least = min(c.planner.stop_cost_sp2 for c in results.main)
@@ -98,17 +89,19 @@ def _generations(judge: Judge, results: Results, settings: ReportSettings) -> It
             continue
         attempts = (f"{c.column('term_attempts').mean():.2f}" for c in (many, few))
         spent = (_median(c, measures.effort) for c in (many, few))
+        one, two = kit.success(many), kit.success(few)
         told = (
-            f"runs with a solution: {measures.text(success(many), level)} with at most "
-            f"{many.planner.ga.num_generations} generations, {measures.text(success(few), level)} "
-            f"with {few.planner.ga.num_generations}; {_fisher(success(many), success(few))}; mean "
+            f"runs with a solution: {measures.text(one, level)} with at most "
+            f"{many.planner.ga.num_generations} generations, {measures.text(two, level)} "
+            f"with {few.planner.ga.num_generations}; {_fisher(one, two)}; mean "
             f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
         )
-        hearing = judge.on("generations", least=f"{least:g}")
-        yield hearing.greater(told, success(many), success(few))
+        yield judge.on("generations", least=f"{least:g}").greater(told, one, two)
 
 
-def _coding(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
+def _coding(
+    judge: kit.Judge, results: kit.Results, settings: kit.ReportSettings
+) -> Iterator[kit.Claim]:
     """Judge real against binary coding."""
     for group in groups_but_for(results, "ga"):
         coded = {c.planner.ga.component: c for c in group}
@@ -119,15 +112,18 @@ def _coding(judge: Judge, results: Results, settings: ReportSettings) -> Iterato
             ("position error", measures.errors, "smaller"),
             ("evaluations to a solution", measures.effort, "fewer"),
         ):
-            row = next(iter(compared([pair], values, settings)), None)
+            row = next(iter(kit.compared([pair], values, settings)), None)
             where = f", judged by {what}: {_against(*pair)}"
             told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
             yield judge.on("coding", where=where).better(row, word, told)
 
 
 def _blindness(
-    judge: Judge, results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
-) -> Iterator[Claim]:
+    judge: kit.Judge,
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    refuted: dict[str, RefutedMotions],
+) -> Iterator[kit.Claim]:
     """Judge that the scene is not trivial: an arm that ignores obstacles meets them."""
     for group in groups_but_for(results, "collision", "blind"):
         seeing, blind = sorted(group, key=lambda c: bool(c.planner.collision.blind))
@@ -137,8 +133,11 @@ def _blindness(
 
 
 def _positions(
-    judge: Judge, results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
-) -> Iterator[Claim]:
+    judge: kit.Judge,
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    refuted: dict[str, RefutedMotions],
+) -> Iterator[kit.Claim]:
     """Judge that chords, and more positions with chords, leave fewer contacts between positions."""
     pairs: list[Group] = []  # (coarse, fine)
     least = min(int(c.planner.collision.num_positions) for c in results.main)
@@ -152,7 +151,7 @@ def _positions(
             pairs += [(coarse, fine) for fine in finer]
     # contacts of either condition, and the tests of all pairs as one family
     counts = [tuple(refuted[c.label].anywhere for c in pair) for pair in pairs]
-    p_values = holm([fisher_exact(one, two) for one, two in counts])
+    p_values = kit.holm([kit.fisher_exact(one, two) for one, two in counts])
     for (coarse, fine), (one, two), p in zip(pairs, counts, p_values, strict=True):
         told = f"{_shares(two, one, settings)}; adjusted (Holm) {markdown.p_value(p)}"
         yield judge.on("fewer_contacts", who=_against(fine, coarse)).greater(told, one, two, p)
@@ -165,19 +164,19 @@ def _positions(
             yield hearing.every(told, *runs)
 
 
-def _against(one: ConditionResults, two: ConditionResults) -> str:
+def _against(one: kit.ConditionResults, two: kit.ConditionResults) -> str:
     return f"{one.label} against {two.label}"
 
 
-def _median(condition: ConditionResults, values: Values) -> str:
+def _median(condition: kit.ConditionResults, values: kit.Values) -> str:
     value = float(np.median(values(condition)))
     return markdown.number(float(round(value)) if 1e3 < value < np.inf else value)
 
 
-def _shares(one: Proportion, two: Proportion, settings: ReportSettings) -> str:
+def _shares(one: kit.Proportion, two: kit.Proportion, settings: kit.ReportSettings) -> str:
     shares = " against ".join(measures.text(p, settings.confidence) for p in (one, two))
     return f"{shares}; {_fisher(one, two)}"
 
 
-def _fisher(one: Proportion, two: Proportion) -> str:
-    return f"Fisher's exact p = {markdown.p_value(fisher_exact(one, two))}"
+def _fisher(one: kit.Proportion, two: kit.Proportion) -> str:
+    return f"Fisher's exact p = {markdown.p_value(kit.fisher_exact(one, two))}"

@@ -4,32 +4,15 @@ from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
+from evoexp.papers import run_values
 from evoexp.papers.lavoie import measures, sweep_claims
 from evoexp.papers.lavoie import page as whole_page
 from evoexp.papers.lavoie.figures import stopping
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    Drawing,
-    Page,
-    Proportion,
-    ReportSettings,
-    Results,
-    Values,
-    compared,
-    grouped,
-    newcombe,
-    success,
-    sweep_figures,
-)
+from evoexp.papers.lavoie.rules import PAPER
+from evoexp.report import kit
+from evoexp.report.kit import sweep_figures
 
-INTRODUCTION = (
-    "Each condition changes one part of the first one of its arm; all share their seeds. A run "
-    "has a solution if both searches were successful (`planner.success`); one without counts as "
-    "an infinite error and infinite effort. Searches differ in length and one follows the other, "
-    "so there is no common axis to draw convergence on."
-)
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
 
 
@@ -38,7 +21,7 @@ class Measure(NamedTuple):
 
     name: str
     unit: str
-    values: Values
+    values: kit.Values
 
 
 class ArmComparison(NamedTuple):
@@ -48,19 +31,19 @@ class ArmComparison(NamedTuple):
     """
 
     measure: Measure
-    first: ConditionResults
-    rows: tuple[Comparison, ...]
+    first: kit.ConditionResults
+    rows: tuple[kit.Comparison, ...]
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or that of the experiment if there is nothing to compare."""
     if not measures.fits(results) or len(results.with_data) < 2:
         return whole_page.page(results, settings)
     refuted = {c.label: measures.refuted(c) for c in results.with_data}
     found = compared_arms(results, settings)
-    return Page(
-        title=f"Lavoie & Boudreau 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "sweep",
         quantities=whole_page.quantities(results),
         claims=sweep_claims.judge_sweep(results, settings, refuted),
         checks=_checks(results, settings, refuted),
@@ -73,12 +56,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def arms(results: Results) -> tuple[tuple[ConditionResults, ...], ...]:
+def arms(results: kit.Results) -> tuple[tuple[kit.ConditionResults, ...], ...]:
     """Return the conditions arm by arm, told by their numbers of joints."""
-    return grouped(results.with_data, measures.num_joints)
+    return kit.grouped(results.with_data, run_values.num_joints)
 
 
-def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmComparison, ...]:
+def compared_arms(results: kit.Results, settings: kit.ReportSettings) -> tuple[ArmComparison, ...]:
     """Compare the first condition of every arm with its others, quantity by quantity."""
     quantities = (
         Measure("position error", results.with_data[0].condition.length_unit, measures.errors),
@@ -88,7 +71,7 @@ def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmCompar
         ArmComparison(
             measure,
             first,
-            compared([(first, other) for other in others], measure.values, settings),
+            kit.compared([(first, other) for other in others], measure.values, settings),
         )
         for measure in quantities
         for first, *others in arms(results)
@@ -96,14 +79,14 @@ def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmCompar
 
 
 def _checks(
-    results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
+    results: kit.Results, settings: kit.ReportSettings, refuted: dict[str, RefutedMotions]
 ) -> tuple[tuple[str, str], ...]:
     """Return a row of shares per condition, and rows on the worth of agreement with Fig. 3."""
     rows = []
     for c in results.with_data:
         found = refuted[c.label]
         told = {
-            "with a solution": success(c),
+            "with a solution": kit.success(c),
             f"error below {BOUND:g}": measures.below(c, BOUND),
             "accepted and in contact": found.anywhere,
             "on SP1": found.sp1,
@@ -122,7 +105,7 @@ def _checks(
     return *rows, *weak
 
 
-def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple[str, str]]:
+def _weak_evidence(results: kit.Results, settings: kit.ReportSettings) -> Iterator[tuple[str, str]]:
     """Count the settings of each arm that agree with a printed percentage.
 
     The more settings agree, the less agreement says about any of them.
@@ -130,7 +113,9 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple
     for own in arms(results):
         for printed in (one for one in measures.printed(own[0]) if one.bound == BOUND):
             intervals = {
-                c.label: newcombe(measures.below(c, BOUND), printed.proportion, settings.confidence)
+                c.label: kit.newcombe(
+                    measures.below(c, BOUND), printed.proportion, settings.confidence
+                )
                 for c in own
             }
             same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
@@ -147,25 +132,21 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple
             yield (what, text)
 
 
-def _paths_differ(results: Results) -> bool:
+def _paths_differ(results: kit.Results) -> bool:
     """Return whether conditions differ in the places at which they test paths for collision."""
     collisions = (c.planner.collision for c in results.with_data)
     return len({(model.num_positions, model.swept) for model in collisions}) > 1
 
 
 def _drawings(
-    results: Results,
-    settings: ReportSettings,
+    results: kit.Results,
+    settings: kit.ReportSettings,
     found: tuple[ArmComparison, ...],
     refuted: dict[str, RefutedMotions],
-) -> tuple[Drawing, ...]:
+) -> tuple[kit.Drawing, ...]:
     """Return the figures: stopping values where they differ, shares, values, effect sizes."""
-    stopping_values = Drawing(
+    stopping_values = PAPER.drawing(
         "stopping",
-        "Precision against the stopping value",
-        "Medians with quartiles over all runs; one without a solution counts as infinite; a "
-        "triangle on the first quartile: the third one is infinite. To the right searches stop at "
-        "smaller values.",
         partial(stopping.stopping_table, results, measures.errors, measures.effort),
         stopping.draw_stopping,
         results.with_data,
@@ -181,7 +162,7 @@ def _drawings(
     references = {f"error below {p.bound:g}": p.proportion.share for p in printed}
     shares = _share_rows(results, refuted)
     values = {f"{one.measure.name} [{one.measure.unit}]": one.measure.values for one in found}
-    rows: dict[str, tuple[Comparison, ...]] = {}
+    rows: dict[str, tuple[kit.Comparison, ...]] = {}
     for one in found:
         rows[one.measure.name] = (*rows.get(one.measure.name, ()), *one.rows)
     a12 = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
@@ -196,8 +177,8 @@ def _drawings(
 
 
 def _share_rows(
-    results: Results, refuted: dict[str, RefutedMotions]
-) -> list[tuple[str, int, str, Proportion]]:
+    results: kit.Results, refuted: dict[str, RefutedMotions]
+) -> list[tuple[str, int, str, kit.Proportion]]:
     """Return the counts that are drawn: by sub-path if conditions differ in how paths are tested.
 
     Returns:
@@ -210,7 +191,7 @@ def _share_rows(
         if not _paths_differ(results):
             told = {
                 f"error below {BOUND:g}": measures.below(c, BOUND),
-                "with a solution": success(c),
+                "with a solution": kit.success(c),
                 "touch an obstacle": found.anywhere,
             }
         rows += [(name, position, c.label, proportion) for name, proportion in told.items()]

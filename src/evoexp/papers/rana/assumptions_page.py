@@ -5,68 +5,44 @@ import numpy as np
 from evoexp.papers.rana.claims import evolution_told
 from evoexp.papers.rana.drawings import AT, BETWEEN
 from evoexp.papers.rana.motions import problem
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Judge,
-    Page,
-    ReportSettings,
-    Results,
-    assumptions,
-    by_column,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import assumptions, markdown
 
 SOURCE = "sections 3.5 and 4.2"
+Controls = tuple[kit.ConditionResults, ...]
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the paper's assumptions."""
 
-    def evolution(
-        judge: Judge, condition: ConditionResults, controls: tuple[ConditionResults, ...]
-    ) -> Claim:
-        told, rows = evolution_told(condition, controls, settings)
+    def free(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
+        told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
+        hearing = judge.on("free_at_via_points", who="", source=SOURCE)
+        return hearing.every(told, c.solved, c.done, c.planned)
+
+    def evolution(judge: kit.Judge, c: kit.ConditionResults, controls: Controls) -> kit.Claim:
+        told, rows = evolution_told(c, controls, settings)
         return judge.on("evolution_adds", who="").better_than_all(told, rows)
 
+    safety = "least distance of centres over the safety distance [-]"
+    hits = kit.by_column("term_collisions")
     headlines = (
-        assumptions.Headline(
-            "free_at_via_points",
-            "colliding instants C5",
-            by_column("term_collisions"),
-            _free,
-        ),
-        assumptions.Headline(
-            "safety_between_via_points",
-            "least distance of centres over the safety distance [-]",
-            _kept_share,
-            _safe,
-        ),
-        assumptions.Headline("evolution_adds", "fitness F", by_column("term_fitness"), evolution),
+        kit.Headline("free_at_via_points", "colliding instants C5", hits, free),
+        kit.Headline("safety_between_via_points", safety, _kept_share, _safe),
+        kit.Headline("evolution_adds", "fitness F", kit.by_column("term_fitness"), evolution),
     )
-    return assumptions.page(results, settings, RULES, "Rana & Zalzala 1995", headlines)
+    return assumptions.page(results, settings, RULES, PAPER.name, headlines)
 
 
-def _free(
-    judge: Judge, condition: ConditionResults, controls: tuple[ConditionResults, ...]
-) -> Claim:
-    c = condition
-    told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
-    hearing = judge.on("free_at_via_points", who="", source=SOURCE)
-    return hearing.every(told, c.solved, c.done, c.planned)
-
-
-def _kept_share(condition: ConditionResults) -> FloatArray:
+def _kept_share(condition: kit.ConditionResults) -> FloatArray:
     """Return the least distance of centres between via-points in units of the safety distance."""
     return np.asarray(condition.column(BETWEEN) / problem(condition).security_margin)
 
 
-def _safe(
-    judge: Judge, condition: ConditionResults, controls: tuple[ConditionResults, ...]
-) -> Claim:
-    c, values = condition, _kept_share(condition)
+def _safe(judge: kit.Judge, c: kit.ConditionResults, controls: Controls) -> kit.Claim:
+    values = _kept_share(c)
     safe = int(np.count_nonzero(values >= 1.0))
     told = (
         f"{markdown.share(safe, c.done)} runs never below it; least "

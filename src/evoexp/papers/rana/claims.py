@@ -5,28 +5,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from evoexp.papers.rana import motions
-from evoexp.report.kit import (
-    Comparison,
-    ConditionResults,
-    ReportSettings,
-    by_column,
-    compared,
-    evidence,
-    markdown,
-)
+from evoexp.report import kit
+from evoexp.report.kit import markdown
 
-COST = by_column("best_cost")
+COST = kit.by_column("best_cost")
 
 
 def evolution_told(
-    condition: ConditionResults, controls: Sequence[ConditionResults], settings: ReportSettings
-) -> tuple[str, list[Comparison]]:
+    condition: kit.ConditionResults,
+    controls: Sequence[kit.ConditionResults],
+    settings: kit.ReportSettings,
+) -> tuple[str, list[kit.Comparison]]:
     """Return the evidence on what evolution adds to each control, and the comparisons of costs.
 
     The control of the lowest median cost comes first.
     """
     pairs = [(condition, control) for control in controls if control.done]
-    rows = {row.quantity: row for row in compared(pairs, COST, settings)}
+    rows = {row.quantity: row for row in kit.compared(pairs, COST, settings)}
     shown = [control for control in controls if control.label in rows]
     shown.sort(key=lambda control: float(np.median(COST(control))))
     fitness = " · ".join(
@@ -39,7 +34,7 @@ def evolution_told(
         which = f"the best control, {control.label}" if place == 0 else control.label
         told.append(
             f"to {which}, evolution adds {markdown.number(-row.median_difference)} in the median "
-            f"of pairs: its best cost is {evidence(row, 'lower')}"
+            f"of pairs: its best cost is {kit.evidence(row, 'lower')}"
         )
     if not shown:
         told.append("no control beside it")

@@ -16,13 +16,7 @@ PAIRS = 2000  # drawn of each generation
 def checks(
     results: Results, costs: Sequence[Comparison], evenness: Sequence[Comparison]
 ) -> list[tuple[str, str]]:
-    """Return the checks of an experiment whose conditions change the cross-over.
-
-    Args:
-        results: With data.
-        costs: Of the first condition with each other one.
-        evenness: The same.
-    """
+    """Return the checks of an experiment whose conditions change the cross-over."""
     first, *others = results.with_data
     if not isinstance(first.planner, ViaPointGa) or first.is_control:
         return []

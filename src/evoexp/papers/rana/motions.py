@@ -53,11 +53,6 @@ def paths_table(
 
     Of more than `MOST_PATHS` replicates the first ones are in it, and the best one.
 
-    Args:
-        condition: With data.
-        table_of: Gives the table of one solution.
-        best: Name of the best replicate's series.
-
     Returns:
         The columns of `table_of`, series (best, replicate, straight line) and replicate (−1: none).
         If replicates are left out, a series "replicate of N" tells how many there are.
@@ -76,15 +71,7 @@ def paths_table(
 
 
 def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, colour: str) -> None:
-    """Draw the paths of an arm in a plane or in space, the best path with its start and goal.
-
-    Args:
-        axes: With as many dimensions as there are columns.
-        rows: Of `paths_table`.
-        columns: Names of the coordinates.
-        best: Name of the best replicate's series.
-        colour: Of the arm.
-    """
+    """Draw the paths of an arm in a plane or in space, the best path with its start and goal."""
     for (series, _), path in groups(rows, ["series", "replicate"]):
         points = [path[name].to_numpy() for name in columns]
         if series == best:
@@ -121,10 +108,7 @@ def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, f
     """Return the kinds of pairs of bodies: name → (pairs of the scene, required distance)."""
     found = problem(condition)
     among = obstacle_pairs(found.assembly, found.scene)
-    kinds = {
-        ARMS: (~among, found.security_margin),
-        OBSTACLES: (among, found.obstacle_margin),
-    }
+    kinds = {ARMS: (~among, found.security_margin), OBSTACLES: (among, found.obstacle_margin)}
     return {name: kind for name, kind in kinds.items() if kind[0].any()}
 
 

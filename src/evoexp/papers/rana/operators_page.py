@@ -5,29 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.papers.rana import crossover_checks, measures
-from evoexp.papers.rana.rules import RULES
-from evoexp.report.kit import (
-    Claim,
-    Comparison,
-    ConditionResults,
-    Judge,
-    Page,
-    Proportion,
-    ReportSettings,
-    Results,
-    Values,
-    by_column,
-    compared,
-    evidence,
-    fisher_exact,
-    generic,
-    holm,
-    judging,
-    markdown,
-    run_measures,
-    sweep_figures,
-    verdicts,
-)
+from evoexp.papers.rana.rules import PAPER, RULES
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown, run_measures, sweep_figures, verdicts
 
 
 class ComparedQuantity(NamedTuple):
@@ -36,32 +16,27 @@ class ComparedQuantity(NamedTuple):
     short: str  # name in figures; empty: in none
     name: str
     unit: str
-    values: Values
+    values: kit.Values
     lower_is_better: bool = True
 
 
 COST, EVENNESS = "best cost", "unevenness of the best, C3 + C4"
 COMPARED = (
-    ComparedQuantity("best cost", COST, "–", by_column("best_cost")),
+    ComparedQuantity("best cost", COST, "–", kit.by_column("best_cost")),
     ComparedQuantity("unevenness C3 + C4", EVENNESS, "deg", measures.unevenness),
     ComparedQuantity(
         "clearance",
         "clearance of the bodies over the whole motion",
         "length",
-        by_column("clearance"),
+        kit.by_column("clearance"),
         lower_is_better=False,
     ),
     ComparedQuantity("", measures.FIRST_FREE, "generation", run_measures.first_feasible),
 )
-INTRODUCTION = (
-    "Each condition changes one part of the first one; all share their seeds. Costs are measured "
-    "by the same formula, except that collision substeps look for collisions between via-points, "
-    "too. Without elites a generation evaluates as many individuals more as there were elites."
-)
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of ablations, or the generic page if there is nothing to compare."""
     if len(results.with_data) < 2:
         return generic.page(results, settings)
@@ -70,16 +45,18 @@ def page(results: Results, settings: ReportSettings) -> Page:
     first, *others = results.with_data
     pairs = [(first, other) for other in others]
     tables = {
-        one.name: compared(pairs, one.values, settings, lower_is_better=one.lower_is_better)
+        one.name: kit.compared(pairs, one.values, settings, lower_is_better=one.lower_is_better)
         for one in COMPARED
     }
     shown = [one for one in COMPARED if one.short and tables[one.name]]
     units = {one.name: unit if one.unit == "length" else one.unit for one in COMPARED}
     cost, _, *effort = base.quantities
     own = [generic.quantity(results, one.name, units[one.name], one.values) for one in COMPARED[1:]]
-    return base._replace(
+    return PAPER.page(
+        results,
+        "operators",
+        base,
         title=f"{results.experiment or 'stored runs'}: {first.label} against each other condition",
-        introduction=INTRODUCTION,
         quantities=(cost, *own, *effort),
         claims=tuple(operator_claims(results, settings, judging.judge(results, settings, RULES))),
         checks=tuple(crossover_checks.checks(results, tables[COST], tables[EVENNESS])),
@@ -99,8 +76,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 
 def operator_claims(
-    results: Results, settings: ReportSettings, judge: Judge, who: str = "", first: str = ""
-) -> list[Claim]:
+    results: kit.Results,
+    settings: kit.ReportSettings,
+    judge: kit.Judge,
+    who: str = "",
+    first: str = "",
+) -> list[kit.Claim]:
     """Judge the paper's claim about relaxation and redistribution, part by part.
 
     Args:
@@ -119,13 +100,13 @@ def operator_claims(
         return []
     pairs = [(printed, other) for other in named.values() if other is not printed]
     rows = {
-        one.name: {row.quantity: row for row in compared(pairs, one.values, settings)}
+        one.name: {row.quantity: row for row in kit.compared(pairs, one.values, settings)}
         for one in COMPARED[:2]
     }
     parts = [other for _, other in pairs if other.label in PARTS]
     counts = {c.label: refuted(c) for c in (printed, *parts)}
     own = counts[printed.label]
-    p_values = holm([fisher_exact(own, counts[part.label]) for part in parts])
+    p_values = kit.holm([kit.fisher_exact(own, counts[part.label]) for part in parts])
     claims = []
     for part, p_value in zip(parts, p_values, strict=True):
         other = counts[part.label]
@@ -154,17 +135,17 @@ def improves(says: list[int]) -> bool | None:
     return None if better == worse else better
 
 
-def refuted(condition: ConditionResults) -> Proportion:
+def refuted(condition: kit.ConditionResults) -> kit.Proportion:
     """Count the motions whose bodies touch."""
     counts = condition.verdicts
-    return Proportion(counts.refuted, counts.judged)
+    return kit.Proportion(counts.refuted, counts.judged)
 
 
 def _told(
-    row: Comparison | None,
+    row: kit.Comparison | None,
     name: str,
     unit: str,
-    pair: tuple[ConditionResults, ConditionResults] | None = None,
+    pair: tuple[kit.ConditionResults, kit.ConditionResults] | None = None,
 ) -> str:
     """Return a comparison in words, with the medians of both where the pair is given."""
     if row is None:
@@ -175,4 +156,4 @@ def _told(
         with_it, without = (markdown.number(float(np.median(measures.unevenness(c)))) for c in pair)
         medians = f"{with_it}{shown} with, {without}{shown} without, "
     difference = markdown.number(row.median_difference)
-    return f"{name}: {medians}median difference {difference}{shown}, {evidence(row, 'lower')}"
+    return f"{name}: {medians}median difference {difference}{shown}, {kit.evidence(row, 'lower')}"

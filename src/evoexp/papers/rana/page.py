@@ -5,54 +5,27 @@ import numpy as np
 from evoexp.papers.rana import drawings, measures, motions, operators_page
 from evoexp.papers.rana.claims import evolution_told
 from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report.kit import (
-    ConditionResults,
-    Judge,
-    Page,
-    Quantity,
-    ReportSettings,
-    Results,
-    beside,
-    by_column,
-    compared_with_controls,
-    generic,
-    judging,
-    markdown,
-    overridden,
-    parameters,
-    planned_replicates,
-    run_measures,
-    spread,
-    verdicts,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown, run_measures
 
-CLEARANCE, COST = by_column("clearance"), by_column("best_cost")
+CLEARANCE, COST = kit.by_column("clearance"), kit.by_column("best_cost")
 PRINTED = "as printed"  # label of the printed setting among the ablations
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
 COMPARED = (  # with the controls: name, whether lower is better, values
     ("best cost", True, COST),
-    (
-        "path length over that of the straight line",
-        True,
-        by_column("term_path_length_ratio"),
-    ),
-    ("colliding instants C5 of the best", True, by_column("term_collisions")),
+    ("path length over that of the straight line", True, kit.by_column("term_path_length_ratio")),
+    ("colliding instants C5 of the best", True, kit.by_column("term_collisions")),
     ("clearance of the bodies over the whole motion", False, CLEARANCE),
 )
-INTRODUCTION = (
-    "Two arms change sides; the paths of both are strings of via-points, evolved together. The "
-    "paper maximises the fitness F = C_max − cost; everything else here is a cost, lower is "
-    "better. Instant i is the i-th via-point of both arms."
-)
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the paper, or the generic page if its figures cannot draw a robot."""
     if not results.with_data or not all(_fits(condition) for condition in results.with_data):
         return generic.page(results, settings)
-    comparisons = compared_with_controls(results, settings, COMPARED)
+    comparisons = kit.compared_with_controls(results, settings, COMPARED)
     drawn = [measure(c, suffix, settings) for c, suffix in results.suffixed]
     found = [claim for one in drawn for claim in _claims(results, settings, one)]
     checks = [
@@ -63,10 +36,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
         *(d for one in drawn for d in drawings.drawings(one)),
     ]
     planar = {one.planar for one in drawn}
-    return Page(
-        f"Rana & Zalzala 1995: {' and '.join(ARMS[flat] for flat in sorted(planar, reverse=True))}",
-        INTRODUCTION,
-        _quantities(results),
+    arms = " and ".join(ARMS[flat] for flat in sorted(planar, reverse=True))
+    return PAPER.page(
+        results,
+        "arms",
+        title=f"{PAPER.name}: {arms}",
+        quantities=_quantities(results),
         claims=tuple(found),
         checks=tuple(checks),
         comparisons=comparisons,
@@ -74,7 +49,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def _fits(condition: ConditionResults) -> bool:
+def _fits(condition: kit.ConditionResults) -> bool:
     """Return whether the paper's figures can draw a condition.
 
     They draw several arms of two joints in a plane, or of three joints or more in space.
@@ -86,7 +61,7 @@ def _fits(condition: ConditionResults) -> bool:
     return all(stop - first >= joints for first, stop in problem.arm_slices)
 
 
-def _quantities(results: Results) -> tuple[Quantity, ...]:
+def _quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     unit = results.with_data[0].condition.length_unit
     cost, _, *effort = generic.quantities(results)
     least = "least distance of centres of circles or spheres at via-points"
@@ -98,35 +73,35 @@ def _quantities(results: Results) -> tuple[Quantity, ...]:
         ("the same, sampled between via-points too", unit, BETWEEN),
         (clearance, unit, "clearance"),
     )
-    fitness = by_column("term_fitness")
+    fitness = kit.by_column("term_fitness")
     return (
         cost,
         generic.quantity(results, "fitness F of the best", "–", fitness),
         generic.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible),
-        *(generic.quantity(results, name, of, by_column(column)) for name, of, column in rows),
+        *(generic.quantity(results, name, of, kit.by_column(column)) for name, of, column in rows),
         *effort,
     )
 
 
-def not_judged(results: Results, condition: ConditionResults) -> str:
+def not_judged(results: kit.Results, condition: kit.ConditionResults) -> str:
     """Return why claims are not judged on a condition; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
     if condition.is_control:
         return judging.ONLY_CONTROLS
-    planned = planned_replicates(results)
+    planned = kit.planned_replicates(results)
     if condition.planned < planned:
         return f"{condition.planned} of {planned} replicates planned"
-    changed = overridden(parameters(results, condition))
+    changed = kit.overridden(kit.parameters(results, condition))
     return f"overridden: {', '.join(changed)}" if changed else ""
 
 
 def _claims(
-    results: Results, settings: ReportSettings, one: MeasuredMotions
-) -> list[verdicts.Claim]:
+    results: kit.Results, settings: kit.ReportSettings, one: MeasuredMotions
+) -> list[kit.Claim]:
     """Return the paper's claims with verdicts on one condition."""
     c, unit, who = one.condition, one.condition.condition.length_unit, _who(results, one)
-    judge = Judge(not_judged(results, c), settings.significance, RULES)
+    judge = kit.Judge(not_judged(results, c), settings.significance, RULES)
     section, figures = ("section 3.5", ("4", "7")) if one.planar else ("section 4.2", ("11", "13"))
     told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
     hearing = judge.on("free_at_via_points", who=who, source=f"{section}, Fig. {figures[0]}")
@@ -146,7 +121,7 @@ def _claims(
         told = (
             f"{markdown.share(safe, c.done)} runs never below {one.margin:g} {unit}; least "
             f"{markdown.number(float(np.min(values)))}, median "
-            f"{markdown.number(spread(values).median)} {unit}{more}"
+            f"{markdown.number(kit.spread(values).median)} {unit}{more}"
         )
         hearing = judge.on(name, who=who, source=f"{section}, Fig. {figures[1]}")
         found.append(hearing.every(told, safe, c.done, c.planned))
@@ -159,8 +134,8 @@ def _claims(
 
 
 def _operator_claims(
-    results: Results, settings: ReportSettings, one: MeasuredMotions, judge: Judge
-) -> list[verdicts.Claim]:
+    results: kit.Results, settings: kit.ReportSettings, one: MeasuredMotions, judge: kit.Judge
+) -> list[kit.Claim]:
     """Judge the claim about the two operators from the stored ablations of the same scene."""
     experiment = f"rana_{'planar' if one.planar else 'puma'}_ablations"
     stored, who = results.beside(experiment), _who(results, one)
@@ -174,17 +149,17 @@ def _operator_claims(
 
 
 def _evolution_claim(
-    results: Results, settings: ReportSettings, one: MeasuredMotions, judge: Judge
-) -> verdicts.Claim:
+    results: kit.Results, settings: kit.ReportSettings, one: MeasuredMotions, judge: kit.Judge
+) -> kit.Claim:
     """Judge what evolution adds to every control, and tell how much to the best of them."""
     c = one.condition
-    controls = [k for k in results.evolved if k.is_control and beside(c.condition, k.condition)]
+    controls = [k for k in results.evolved if k.is_control and kit.beside(c.condition, k.condition)]
     told, rows = evolution_told(c, controls, settings)
     hearing = judge.on("evolution_adds", who=_who(results, one))
     return hearing.better_than_all(told, rows)
 
 
-def _who(results: Results, one: MeasuredMotions) -> str:
+def _who(results: kit.Results, one: MeasuredMotions) -> str:
     """Return the label that begins a line about a condition, or nothing if there is one only."""
     return f"{one.condition.label}: " if len(results.main) > 1 else ""
 
@@ -198,7 +173,7 @@ def _checks(one: MeasuredMotions) -> list[tuple[str, str]]:
     closer = int(np.count_nonzero(c.column("clearance") < one.margin))
     verdicts = c.verdicts
     weights, total = c.planner.objective, motions.straight_length(c)
-    longer = spread(total * (c.column("term_path_length_ratio") - 1.0))
+    longer = kit.spread(total * (c.column("term_path_length_ratio") - 1.0))
     redistributed, both = (motions.colliding_after(c, relaxed) for relaxed in (False, True))
     return [
         (

@@ -3,40 +3,20 @@
 import numpy as np
 
 from evoexp.papers.rana import measures, motions
-from evoexp.papers.rana.rules import RULES
+from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    Claim,
-    ConditionResults,
-    Judge,
-    Page,
-    Proportion,
-    ReportSettings,
-    Results,
-    Table,
-    by_column,
-    compared,
-    generic,
-    judging,
-    markdown,
-    run_measures,
-    sweep_figures,
-)
+from evoexp.report import kit
+from evoexp.report.kit import generic, judging, markdown, run_measures, sweep_figures
 
 LENGTH, HITS = "path length of the best, all arms", "colliding instants C5 of the best"
-INTRODUCTION = (
-    "Eq. 7 weighs a colliding instant (k3) against the length of the paths (k1 per degree). All "
-    "conditions share their seeds and differ in k3 alone, so their costs are not comparable: "
-    "lengths and collisions are."
-)
 COLLIDING = (
     "Share of runs whose best string collides at a via-point by the paper's model, or whose "
     "bodies touch somewhere on the whole motion, with Wilson's interval."
 )
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
+def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page, or the generic page if other planners were run."""
     if not run_measures.planned_by(results, ViaPointGa):
         return generic.page(results, settings)
@@ -45,15 +25,15 @@ def page(results: Results, settings: ReportSettings) -> Page:
     _, _, *effort = generic.quantities(results)
     quantities = (
         generic.quantity(results, LENGTH, "deg", length),
-        generic.quantity(results, HITS, "–", by_column("term_collisions")),
+        generic.quantity(results, HITS, "–", kit.by_column("term_collisions")),
         generic.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible),
         *effort,
     )
-    rows = compared([(first, other) for other in others], length, settings)
+    rows = kit.compared([(first, other) for other in others], length, settings)
     counts = [(c, *_colliding(c)) for c in results.with_data]
-    return Page(
-        title=f"Rana & Zalzala 1995: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
+    return PAPER.page(
+        results,
+        "weights",
         quantities=quantities,
         claims=tuple(_claims(judge, first)),
         comparisons=((f"{LENGTH}: {first.label} against …", rows),) if rows else (),
@@ -63,7 +43,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
                 results,
                 {
                     "path length [deg]": length,
-                    "colliding instants C5": by_column("term_collisions"),
+                    "colliding instants C5": kit.by_column("term_collisions"),
                 },
             ),
             sweep_figures.shares_drawing(
@@ -81,28 +61,28 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def length(condition: ConditionResults) -> FloatArray:
+def length(condition: kit.ConditionResults) -> FloatArray:
     """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
     return np.asarray(motions.straight_length(condition) * ratio)
 
 
-def worth(condition: ConditionResults) -> float:
+def worth(condition: kit.ConditionResults) -> float:
     """Return how many degrees of path cost as much as one colliding instant, k3 / k1."""
     weights = condition.planner.objective
     return float(weights.collision_weight / weights.length_weight)
 
 
-def _colliding(condition: ConditionResults) -> tuple[Proportion, Proportion]:
+def _colliding(condition: kit.ConditionResults) -> tuple[kit.Proportion, kit.Proportion]:
     """Count the runs that end in a collision: at a via-point, anywhere."""
     counts = condition.verdicts
     return (
-        Proportion(condition.done - condition.solved, condition.done),
-        Proportion(counts.refuted, counts.judged),
+        kit.Proportion(condition.done - condition.solved, condition.done),
+        kit.Proportion(counts.refuted, counts.judged),
     )
 
 
-def _claims(judge: Judge, printed: ConditionResults) -> list[Claim]:
+def _claims(judge: kit.Judge, printed: kit.ConditionResults) -> list[kit.Claim]:
     straight = motions.straight_length(printed)
     line = printed.evaluate(motions.straight_line(printed))
     told = f"{markdown.share(printed.solved, printed.done)} finished runs end free at via-points"
@@ -123,7 +103,7 @@ def _claims(judge: Judge, printed: ConditionResults) -> list[Claim]:
     ]
 
 
-def _table(counts: list[tuple[ConditionResults, Proportion, Proportion]]) -> Table:
+def _table(counts: list[tuple[kit.ConditionResults, kit.Proportion, kit.Proportion]]) -> kit.Table:
     rows = tuple(
         (
             c.label,
@@ -134,14 +114,4 @@ def _table(counts: list[tuple[ConditionResults, Proportion, Proportion]]) -> Tab
         )
         for c, at, anywhere in counts
     )
-    return Table(
-        "What a collision costs",
-        (
-            "condition",
-            "path that costs as much as one colliding instant",
-            "runs that end in a collision at a via-point",
-            "runs whose bodies touch somewhere",
-            "median path length",
-        ),
-        rows,
-    )
+    return PAPER.table("costs", rows)

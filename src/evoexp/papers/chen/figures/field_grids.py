@@ -86,11 +86,7 @@ def compare(
 
 
 def draw_fields(table: pd.DataFrame) -> Figure:
-    """Draw one grid per field, with the number of every node, and mark where the print differs.
-
-    Args:
-        table: See `compare`; several fields.
-    """
+    """Draw one grid per field, with the number of every node, and mark where the print differs."""
     count = table["field"].nunique()
     figure = style.figure(7.2 * 0.5 * 1.12, style.WIDTH * (1.0 if count > 1 else 0.55))
     panels = figure.subplots(1, count, squeeze=False)[0]

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from evoexp.papers import marks
 from evoexp.papers.chen.path_measures import Group, boxes, gaps, median_path, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
@@ -26,19 +27,12 @@ KNOWN, BOUND = "best path known", "no path costs less"
 
 
 class Line(NamedTuple):
-    """A path to draw.
+    """A path to draw."""
 
-    Attributes:
-        kind: Lines of one kind look alike and share an entry in the legend.
-        path: (nodes, 2).
-        share: Share of the runs that take it, in [0, 1]; tells its width.
-        text: Entry in the legend; empty: the kind.
-    """
-
-    kind: str
-    path: FloatArray
-    share: float = 1.0
-    text: str = ""
+    kind: str  # lines of one kind look alike and share an entry in the legend
+    path: FloatArray  # (nodes, 2)
+    share: float = 1.0  # share of the runs that take it, in [0, 1]; tells its width
+    text: str = ""  # entry in the legend; empty: the kind
 
 
 def known_lines(group: Group) -> list[Line]:
@@ -47,9 +41,7 @@ def known_lines(group: Group) -> list[Line]:
     return [Line(MEDIAN, median_path(group.main)), *best]
 
 
-def paths_table(
-    panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]],
-) -> pd.DataFrame:
+def paths_table(panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]]) -> pd.DataFrame:
     """Return obstacles and paths of all workspaces.
 
     Args:
@@ -98,9 +90,8 @@ def draw_routes(table: pd.DataFrame) -> Figure:
 def draw_obstacle(axes: Axes, x: pd.Series, y: pd.Series) -> None:
     """Draw an obstacle between two corners."""
     (x0, x1), (y0, y1) = x, y
-    axes.add_patch(
-        Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL)
-    )
+    look: dict[str, Any] = {"facecolor": "#bbbbbb", "edgecolor": style.NEUTRAL}
+    axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
 
 
 def _lines(panels: list[Axes], table: pd.DataFrame) -> Iterator[tuple[Axes, str, pd.DataFrame]]:
@@ -184,19 +175,8 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
         if group.truth is not None:
             known = (KNOWN, group.optimum), (BOUND, group.bound)
             rows += [(group.title, -1, name, name, 0, *(value,) * 3) for name, value in known]
-    return pd.DataFrame(
-        rows,
-        columns=[
-            "panel",
-            "position",
-            "condition",
-            "quantity",
-            "generation",
-            "median",
-            "lower",
-            "upper",
-        ],
-    )
+    names = ["panel", "position", "condition", "quantity", "generation"]
+    return pd.DataFrame(rows, columns=[*names, "median", "lower", "upper"])
 
 
 def draw_costs(table: pd.DataFrame) -> Figure:
@@ -223,7 +203,7 @@ def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None
         axes.plot(x, median, label=f"{label}, average", color=colour, **look)
     else:
         axes.plot(x, median, color=colour, label=label)
-        axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)
+        marks.band(axes, x, line["lower"], line["upper"], colour)
 
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:

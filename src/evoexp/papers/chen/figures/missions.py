@@ -57,13 +57,7 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
 
 
 def _joints(model: pin.Model, last: float, q: FloatArray) -> list[list[float]]:
-    """Return the arm's joints and its end, (4, 2): x, and height.
-
-    Args:
-        model: Platform and arm.
-        last: Length of the last link.
-        q: (nq,) configuration.
-    """
+    """Return the arm's joints and its end, (4, 2): x, and height."""
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     points = [data.oMi[k].translation for k in range(3, model.njoints)]

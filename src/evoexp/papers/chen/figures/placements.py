@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import MultipleLocator
 
+from evoexp.papers import marks
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.records import FloatArray
 from evoexp.report.kit import groups, quantiles, records, rounded, style
@@ -88,7 +89,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
         for method, own in groups(rows, "method"):
             x, colour = own["generation"], _colour(method)
             label = f"{method} (n = {int(own['runs'].max())})"
-            axes.fill_between(x, own["lower"], own["upper"], color=colour, alpha=0.18, linewidth=0)
+            marks.band(axes, x, own["lower"], own["upper"], colour)
             axes.plot(x, own["median"], color=colour, label=label)
         axes.axhline(optimum, label="optimum", **OPTIMUM_LINE)
         # the first generations may be far off: later ones tell the range
@@ -140,14 +141,10 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
             x = np.sort(np.maximum(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP))
             finite = np.isfinite(x)  # the gaps that are not come last
             heights = np.arange(1, len(x) + 1)[finite] / len(x)
-            axes.step(
-                np.append(x[finite], 1e2),
-                np.append(heights, finite.mean()),
-                where="post",
-                color=_colour(method),
-                linestyle="-" if method in RUNS else (0, (4, 1.5)),
-                label=f"{method} (n = {len(x)})",
-            )
+            steps = np.append(x[finite], 1e2), np.append(heights, finite.mean())
+            look: dict[str, Any] = {"color": _colour(method), "label": f"{method} (n = {len(x)})"}
+            look["linestyle"] = "-" if method in RUNS else (0, (4, 1.5))
+            axes.step(*steps, where="post", **look)
         for close in CLOSE:
             axes.axvline(close, color=style.FAINT, linewidth=0.8, linestyle=":")
         axes.set(
@@ -192,12 +189,8 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
             if found.get("branch", -1.0) >= 0.0:
                 own += _links(case, posture, found)
         rows += [(panel, case.name, *row) for row in own]
-    return rounded(
-        pd.DataFrame(
-            rows,
-            columns=["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"],
-        )
-    )
+    names = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
+    return rounded(pd.DataFrame(rows, columns=names))
 
 
 def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any, ...]]:

@@ -12,18 +12,9 @@ from matplotlib.ticker import NullFormatter, NullLocator
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
+from evoexp.report import kit
 from evoexp.report.figures.boxes import JITTER
-from evoexp.report.kit import (
-    ConditionResults,
-    Proportion,
-    Values,
-    expected_effort,
-    expected_interval,
-    groups,
-    solved,
-    spread,
-    style,
-)
+from evoexp.report.kit import style
 
 SHARE, EFFORT, RATIO = "share", "effort", "ratio"
 NUMBERS = "abcdef"
@@ -35,8 +26,8 @@ PROPORTIONAL: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.1, "lines
 
 def effort_table(
     found: tuple[Task, ...],
-    shares: Mapping[str, Callable[[ConditionResults], Proportion]],
-    effort: Mapping[str, Values],
+    shares: Mapping[str, Callable[[kit.ConditionResults], kit.Proportion]],
+    effort: Mapping[str, kit.Values],
     confidence: float,
     num_resamples: int,
 ) -> pd.DataFrame:
@@ -67,20 +58,17 @@ def effort_table(
     ]
     for name, values in effort.items():
         for *given, c in points:
-            runs = values(c), solved(c)
-            expected = expected_effort(*runs), *expected_interval(*runs, confidence, num_resamples)
+            runs = values(c), kit.solved(c)
+            expected = (
+                kit.expected_effort(*runs),
+                *kit.expected_interval(*runs, confidence, num_resamples),
+            )
             rows.append((name, EFFORT, *given, *expected, c.solved, c.done))
     return pd.DataFrame(rows, columns=[*NAMES, "having", "total"])
 
 
 def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
-    """Draw one panel per quantity; a value without a success has no point.
-
-    Args:
-        table: As `effort_table` gives it.
-        setting: Label of the horizontal axis.
-        marked: The value that the paper recommends.
-    """
+    """Draw one panel per quantity; a value without a success has no point."""
     quantities = list(dict.fromkeys(table["quantity"]))
     lines, free = -(-len(quantities) // 2), len(quantities) % 2 == 1
     figure = style.figure(2.6 * lines + (0.0 if free else 0.7))
@@ -107,11 +95,6 @@ def ratios_table(
     rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float
 ) -> pd.DataFrame:
     """Return the effort of every value over that of the recommended one.
-
-    Args:
-        rows: Metric → objects with task, value, ratio, interval, bound.
-        names: Tasks, in the order that gives them their colours.
-        reference: The recommended value.
 
     Returns:
         Columns quantity, kind (ratio), position, task, value, expected (the ratio), lower, upper,
@@ -152,7 +135,7 @@ def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> 
     share = table["kind"].iloc[0] == SHARE
     scale = 100.0 if share else 1.0
     known = table.replace(np.inf, np.nan).dropna(subset="expected").sort_values("value")
-    for position, rows in groups(known, "position"):
+    for position, rows in kit.groups(known, "position"):
         x = rows["value"] * (1.0 + APART * (position - 0.5 * (count - 1)))
         look, most = _look(int(position)), rows["upper"].fillna(rows["expected"])
         axes.plot(x, scale * rows["expected"], linewidth=1.1, **look)
@@ -202,7 +185,7 @@ def floor_table(found: Sequence[Task]) -> pd.DataFrame:
         for scope, c in task.by_value.items():
             given = position, task.name
             for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
-                median, lower, upper, _ = spread(values)
+                median, lower, upper, _ = kit.spread(values)
                 rows.append((*given, name, scope, median, lower, upper, c.done, slope(task)))
             rows += [
                 (*given, POINT, scope, value, value, value, 1, slope(task))
@@ -218,7 +201,7 @@ def slope(task: Task) -> float:
 
     It is NaN if there are fewer than two scopes.
     """
-    medians = np.array([spread(measures.residuals(c)).median for c in task.conditions])
+    medians = np.array([kit.spread(measures.residuals(c)).median for c in task.conditions])
     if len(medians) < 2 or not (medians > 0.0).all():
         return float("nan")
     x, y = np.log2(np.array(task.values)), np.log2(medians)
@@ -230,7 +213,7 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     """Draw residuals with every run, and cycles, against the scope, a colour per kind of goal."""
     figure, (left, right) = style.row_of_panels(3.4, 2)
     unit, keys = table["length_unit"].iloc[0], []
-    for (position, task), own in groups(table, ["position", "task"]):
+    for (position, task), own in kit.groups(table, ["position", "task"]):
         colour = style.arm_colour(int(position))
         name = f"{task} (slope {own['slope'].iloc[0]:.2f})"
         keys.append(style.key(name, color=colour, marker="o", markersize=4.5))

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
 from evoexp.report.kit import Results, counted, groups, quantile, quantiles, records, style
 
@@ -113,12 +114,9 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
     """Draw one curve per condition or phase; numbers of runs at the ends, equal ones once."""
     longest = {rows["begun"].iloc[0]: name for _, name, rows in _by_length(table, by)}
     for name, curve in groups(table, by):
-        x, median, colour = (
-            curve["cycle"],
-            curve["median"],
-            style.condition_colour(names.index(name)),
-        )
-        axes.fill_between(x, curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
+        x, median = curve["cycle"], curve["median"]
+        colour = style.condition_colour(names.index(name))
+        marks.band(axes, x, curve["lower"], curve["upper"], colour, alpha=0.2)
         axes.plot(x, median, color=colour)
         begun = curve["begun"].iloc[0]
         if longest[begun] == name:

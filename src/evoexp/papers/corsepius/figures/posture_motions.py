@@ -16,15 +16,8 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    BOOTSTRAP_SEED,
-    ConditionResults,
-    groups,
-    motion_geometry,
-    records,
-    rounded,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import motion_geometry, style
 from evoexp.robots.poses import frame_pose
 
 LINK, OBSTACLE, HELD, TIP, GOAL = "link", "obstacle", "held", "tip", "goal"
@@ -40,19 +33,12 @@ EQUAL: dict[str, Any] = {"adjustable": "datalim", "aspect": "equal"}
 
 
 class ShownPath(NamedTuple):
-    """The run of one panel, or of one panel per phase.
+    """The run of one panel, or of one panel per phase."""
 
-    Attributes:
-        title: Title of the panel.
-        condition: The condition of the run.
-        replicate: Its replicate.
-        by_phase: Whether each phase has a panel of its own.
-    """
-
-    title: str
-    condition: ConditionResults
-    replicate: int
-    by_phase: bool = False
+    title: str  # title of the panel
+    condition: kit.ConditionResults  # the condition of the run
+    replicate: int  # its replicate
+    by_phase: bool = False  # whether each phase has a panel of its own
 
 
 def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
@@ -74,30 +60,13 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
             given = {"panel": len(panels), "title": title, "length_unit": unit}
             panels.append([given | row for row in _panel(problem, span, postures, first)])
     rows = [row for panel in panels for row in panel]
-    return rounded(
-        pd.DataFrame(rows).reindex(
-            columns=[
-                "panel",
-                "title",
-                "element",
-                "instant",
-                "name",
-                *solids.COLUMNS,
-                *PATH,
-                "length_unit",
-            ]
-        )
-    )
+    names = ["panel", "title", "element", "instant", "name", *solids.COLUMNS, *PATH, "length_unit"]
+    return kit.rounded(pd.DataFrame(rows).reindex(columns=names))
 
 
 def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
-    """Draw one panel per path or phase; where there are one or two, each from above, too.
-
-    Args:
-        table: As `motions_table` gives it.
-        same_scene: Whether all panels show the same room: the phases of one path.
-    """
-    panels = list(groups(table, ["panel", "title"]))
+    """Draw one panel per path or phase; where there are one or two, each from above, too."""
+    panels = list(kit.groups(table, ["panel", "title"]))
     above = len(panels) <= FEW
     columns = 2 if above else min(PER_LINE, len(panels))
     lines = len(panels) if above else -(-len(panels) // columns)
@@ -184,12 +153,12 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     )
     first, last = sticks["instant"].min(), sticks["instant"].max()
     # obstacles, and the held object: earlier fainter
-    for row in records(obstacles):
+    for row in kit.records(obstacles):
         draw(axes, row, style.FAINT, 0.22)
-    for row in records(held):
+    for row in kit.records(held):
         draw(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
     # postures: earlier fainter, joints of the last one
-    for instant, links in groups(sticks, "instant"):
+    for instant, links in kit.groups(sticks, "instant"):
         points = [[links[name].iloc[0], *links[f"{name}_end"]] for name in names]
         shade = 0.12 + 0.4 * (instant - first) / max(1, last - first)
         newest = instant == last
@@ -200,17 +169,11 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     # the tool's way and its goal
     way = tip.sort_values("instant")
     axes.plot(*(way[name] for name in names), color=TOOL, linewidth=1.0, zorder=7)
-    axes.plot(
-        *(goal[name] for name in names),
-        "*",
-        color="white",
-        markeredgecolor=style.NEUTRAL,
-        ms=8,
-        zorder=8,
-    )
+    star: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "ms": 8}
+    axes.plot(*(goal[name] for name in names), "*", zorder=8, **star)
 
 
-def scope_table(condition: ConditionResults) -> pd.DataFrame:
+def scope_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the shown path in its two liveliest joints, and the tool's reach at the start.
 
     The reach is told by hulls of the tool's places after one random step.
@@ -225,7 +188,7 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
     moved = np.abs(np.diff(q, axis=0)).sum(axis=0)
     a, b = sorted(int(k) for k in np.argsort(-moved, kind="stable")[:2])
     half = problem.scope[[a, b]] / DEGREE
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+    rng = np.random.Generator(np.random.PCG64(kit.BOOTSTRAP_SEED))
     steps = 2.0 * rng.random((STEPS, len(problem.start))) - 1.0
     parts = [(POSTURE, q[:, [a, b]] / DEGREE, *half, np.nan)]
     for factor in FACTORS:
@@ -238,7 +201,7 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
         for element, points, *rest in parts
         for n, (x, y) in enumerate(points)
     ]
-    table = rounded(
+    table = kit.rounded(
         pd.DataFrame(rows, columns=["element", "order", "x", "y", "half_x", "half_y", "factor"])
     )
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit)
@@ -249,7 +212,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     figure, (left, right) = style.row_of_panels(3.4, 2)
     path, reach, tool = (table[table["element"] == element] for element in (POSTURE, REACH, WAY))
     blue, last = style.arm_colour(0), max(1, len(path) - 1)
-    for row in records(path):
+    for row in kit.records(path):
         corner, shade = (row.x - row.half_x, row.y - row.half_y), 0.10 + 0.12 * row.order / last
         look: dict[str, Any] = {"linewidth": 0, "facecolor": blue, "alpha": shade}
         left.add_patch(Rectangle(corner, 2 * row.half_x, 2 * row.half_y, **look))
@@ -258,7 +221,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     joints = (int(table[name].iloc[0]) - 1 for name in ("joint_x", "joint_y"))
     x, y = (f"{style.joint_symbol(0, joint)} [deg]" for joint in joints)
     left.set(xlabel=x, ylabel=y, title="a  boxes of offspring along a path", **EQUAL)
-    for k, (factor, rows) in enumerate(sorted(groups(reach, "factor"), reverse=True)):
+    for k, (factor, rows) in enumerate(sorted(kit.groups(reach, "factor"), reverse=True)):
         colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
         look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
         right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **look)

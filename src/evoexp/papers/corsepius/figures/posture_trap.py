@@ -10,21 +10,14 @@ from matplotlib.patches import Rectangle
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    BOOTSTRAP_SEED,
-    ConditionResults,
-    groups,
-    median_replicate,
-    records,
-    rounded,
-    solved,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import style
 
 TOOL, CELL, ESCAPE, OBSTACLE, GOAL = "tool", "cell", "escape", "obstacle", "goal"
 CELLS = 81  # of the landscape, along each joint
@@ -34,16 +27,12 @@ BOXES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 SAMPLES = 20_000  # postures in each box
 STUCK, HELPED = "stuck", "helped"
 END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
-STAR: dict[str, Any] = {
-    "color": "white",
-    "markeredgecolor": style.NEUTRAL,
-    "markersize": 10,
-    "zorder": 6,
-}
 Rows = list[dict[str, object]]
 
 
-def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ConditionResults] | None:
+def pair(
+    shown: tuple[kit.ConditionResults, ...],
+) -> tuple[kit.ConditionResults, kit.ConditionResults] | None:
     """Return a task of one phase in which runs get stuck, and the same with sub-goals, solved.
 
     Returns:
@@ -63,7 +52,7 @@ def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, Conditi
     )
 
 
-def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
+def trap_table(stuck: kit.ConditionResults, helped: kit.ConditionResults) -> pd.DataFrame:
     """Return ways of the tools with distances to the goal, and the cost around a stuck posture.
 
     That posture is the end of the median run that is stuck. The planner's own `cost` judges all
@@ -78,10 +67,10 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     """
     rows: Rows = []
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
-        wanted, found = solved(condition) == (series == HELPED), measures.paths(condition)
+        wanted, found = kit.solved(condition) == (series == HELPED), measures.paths(condition)
         for replicate in condition.summaries.index[wanted]:
             rows += _way(stuck, series, int(replicate), found[replicate])
-    median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
+    median = kit.median_replicate(stuck, measures.evaluations(stuck), ~kit.solved(stuck))
     failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
     rows += [*_cells(stuck, failed[-1], a, b), *_escape(stuck, failed[-1])]
@@ -91,25 +80,19 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     shapes = obstacle_shapes(problem.obstacles_in(problem.last_stage))
     standing = [solids.solid(*shape) for shape in shapes]
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
-    table = rounded(
-        pd.DataFrame(rows).reindex(
-            columns=[
-                *("element", "series", "replicate", "order", "value", *solids.COLUMNS),
-                *("x_end", "y_end", "scope_deg"),
-            ]
-        )
-    )
+    names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS]
+    table = kit.rounded(pd.DataFrame(rows).reindex(columns=[*names, "x_end", "y_end", "scope_deg"]))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
 
 
-def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
+def _cost(condition: kit.ConditionResults, q: FloatArray) -> FloatArray:
     """Return the cost of postures q (nq, postures) [rad]; NaN: infeasible."""
     planner, problem = condition.prepared
     cost = planner.cost(problem, q).cost
     return np.where(np.isinf(cost), np.nan, cost)
 
 
-def _way(condition: ConditionResults, series: str, replicate: int, q: FloatArray) -> Rows:
+def _way(condition: kit.ConditionResults, series: str, replicate: int, q: FloatArray) -> Rows:
     """Return the places of the tool along a path, and its distances to the goal."""
     planner, problem = condition.prepared
     judged = planner.cost(problem, q.T)
@@ -122,7 +105,7 @@ def _way(condition: ConditionResults, series: str, replicate: int, q: FloatArray
     ]
 
 
-def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
+def _cells(condition: kit.ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
     """Return the cost over two joints, the others as at the end of the run that is stuck."""
     problem = measures.problem(condition)
     low, high = _box(problem, end, AROUND)
@@ -135,9 +118,9 @@ def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows
     return [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
 
 
-def _escape(condition: ConditionResults, end: FloatArray) -> Rows:
+def _escape(condition: kit.ConditionResults, end: FloatArray) -> Rows:
     """Return the least cost of random postures in boxes around a posture, and its own cost."""
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+    rng = np.random.Generator(np.random.PCG64(kit.BOOTSTRAP_SEED))
     (own,), rows = _cost(condition, end[:, None]), list[dict[str, object]]()
     for n, half in enumerate(BOXES):
         low, high = _box(measures.problem(condition), end, half)
@@ -162,19 +145,19 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     )
     unit = table["length_unit"].iloc[0]
     # ways of both kinds of runs, crosses where they are stuck
-    for row in records(obstacles):
+    for row in kit.records(obstacles):
         solids.draw_outline(above, row, style.FAINT, 0.35)
     looks = {
         STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
         HELPED: (style.arm_colour(0), "with a sub-goal"),
     }
     for series, (colour, _) in looks.items():
-        for _, rows in groups(tools[tools["series"] == series], "replicate"):
+        for _, rows in kit.groups(tools[tools["series"] == series], "replicate"):
             for axes, x, y in ((above, "x", "y"), (along, "order", "value")):
                 axes.plot(rows[x], rows[y], color=colour, linewidth=0.7, alpha=0.45)
             if series == STUCK:
                 above.plot(*rows[["x", "y"]].iloc[-1], "x", **END)
-    above.plot(goal["x"], goal["y"], "*", **STAR)
+    marks.hollow(above, goal["x"], goal["y"], "*", style.NEUTRAL, 10, zorder=6)
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
     along.set(
@@ -197,7 +180,7 @@ def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
     shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
     figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
     x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
-    axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
+    marks.contact(axes, x, y, 8)
     frame: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
     axes.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **frame))
     axes.grid(visible=False)
@@ -208,13 +191,8 @@ def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
 
 def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
     """Draw the least cost in boxes around the posture that is stuck."""
-    axes.axhline(
-        escapes["y"].iloc[0],
-        label="stuck",
-        color=style.FORBIDDEN,
-        linewidth=1.0,
-        linestyle=(0, (4, 2)),
-    )
+    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    axes.axhline(escapes["y"].iloc[0], label="stuck", **look)
     axes.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     axes.set_xscale("log", base=2)
     axes.xaxis.set_major_formatter("{x:g}")

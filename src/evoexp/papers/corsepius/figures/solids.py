@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from scipy.spatial import ConvexHull
 
+from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, records, rounded, style
@@ -100,30 +100,14 @@ def corners(table: pd.DataFrame) -> FloatArray:
 def space(
     figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple[float, float]
 ) -> Any:
-    """Return axes in space, with equal scales, that hold some points.
-
-    Args:
-        figure: The figure that they are put into.
-        place: As `add_subplot` takes it.
-        points: (points, 3).
-        unit: Of lengths.
-        view: Elevation and azimuth [deg].
-    """
-    axes: Any = figure.add_subplot(place, projection="3d")
+    """Return axes in space, with equal scales, that hold some points."""
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    for name, least, greatest in zip("xyz", low - pad, high + pad, strict=True):
-        getattr(axes, f"set_{name}lim")(least, greatest)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
-    spans = high - low + 2.0 * pad
-    axes.set_box_aspect(spans, zoom=0.92)
-    axes.patch.set_visible(False)
-    axes.tick_params(labelsize=6, pad=-2)
-    for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), spans, strict=True):
-        axis.set_major_locator(MaxNLocator(nbins=2 if span < 0.6 * spans.max() else 4))
+    look: dict[str, Any] = {"zoom": 0.92, "label_pads": (-7, -7, -7), "ticks": (2, 4)}
+    axes = marks.space(figure, (place,), low, high, pad, unit, view=view, **look)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
-    axes.view_init(elev=view[0], azim=view[1])
     return axes
 
 

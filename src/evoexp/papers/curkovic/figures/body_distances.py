@@ -7,29 +7,19 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    ConditionResults,
-    body_contacts,
-    distance_ranges,
-    groups,
-    motion_geometry,
-    rounded,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import body_contacts, distance_ranges, motion_geometry, style
 
 COLUMNS = 2  # of panels
 LOWEST, HIGHEST, BEST, STRAIGHT = "lowest", "highest", "best replicate", "straight line"
 
 
-def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
+def distances_table(conditions: tuple[kit.ConditionResults, ...], samples: int) -> pd.DataFrame:
     """Return the bodies' least distance: range over all motions, best replicate, straight line.
-
-    Args:
-        conditions: With data.
-        samples: Configurations per segment.
 
     Returns:
         Columns condition, position, series (lowest and highest of all replicates, best replicate,
@@ -46,12 +36,12 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
             parts.append(
                 pd.DataFrame(columns | {"instant": instants, "distance": distances} | counts)
             )
-    return rounded(pd.concat(parts, ignore_index=True)).assign(
+    return kit.rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
     )
 
 
-def _series(condition: ConditionResults, samples: int) -> dict[str, FloatArray]:
+def _series(condition: kit.ConditionResults, samples: int) -> dict[str, FloatArray]:
     """Return the distances of each series, (instants,) [length unit]."""
     prepared, solutions = condition.prepared, condition.solutions
     scene = condition.problem(Problem).scene
@@ -81,13 +71,11 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes in panels[len(positions) :]:
         axes.set_axis_off()
-    for axes, (position, rows) in zip(panels, groups(table, "position"), strict=False):
+    for axes, (position, rows) in zip(panels, kit.groups(table, "position"), strict=False):
         colour = style.condition_colour(int(position))
-        own = dict(groups(rows, "series"))
+        own = dict(kit.groups(rows, "series"))
         low, high, best, straight = (own[name] for name in (LOWEST, HIGHEST, BEST, STRAIGHT))
-        axes.fill_between(
-            low["instant"], low["distance"], high["distance"], color=colour, alpha=0.18, linewidth=0
-        )
+        marks.band(axes, low["instant"], low["distance"], high["distance"], colour)
         axes.plot(straight["instant"], straight["distance"], ":", color=style.FAINT)
         axes.plot(best["instant"], best["distance"], color=colour)
         at = best[best["instant"] == best["instant"].round()]

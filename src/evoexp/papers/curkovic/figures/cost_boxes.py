@@ -8,25 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from evoexp.papers import marks
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
 from evoexp.report.kit import Results, groups, quantile, style
 
 SPREAD = 0.2  # [rows] over which points are spread to either side
-BOX = "Boxes: median and quartiles of all runs, whiskers to the last value within 1.5 interquartile"
-CAPTION = (
-    f"{BOX} ranges; every run a point, a cross where the exact verdict refutes its motion; "
-    "diamond: the median if a refuted run counts as worse than any (none: half or more are "
-    "refuted)."
-)
 
 
 def costs_table(results: Results, threshold: float) -> pd.DataFrame:
     """Return every run's best cost.
-
-    Args:
-        results: With data.
-        threshold: Cost that counts as reached.
 
     Returns:
         Columns position, condition, replicate, cost, refuted, threshold.
@@ -124,11 +115,9 @@ def keys() -> list[Line2D]:
     """Return the entries of a legend for points and medians."""
     grey = style.NEUTRAL
     return [
-        style.key("a run", marker="o", color=grey, ms=3, linestyle="none"),
-        style.key("refuted (×)", marker="x", color=style.FORBIDDEN, ms=5, linestyle="none"),
-        style.key(
-            "median, refuted as worst", marker="D", mec=grey, mfc="white", ms=5, linestyle="none"
-        ),
+        marks.point_key("a run", "o", 3, color=grey),
+        marks.point_key("refuted (×)", "x", 5, color=style.FORBIDDEN),
+        marks.point_key("median, refuted as worst", "D", 5, mec=grey, mfc="white"),
     ]
 
 

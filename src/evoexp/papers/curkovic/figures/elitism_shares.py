@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from evoexp.papers import marks
 from evoexp.report.kit import groups, style
 
 COLUMNS = ["measure", "corner", "elites", "share", "lower", "upper"]
@@ -15,11 +16,7 @@ ALL = 1.0  # elites gain as much as the hall does
 
 
 def draw_shares(table: pd.DataFrame) -> Figure:
-    """Draw one panel per quantity, one row per reading and rate, elites side by side.
-
-    Args:
-        table: With `COLUMNS`; NaN where the hall gains nothing.
-    """
+    """Draw one panel per quantity, one row per reading and rate, elites side by side."""
     corners = list(dict.fromkeys(table["corner"]))
     numbers = list(dict.fromkeys(table["elites"]))
     measures = list(dict.fromkeys(table["measure"]))
@@ -53,13 +50,7 @@ def draw_shares(table: pd.DataFrame) -> Figure:
         style.key(name, color=style.ARM_COLOURS[k], marker="o", ms=5, linewidth=1.4)
         for k, name in enumerate(numbers)
     ]
-    open_mark = style.key(
-        "gain of the hall not told from none",
-        marker="o",
-        mfc="white",
-        mec=style.NEUTRAL,
-        ms=5,
-        linestyle="none",
-    )
+    told = "gain of the hall not told from none"
+    open_mark = marks.point_key(told, "o", 5, mfc="white", mec=style.NEUTRAL)
     style.keys_below(figure, [*keys, open_mark])
     return figure

@@ -14,21 +14,13 @@ from evoexp.report.kit import ConditionResults, Results, groups, quantile, style
 
 MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own
 DIRECTIONS = {"one_sided": "Eq. 9 one-sided", "symmetric": "Eq. 9 symmetric"}
-CURVES = (
-    "Share of all runs that have a team of that cost by then; runs that never get there count, so "
-    "such a curve ends below 1. In brackets: runs that get there, of all."
-)
 
 
 class Facet(NamedTuple):
-    """Conditions of one panel.
+    """Conditions of one panel."""
 
-    Attributes:
-        title: Of the panel; empty if there is one only.
-        conditions: With the part of their labels that differs within the panel.
-    """
-
-    title: str
+    title: str  # of the panel; empty if there is one only
+    # with the part of their labels that differs within the panel
     conditions: tuple[tuple[str, ConditionResults], ...]
 
 
@@ -46,10 +38,6 @@ def facets(results: Results) -> tuple[Facet, ...]:
 
 def facet_table(results: Results, threshold: float) -> pd.DataFrame:
     """Return medians of the best cost so far, and shares of runs that have reached a cost.
-
-    Args:
-        results: With data.
-        threshold: The cost.
 
     Returns:
         Columns panel, title, position (of the name, over all panels), name, generation, evaluations
@@ -119,11 +107,7 @@ def _panels(table: pd.DataFrame) -> tuple[Figure, list[Axes]]:
 
 
 def _lines(
-    axes: Axes,
-    rows: pd.DataFrame,
-    column: str,
-    steps: Any,
-    label: Callable[[pd.DataFrame], str],
+    axes: Axes, rows: pd.DataFrame, column: str, steps: Any, label: Callable[[pd.DataFrame], str]
 ) -> None:
     several = rows.groupby("generation")["evaluations"].nunique().max() > 1
     across = "evaluations" if several else "generation"

@@ -9,6 +9,7 @@ from matplotlib.patches import Arc
 
 from evoexp.collision.models.link_crossings import closed_form
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.report.kit import ConditionResults, records, rounded, style
@@ -68,41 +69,17 @@ def draw_intersection(table: pd.DataFrame) -> Figure:
     )
     for k, name in enumerate(VECTORS):
         _vector(axes, rows[name], style.arm_colour(k // 2), k + 1, size)
+    # the distance of the bases, the first joints, and the crossing
     base, point = rows["base"], rows["point"]
-    axes.annotate(
-        "",
-        (base.x_end, base.y_end),
-        (base.x, base.y),
-        arrowprops={"arrowstyle": "<->", "shrinkB": 0},
-    )
-    text: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
-    axes.annotate(
-        "d·i", (0.5 * (base.x + base.x_end), 0.5 * (base.y + base.y_end)), xytext=(0, -12), **text
-    )
-    for robot, (name, mark) in enumerate((("b", "O₁"), ("d", "O₂"))):
+    arrow = {"arrowstyle": "<->", "shrinkB": 0}
+    axes.annotate("", (base.x_end, base.y_end), (base.x, base.y), arrowprops=arrow)
+    marks.write(axes, "d·i", _middle(base), (0, -12))
+    for robot, (name, mark, side) in enumerate((("b", "O₁", -11), ("d", "O₂", 11))):
         row = rows[name]
-        axes.plot(
-            row.x,
-            row.y,
-            "o",
-            color="white",
-            markeredgecolor=style.arm_colour(robot),
-            markersize=6,
-            zorder=4,
-        )
-        axes.annotate(mark, (row.x, row.y), xytext=(-11 if robot == 0 else 11, 4), **text)
-    axes.plot(
-        point.x,
-        point.y,
-        "X",
-        color=style.FORBIDDEN,
-        markeredgecolor="white",
-        markersize=9,
-        zorder=6,
-    )
-    axes.annotate(
-        "P", (point.x, point.y), xytext=(0, 9), color=style.FORBIDDEN, weight="bold", **text
-    )
+        marks.hollow(axes, row.x, row.y, "o", style.arm_colour(robot), 6, zorder=4)
+        marks.write(axes, mark, (row.x, row.y), (side, 4))
+    marks.contact(axes, point.x, point.y, 9, zorder=6)
+    marks.write(axes, "P", (point.x, point.y), (0, 9), color=style.FORBIDDEN, weight="bold")
     word = "the links cross" if base.crossing else "the links do not cross"
     axes.set_title(f"μ = {base.mu:.3f}, ν = {base.nu:.3f}: {word}")
     axes.margins(0.12)
@@ -114,47 +91,22 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
     """Draw one link as a vector with its name and its angle from +x."""
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow)
-    axes.plot(
-        [row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1
-    )  # for the limits of the axes
+    # a line for the limits of the axes
+    axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1)
     away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
-    middle = 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
-    axes.annotate(
-        row.element,
-        middle,
-        xytext=tuple(away),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        color=colour,
-        weight="bold",
+    marks.write(
+        axes, row.element, _middle(row), tuple(away), va="center", color=colour, weight="bold"
     )
-    radius = 0.2 * size
-    axes.plot(
-        [row.x, row.x + 1.5 * radius],
-        [row.y, row.y],
-        ":",
-        color=style.FAINT,
-        linewidth=0.9,
-        zorder=1,
-    )
-    axes.add_patch(
-        Arc(
-            (row.x, row.y),
-            2 * radius,
-            2 * radius,
-            theta1=0.0,
-            theta2=row.angle_deg,
-            color=colour,
-            lw=0.9,
-        )
-    )
-    half = np.radians(0.5 * row.angle_deg)
-    axes.annotate(
-        f"φ{str(number).translate(style.SUBSCRIPTS)} = {row.angle_deg:.0f}°",
-        (row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)),
-        ha="left",
-        va="center",
-        color=colour,
-        fontsize=7,
-    )
+    # the angle from +x
+    radius, half = 0.2 * size, np.radians(0.5 * row.angle_deg)
+    look: dict[str, Any] = {"color": style.FAINT, "linewidth": 0.9, "zorder": 1}
+    axes.plot([row.x, row.x + 1.5 * radius], [row.y, row.y], ":", **look)
+    arc: dict[str, Any] = {"theta1": 0.0, "theta2": row.angle_deg, "color": colour, "lw": 0.9}
+    axes.add_patch(Arc((row.x, row.y), 2 * radius, 2 * radius, **arc))
+    text = f"φ{str(number).translate(style.SUBSCRIPTS)} = {row.angle_deg:.0f}°"
+    place = row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)
+    axes.annotate(text, place, ha="left", va="center", color=colour, fontsize=7)
+
+
+def _middle(row: Any) -> tuple[float, float]:
+    return 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)

@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from evoexp.papers import marks
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import cost_boxes
 from evoexp.report.kit import Results, groups, style
@@ -118,9 +119,7 @@ def _pair(axes: Axes, table: pd.DataFrame) -> None:
         x, mean, deviation = (
             rows[name].to_numpy(np.float64) for name in ("generation", "value", "deviation")
         )
-        axes.fill_between(
-            x, mean - deviation, mean + deviation, color=colour, alpha=0.2, linewidth=0
-        )
+        marks.band(axes, x, mean - deviation, mean + deviation, colour, alpha=0.2)
         axes.plot(x, mean, color=colour, linestyle=kind)
     axes.set_xlim(0, max(1.0, float(table["generation"].max())))
     axes.set(xlabel="generation", title=" and ".join(names))

@@ -8,24 +8,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.evolution.pareto import pareto_front
+from evoexp.papers import marks
 from evoexp.records import FrontRow
 from evoexp.report.kit import groups, rounded, style
 
 CRITERIA = ("c1", "c2", "c3", "c4")
 MARKERS = ("o", "^", "s", "D")  # of populations
-FRONT, DOMINATED = (
-    style.ARM_COLOURS[1],
-    style.ARM_COLOURS[0],
-)  # red and blue, as the paper draws them
+DOMINATED, FRONT = style.ARM_COLOURS[:2]  # blue and red, as the paper draws them
 
 
 def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> pd.DataFrame:
     """Return the criteria of every individual of every population.
-
-    Args:
-        fronts: One record per population, of one generation of a replicate.
-        replicate: Which.
-        length_unit: Of C2 and C4.
 
     Returns:
         Columns replicate, generation, population, individual, c1 [collisions], c2 [length unit], c3
@@ -74,18 +67,14 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
         else:
             axes.xaxis.set_major_locator(style.few_ticks())
     keys = [
-        style.key(
+        marks.point_key(
             f"robot {population + 1}: {int((rows['non_dominated'] == front).sum())} {word}",
-            linestyle="none",
+            MARKERS[int(population) % len(MARKERS)],
+            4,
             color=colour,
-            marker=MARKERS[int(population) % len(MARKERS)],
-            ms=4,
         )
         for population, rows in groups(table, "population")
-        for front, colour, word in (
-            (True, FRONT, "non-dominated"),
-            (False, DOMINATED, "dominated"),
-        )
+        for front, colour, word in ((True, FRONT, "non-dominated"), (False, DOMINATED, "dominated"))
     ]
     style.keys_below(figure, keys)
     return figure

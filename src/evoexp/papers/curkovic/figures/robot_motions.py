@@ -10,36 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 
 from evoexp.condition import Prepared
+from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions, measures
-from evoexp.report.kit import (
-    ConditionResults,
-    body_contacts,
-    groups,
-    motion_geometry,
-    records,
-    rounded,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import body_contacts, motion_geometry, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
 POINTS = 20  # of an end-effector's path, per segment
-POSTURE, CONFIGURATION, PATH, CONTACT, OBSTACLE = (
-    "posture",
-    "configuration",
-    "path",
-    "contact",
-    "obstacle",
-)
+POSTURE, CONFIGURATION, PATH = "posture", "configuration", "path"
+CONTACT, OBSTACLE = "contact", "obstacle"
 LINK = ["robot", "link", "instant", "x", "y", "x_end", "y_end", "radius"]
 TOOL = 2  # number of a robot's third link, which is the body around its end-effector
 DASHES: Any = (0, (2, 1))
 
 
-def motion_table(condition: ConditionResults) -> pd.DataFrame:
+def motion_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the trail of the best replicate, and end-effector paths and contacts of all.
 
     Returns:
@@ -61,7 +49,7 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
                 for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1))
             ]
     parts.append(_contacts(condition))
-    table = rounded(pd.concat(parts, ignore_index=True)).assign(
+    table = kit.rounded(pd.concat(parts, ignore_index=True)).assign(
         best=best, length_unit=condition.condition.length_unit
     )
     return table[["element", "replicate", *LINK, "best", "length_unit"]]
@@ -75,11 +63,11 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     best, unit = table["best"].iloc[0], table["length_unit"].iloc[0]
     path, contacts = table[table["element"] == PATH], table[table["element"] == CONTACT]
     for axes in (trail, paths):
-        for _, outline in groups(table[table["element"] == OBSTACLE], "link"):
+        for _, outline in kit.groups(table[table["element"] == OBSTACLE], "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
         style.operational_axes(axes, unit)
     _trail(trail, table)
-    for (robot, replicate), rows in groups(path, ["robot", "replicate"]):
+    for (robot, replicate), rows in kit.groups(path, ["robot", "replicate"]):
         colour = style.arm_colour(int(robot))
         if replicate == best:
             trail.plot(rows["x_end"], rows["y_end"], ".", color=colour, markersize=2.6, zorder=4)
@@ -87,9 +75,7 @@ def draw_motion(table: pd.DataFrame) -> Figure:
         for axes in (trail, paths):
             _ends(axes, rows)
     for axes, rows in ((trail, contacts[contacts["replicate"] == best]), (paths, contacts)):
-        axes.plot(
-            rows["x"], rows["y"], "X", color=style.FORBIDDEN, mec="white", markersize=8, zorder=7
-        )
+        marks.contact(axes, rows["x"], rows["y"], 8, zorder=7)
     trail.set_title(f"a  motion of replicate {best}")
     paths.set_title(f"b  end-effectors, all replicates (n = {path['replicate'].nunique()})")
     trail.set(xlim=(left, right), ylim=(low, high))
@@ -97,7 +83,7 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
+def tools_table(conditions: Sequence[kit.ConditionResults]) -> pd.DataFrame:
     """Return the end-effector paths of conditions that differ in the end-effector's radius.
 
     Returns:
@@ -120,7 +106,7 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
             refuted=shown in body_contacts.refuted(c),
         )
         parts.append(given)
-    table = rounded(pd.concat(parts, ignore_index=True)).assign(
+    table = kit.rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
     )
     return table.drop(columns=["element", "link", "radius"])
@@ -136,30 +122,22 @@ def draw_tools(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(1, len(tests), sharex=True, sharey=True, squeeze=False)[0]
     for axes, substeps in zip(panels, tests, strict=True):
         style.operational_axes(axes, unit)
-        for (radius, _), rows in groups(
+        for (radius, _), rows in kit.groups(
             table[table["collision_substeps"] == substeps], ["tcp_radius", "robot"]
         ):
             colour = style.condition_colour(radii.index(radius))
             kind = DASHES if rows["refuted"].any() else "-"
             axes.plot(rows["x_end"], rows["y_end"], color=colour, linestyle=kind)
-            for row in records(rows[rows["at_configuration"]]):
+            for row in kit.records(rows[rows["at_configuration"]]):
                 tip = row.x_end, row.y_end
                 axes.add_patch(Circle(tip, radius, fill=False, edgecolor=colour, lw=0.7, alpha=0.7))
             _ends(axes, rows)
-        for robot, rows in groups(table, "robot"):
-            axes.annotate(
-                f"robot {int(robot) + 1}",
-                (rows["x_end"].iloc[0], rows["y_end"].iloc[0]),
-                xytext=(0, -13),
-                textcoords="offset points",
-                ha="center",
-                fontsize=7.5,
-                zorder=7,
-                path_effects=[withStroke(linewidth=2.0, foreground="white")],
-            )
-        axes.set_title(
-            "tested at the configurations" if substeps == 1 else f"tested at {substeps} substeps"
-        )
+        for robot, rows in kit.groups(table, "robot"):
+            look: dict[str, Any] = {"fontsize": 7.5, "zorder": 7, "path_effects": marks.HALO}
+            start = rows["x_end"].iloc[0], rows["y_end"].iloc[0]
+            marks.write(axes, f"robot {int(robot) + 1}", start, (0, -13), **look)
+        where = "the configurations" if substeps == 1 else f"{substeps} substeps"
+        axes.set_title(f"tested at {where}")
         axes.margins(0.1)
     keys = [
         style.key(f"radius {radius:g} {unit}", color=style.condition_colour(k))
@@ -191,7 +169,7 @@ def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFra
     return tips.assign(element=PATH, x=before["x_end"], y=before["y_end"])
 
 
-def _contacts(condition: ConditionResults) -> pd.DataFrame:
+def _contacts(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the first contacts of bodies in the motions that the exact verdict refutes."""
     rows = []
     for replicate, (instant, pair) in body_contacts.refuted(condition).items():
@@ -202,7 +180,7 @@ def _contacts(condition: ConditionResults) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
 
 
-def _obstacles(condition: ConditionResults) -> pd.DataFrame:
+def _obstacles(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the outlines of the obstacles."""
     table = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
     rows = [
@@ -217,40 +195,31 @@ def _trail(axes: Axes, table: pd.DataFrame) -> None:
     """Draw postures, and at configurations the boundaries of thick links and tools."""
     postures, at = table[table["element"] == POSTURE], table[table["element"] == CONFIGURATION]
     last = postures["instant"].max()
-    for (robot, instant), rows in groups(postures, ["robot", "instant"]):
+    for (robot, instant), rows in kit.groups(postures, ["robot", "instant"]):
         links = rows[rows["link"] < TOOL]
         if instant in (0.0, last):
             style.draw_arm(axes, int(robot), links, dashed=instant == 0.0)
         else:
             x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
             axes.plot(x, y, color=style.arm_colour(int(robot)), linewidth=0.9, alpha=0.3, zorder=2)
-        axes.plot(
-            links["x"].iloc[0], links["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2
-        )
-    for row in records(at[at["radius"] > 0.0]):
-        look: dict[str, Any] = {
-            "color": style.arm_colour(row.robot),
-            "linewidth": 0.6,
-            "alpha": 0.6,
-            "zorder": 2,
-        }
+        marks.base(axes, links["x"].iloc[0], links["y"].iloc[0], 6, zorder=2)
+    for row in kit.records(at[at["radius"] > 0.0]):
+        look: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.6, "zorder": 2}
+        look["color"] = style.arm_colour(row.robot)
         if row.link == TOOL:
             axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, **look))
             continue
         along = np.array([row.x_end - row.x, row.y_end - row.y])
         x, y = row.radius * np.array([-along[1], along[0]]) / float(np.hypot(*along))
         for side in (-1.0, 1.0):
-            axes.plot(
-                [row.x + side * x, row.x_end + side * x],
-                [row.y + side * y, row.y_end + side * y],
-                **look,
-            )
+            ends = np.array([[row.x, row.x_end], [row.y, row.y_end]]) + side * np.array([[x], [y]])
+            axes.plot(*ends, **look)
 
 
 def _ends(axes: Axes, path: pd.DataFrame) -> None:
     """Mark start and goal of an end-effector: circle and cross, as the paper does."""
     (x, y), (x_end, y_end) = path[["x_end", "y_end"]].to_numpy()[[0, -1]]
-    axes.plot(x, y, "o", color="white", markeredgecolor=style.NEUTRAL, markersize=6, zorder=6)
+    marks.hollow(axes, x, y, "o", style.NEUTRAL, 6, zorder=6)
     axes.plot(x_end, y_end, "x", color=style.NEUTRAL, markersize=7, markeredgewidth=1.8, zorder=6)
 
 
@@ -267,21 +236,15 @@ def _end_keys() -> list[Line2D]:
     grey = style.NEUTRAL
     return [
         style.key("start of an end-effector", marker="o", mec=grey, mfc="white", linestyle="none"),
-        style.key("its goal", marker="x", color=grey, ms=7, mew=1.8, linestyle="none"),
+        marks.point_key("its goal", "x", 7, color=grey, mew=1.8),
     ]
 
 
 def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
     grey, red = style.NEUTRAL, style.FORBIDDEN
     robots = sorted(table.loc[table["element"] == PATH, "robot"].unique())
-    contact = style.key(
-        f"first contact of bodies (refuted: {contacts})",
-        linestyle="none",
-        color=red,
-        ms=8,
-        marker="X",
-        mec="white",
-    )
+    told = f"first contact of bodies (refuted: {contacts})"
+    contact = marks.point_key(told, "X", 8, color=red, mec="white")
     return [
         *style.arm_keys(robots, "robot", linewidth=3),
         style.key("start posture", color=grey, linewidth=2, linestyle=DASHES),

@@ -3,6 +3,7 @@
 import pandas as pd
 from matplotlib.figure import Figure
 
+from evoexp.papers import marks
 from evoexp.report.kit import Results, counted, groups, records, style
 
 NAMES = [
@@ -36,26 +37,14 @@ def draw_attempts(table: pd.DataFrame) -> Figure:
     for k, (position, rows) in enumerate(groups(table, "position")):
         first = rows.iloc[0]
         x = rows["attempts"].to_numpy() + width * (k - 0.5 * (count - 1))
-        axes.bar(
-            x,
-            100.0 * rows["share"],
-            width=width,
-            color=style.condition_colour(int(position)),
-            alpha=0.75,
-            label=f"{first['condition']} (n = {first['total']}, mean {first['mean']:.2f})",
-        )
+        colour = style.condition_colour(int(position))
+        label = f"{first['condition']} (n = {first['total']}, mean {first['mean']:.2f})"
+        axes.bar(x, 100.0 * rows["share"], width=width, color=colour, alpha=0.75, label=label)
         seen = rows.assign(x=x)[rows["share"] > 0.0]
         lower, upper = 100.0 * seen["lower"], 100.0 * seen["upper"]
         axes.vlines(seen["x"], lower, upper, color=style.NEUTRAL, linewidth=1.0)
         for row in records(seen):
-            axes.annotate(
-                str(row.having),
-                (row.x, 100.0 * row.upper),
-                xytext=(0, 2),
-                textcoords="offset points",
-                ha="center",
-                fontsize=6.5,
-            )
+            marks.write(axes, str(row.having), (row.x, 100.0 * row.upper), (0, 2), fontsize=6.5)
     axes.set_xticks(sorted(table["attempts"].unique()))
     axes.set(xlabel="attempts of SP1 → SP2", ylabel="share of runs [%]")
     axes.grid(visible=False, axis="x")

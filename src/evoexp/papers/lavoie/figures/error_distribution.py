@@ -9,9 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from evoexp.papers import marks
 from evoexp.report.kit import ConditionResults, Proportion, Results, Values, groups, records, style
 
 FOUND, PRINTED = "found", "printed"
+HALO = [withStroke(linewidth=2.5, foreground="white")]
 NAMES = [
     *("series", "position", "condition", "error", "having", "total"),
     *("share", "lower", "upper"),
@@ -27,12 +29,6 @@ def distribution_table(
     confidence: float,
 ) -> pd.DataFrame:
     """Return P(error < x) of every condition at each error that occurs, and the printed points.
-
-    Args:
-        results: With data.
-        errors: Of a condition, (done,); inf: no solution.
-        printed: The paper's points for a condition.
-        confidence: Level of Wilson's intervals, each for itself.
 
     Returns:
         Columns series (found: holds for x from this row's error, exclusive, to the next one's;
@@ -80,9 +76,7 @@ def _curve(axes: Axes, rows: pd.DataFrame, greatest: float, colour: str, name: s
     """Draw the steps of an arm's curve up to the right end, and their band."""
     rows = pd.concat([rows, rows.iloc[[-1]].assign(error=greatest)], ignore_index=True)
     x, label = rows["error"], f"{name} (n = {int(rows['total'].iloc[0])})"
-    axes.fill_between(
-        x, rows["lower"], rows["upper"], step="post", color=colour, alpha=0.22, linewidth=0
-    )
+    marks.band(axes, x, rows["lower"], rows["upper"], colour, alpha=0.22, step="post")
     axes.step(x, rows["share"], where="post", color=colour, label=label)
 
 
@@ -90,30 +84,14 @@ def _points(axes: Axes, rows: pd.DataFrame, colour: str) -> None:
     """Draw the printed points of one arm with the intervals of the paper's own sample."""
     name = f"printed, {rows['condition'].iloc[0]} (their n = {int(rows['total'].iloc[0])})"
     axes.vlines(rows["error"], rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
-    axes.plot(
-        rows["error"],
-        rows["share"],
-        "D",
-        label=name,
-        color="white",
-        mec=colour,
-        mew=1.4,
-        ms=5,
-        zorder=5,
-    )
+    look = {"label": name, "mew": 1.4, "zorder": 5}
+    marks.hollow(axes, rows["error"], rows["share"], "D", colour, 5, **look)
 
 
 def _label(axes: Axes, row: Any, greatest: bool) -> None:
     """Write a printed percentage above its point if it is the greatest at its x, else below."""
     left = row.error > 0.7 * axes.get_xlim()[1]
-    axes.annotate(
-        f"{100 * row.share:.1f} %",
-        (row.error, row.share),
-        zorder=6,
-        xytext=(-6 if left else 7, 4 if greatest else -10),
-        textcoords="offset points",
-        ha="right" if left else "left",
-        color=style.condition_colour(row.position),
-        fontsize=7.5,
-        path_effects=[withStroke(linewidth=2.5, foreground="white")],
-    )
+    look: dict[str, Any] = {"ha": "right" if left else "left", "fontsize": 7.5, "zorder": 6}
+    look |= {"color": style.condition_colour(row.position), "path_effects": HALO}
+    offset = -6 if left else 7, 4 if greatest else -10
+    marks.write(axes, f"{100 * row.share:.1f} %", (row.error, row.share), offset, **look)

@@ -8,29 +8,16 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Patch, Rectangle
-from matplotlib.patheffects import withStroke
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    ConditionResults,
-    body_contacts,
-    groups,
-    motion_geometry,
-    records,
-    rounded,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import body_contacts, motion_geometry, style
 
-ELLIPSE, BOX, TARGET, LINK, TOUCHING, CONTACT = (
-    "ellipse",
-    "box",
-    "target",
-    "link",
-    "touching",
-    "contact",
-)
+ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
+LINK, TOUCHING, CONTACT = "link", "touching", "contact"
 NAMES = [
     *("element", "name", "sub_path", "instant", "link"),
     *("x", "y", "x_end", "y_end", "semi_a", "semi_b", "angle_deg"),
@@ -42,40 +29,23 @@ AROUND = 0.35  # [-] of the box by which a view of it is wider than box and targ
 MARKERS = {"via point": "P", "goal point": "*"}
 START: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 2.6}
 INSIDE: dict[str, Any] = {"linestyle": (0, (3, 2)), "linewidth": 0.9}
-TOUCH: dict[str, Any] = {
-    "color": style.FORBIDDEN,
-    "linewidth": 1.4,
-    "linestyle": (0, (3, 1.5)),
-}
-CROSS: dict[str, Any] = {
-    "linestyle": "none",
-    "marker": "X",
-    "color": style.FORBIDDEN,
-    "mec": "white",
-    "ms": 9,
-}
+TOUCH: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.4, "linestyle": (0, (3, 1.5))}
 # names of the start and of both ends, and where they stand beside the tip: off its markers [pt]
 PLACES: tuple[tuple[str, tuple[int, int], Literal["left", "right"]], ...] = (
     ("start", (-4, 5), "right"),
     ("A", (-3, -12), "right"),
     ("B", (8, 5), "left"),
 )
-HALO = withStroke(linewidth=2.0, foreground="white")
 
 
 class ShownMotion(NamedTuple):
-    """The scene of one panel, and the motion in it.
+    """The scene of one panel, and the motion in it."""
 
-    Attributes:
-        title: Title of the panel.
-        condition: The condition whose scene is drawn.
-        replicate: The replicate whose solution is drawn; None: the start posture only.
-        contacts: (instant, bodies) of the first contact on each sub-path that has one.
-    """
-
-    title: str
-    condition: ConditionResults
+    title: str  # title of the panel
+    condition: kit.ConditionResults  # the condition whose scene is drawn
+    # the replicate whose solution is drawn; None: the start posture only
     replicate: int | None = None
+    # (instant, bodies) of the first contact on each sub-path that has one
     contacts: Sequence[tuple[float, str]] = ()
 
 
@@ -92,12 +62,12 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
         rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]
         end = one.condition.condition.length_unit
         parts += [(panel, one.title, *row, end) for row in rows]
-    return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
+    return kit.rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
     """Draw every scene with its postures, and below each motion a close view of its box."""
-    panels = [rows for _, rows in groups(table, "panel")]
+    panels = [rows for _, rows in kit.groups(table, "panel")]
     ratios = [x / y for x, y in map(_span, panels)]
     moving = bool((table["sub_path"] > 0).any())
     height = min(4.6, 6.1 / sum(ratios))
@@ -110,7 +80,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
             style.operational_axes(axes, rows["length_unit"].iloc[0])
             _draw_scene(axes, rows)
             _draw_postures(axes, links, (0,) if axes is whole else (1, 2))
-            axes.plot(contacts["x"], contacts["y"], zorder=9, **CROSS)
+            marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9)
         whole.set_title(rows["title"].iloc[0])
         whole.margins(0.06)
         for axes in close:
@@ -119,7 +89,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
+def _scene(condition: kit.ConditionResults) -> list[tuple[Any, ...]]:
     """Return the rows of ellipses, box and targets."""
     scenario: Any = condition.condition.scenario
     table = scenario.obstacle_table()
@@ -180,28 +150,18 @@ def _span(rows: pd.DataFrame) -> tuple[float, float]:
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw ellipses, box and targets."""
-    for row in records(rows[rows["element"] == ELLIPSE]):
+    for row in kit.records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
-        axes.add_patch(
-            Ellipse(
-                (row.x, row.y), *size, angle=row.angle_deg, facecolor=style.FAINT, lw=0, zorder=2
-            )
-        )
-    for row in records(rows[rows["element"] == BOX]):
+        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
+        axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
+    for row in kit.records(rows[rows["element"] == BOX]):
         size = row.x_end - row.x, row.y_end - row.y
         edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
         axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
-    for row in records(rows[rows["element"] == TARGET]):
-        axes.plot(
-            row.x,
-            row.y,
-            MARKERS[row.name],
-            color="black",
-            mec="white",
-            mew=0.8,
-            ms=8 if row.name == "via point" else 11,
-            zorder=8,
-        )
+    for row in kit.records(rows[rows["element"] == TARGET]):
+        wide = 8 if row.name == "via point" else 11
+        point: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
+        axes.plot(row.x, row.y, MARKERS[row.name], ms=wide, **point)
 
 
 def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
@@ -215,14 +175,8 @@ def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
 
 
 def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
-    """Draw the start in black, each sub-path in a colour of its own, its end strong.
-
-    Args:
-        axes: To be drawn into.
-        links: Rows of links.
-        named: Sub-paths whose ends have their names written beside them; 0: the start.
-    """
-    for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
+    """Draw the start in black, each sub-path in a colour of its own, its end strong."""
+    for (element, sub_path, instant), rows in kit.groups(links, ["element", "sub_path", "instant"]):
         x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
         colour, share = _colour(sub_path), instant - (sub_path - 1)
         if element == TOUCHING:
@@ -238,26 +192,17 @@ def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> Non
         if element == LINK and instant == sub_path:
             _draw_joints(axes, x, y, sub_path, sub_path in named)
     base = links[links["link"] == 0].iloc[0]
-    axes.plot(base["x"], base["y"], "s", color=style.NEUTRAL, markersize=7, zorder=4)
+    marks.base(axes, base["x"], base["y"], 7, zorder=4)
 
 
 def _draw_joints(axes: Axes, x: list[float], y: list[float], sub_path: int, named: bool) -> None:
     """Draw the joints of a posture at the end of a sub-path, and its name."""
     colour = _colour(sub_path)
-    axes.plot(x[:-1], y[:-1], "o", color="white", mec=colour, ms=3.6, mew=0.9, zorder=7)
+    marks.hollow(axes, x[:-1], y[:-1], "o", colour, 3.6, mew=0.9, zorder=7)
     if named:
         name, place, side = PLACES[sub_path]
-        axes.annotate(
-            name,
-            (x[-1], y[-1]),
-            xytext=place,
-            textcoords="offset points",
-            ha=side,
-            zorder=10,
-            fontsize=8,
-            color=colour,
-            path_effects=[HALO],
-        )
+        look: dict[str, Any] = {"ha": side, "zorder": 10, "fontsize": 8, "color": colour}
+        marks.write(axes, name, (x[-1], y[-1]), place, path_effects=marks.HALO, **look)
 
 
 def _colour(sub_path: int) -> str:
@@ -271,7 +216,7 @@ def _keys(table: pd.DataFrame) -> list[Any]:
     point: dict[str, Any] = {"linestyle": "none", "color": "black", "mec": "white", "ms": 9}
     touching = [
         style.key("posture in contact, never tested", **TOUCH),
-        style.key("first contact of a sub-path", **CROSS),
+        marks.point_key("first contact of a sub-path", "X", 9, color=style.FORBIDDEN, mec="white"),
     ]
     return [
         style.key("start posture", **START, marker="o", mfc="white", ms=4),

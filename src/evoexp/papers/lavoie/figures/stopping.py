@@ -17,11 +17,6 @@ NAMES = [
 def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataFrame:
     """Return precision and effort of every condition by its stopping value and its generations.
 
-    Args:
-        results: With data.
-        errors: Position errors of a condition, (done,); inf: no solution.
-        effort: Evaluations to its solutions, (done,); inf: no solution.
-
     Returns:
         Columns quantity (position error, evaluations), num_generations, stop_cost, condition,
         median, lower, upper (quartiles over all runs), solved, done, length_unit.

@@ -8,9 +8,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
-from matplotlib.patheffects import withStroke
 
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.papers import marks
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
@@ -21,10 +21,8 @@ CLOSEST: dict[str, tuple[str, dict[str, Any]]] = {  # pairs of points: name, loo
     "bodies": ("the links", {"color": style.ARM_COLOURS[3], "ls": ":"}),
 }
 NUMBERED = 5  # every fifth via-point carries its number
-NUMBER_OFFSET, NUMBER_ROOM = (
-    10.0,
-    0.07,
-)  # [points], [-] of the path's extent: from via-point to number
+NUMBER_OFFSET = 10.0  # [pt] from via-point to number
+NUMBER_ROOM = 0.07  # [-] of the path's extent, from via-point to number
 
 
 def arms_table(condition: ConditionResults) -> pd.DataFrame:
@@ -59,15 +57,9 @@ def draw_arms(table: pd.DataFrame) -> Figure:
         for row in records(links) if at_start else ():
             _angle(axes, row)
     for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
-        _base(axes, row.x, row.y)
-        axes.annotate(
-            f"arm {row.arm + 1}",
-            (row.x, row.y),
-            xytext=(0, -22),
-            textcoords="offset points",
-            ha="center",
-            color=style.arm_colour(row.arm),
-        )
+        marks.base(axes, row.x, row.y, 9, zorder=2)
+        colour = style.arm_colour(row.arm)
+        marks.write(axes, f"arm {row.arm + 1}", (row.x, row.y), (0, -22), color=colour)
     keys = [
         style.key("start", color=style.NEUTRAL, linewidth=3, marker="o", markersize=4),
         style.key("goal", color=style.NEUTRAL, linewidth=2, alpha=0.35, linestyle=(0, (2, 1))),
@@ -123,12 +115,7 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
 def configuration_planes(
     table: pd.DataFrame, height: float
 ) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
-    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm).
-
-    Args:
-        table: With the column arm.
-        height: Of the figure, if it has two planes or one [inch].
-    """
+    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm)."""
     by_arm = list(groups(table, "arm"))
     figure, panels = style.row_of_panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
     for axes, (arm, _) in zip(panels, by_arm, strict=True):
@@ -176,15 +163,12 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     style.operational_axes(axes, unit)
     for row in records(table[table["element"] == "circle"]):
         colour = style.arm_colour(row.arm)
-        for look in (
-            {"fc": colour, "alpha": 0.14, "lw": 0},
-            {"fill": False, "ec": colour, "lw": 0.8},
-        ):
-            axes.add_patch(Circle((row.x, row.y), row.radius, **look))
+        axes.add_patch(Circle((row.x, row.y), row.radius, fc=colour, alpha=0.14, lw=0))
+        axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, ec=colour, lw=0.8))
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
     for arm, links in groups(table[table["element"] == "link"], "arm"):
         style.draw_arm(axes, arm, links)
-        _base(axes, links["x"].iloc[0], links["y"].iloc[0])
+        marks.base(axes, links["x"].iloc[0], links["y"].iloc[0], 9, zorder=2)
     for row in records(table[table["distance"].notna()]):
         what, line = CLOSEST[row.element]
         label = f"least distance of {what}: {row.distance:.3f} {unit}"
@@ -208,10 +192,6 @@ def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFram
         angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")
         frames.append(pd.DataFrame({"arm": arm, "instant": range(rows)}).join(angles))
     return pd.concat(frames, ignore_index=True)
-
-
-def _base(axes: Axes, x: float, y: float) -> None:
-    axes.plot(x, y, "s", color=style.NEUTRAL, markersize=9, zorder=2)
 
 
 def _angle(axes: Axes, row: Any) -> None:
@@ -241,7 +221,6 @@ def _numbers(
     Of eight places around a via-point the one is taken that is farthest from all points `around`,
     (points, 2), and from the numbers that stand there already.
     """
-    halo = withStroke(linewidth=2.0, foreground="white")
     size = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
     taken = list(around)
     angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
@@ -253,17 +232,9 @@ def _numbers(
         best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
         s, c = angles[best]
         taken.append(places[best])
-        axes.annotate(
-            str(instant),
-            (x[k], y[k]),
-            xytext=(NUMBER_OFFSET * c, NUMBER_OFFSET * s),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=7,
-            path_effects=[halo],
-            zorder=6,
-        )
+        look: dict[str, Any] = {"va": "center", "fontsize": 7, "zorder": 6}
+        offset = NUMBER_OFFSET * c, NUMBER_OFFSET * s
+        marks.write(axes, str(instant), (x[k], y[k]), offset, path_effects=marks.HALO, **look)
 
 
 def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -11,27 +11,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import marks
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
-from evoexp.report.kit import (
-    ConditionResults,
-    distance_ranges,
-    groups,
-    motion_geometry,
-    rounded,
-    style,
-)
+from evoexp.report import kit
+from evoexp.report.kit import distance_ranges, motion_geometry, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
 BEST, AT_VIA_POINTS = "best replicate", "best replicate, at via-points"
-CLOSEST, REFUTED = (
-    "closest over the whole motion, every replicate that is free (exact)",
-    "refuted: first contact of bodies",
-)
+CLOSEST = "closest over the whole motion, every replicate that is free (exact)"
+REFUTED = "refuted: first contact of bodies"
 LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are drawn as they are
     STRAIGHT: {"linestyle": ":", "color": style.FAINT, "lw": 1.2},
     BEST: {"color": style.ARM_COLOURS[0], "lw": 1.3, "label": f"{BEST}, between via-points too"},
@@ -48,6 +41,8 @@ LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are draw
         **{"clip_on": False, "zorder": 5},
     },
 }
+# the first instant of a panel
+FIRST: dict[str, Any] = {"linestyle": (0, (2, 1)), "linewidth": 1.4, "alpha": 0.8, "zorder": 2}
 MANY = 200  # marks of a series, from which on they are drawn small, below the curves
 CROWDED: dict[str, dict[str, Any]] = {
     CLOSEST: {"ms": 1.5, "mew": 0.0, "alpha": 0.35, "zorder": 2},
@@ -62,7 +57,7 @@ TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
-def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
+def snapshots_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion.
 
     Returns:
@@ -86,7 +81,9 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     ]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     found = pd.concat([table[names], pd.DataFrame(rows, columns=names)]) if rows else table[names]
-    return rounded(found.reset_index(drop=True)).assign(length_unit=condition.condition.length_unit)
+    return kit.rounded(found.reset_index(drop=True)).assign(
+        length_unit=condition.condition.length_unit
+    )
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
@@ -105,9 +102,9 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     for axes in panels.ravel()[len(stages) :]:
         axes.set_axis_off()
-    for axes, (stage, rows) in zip(panels.ravel(), groups(table, "stage"), strict=False):
+    for axes, (stage, rows) in zip(panels.ravel(), kit.groups(table, "stage"), strict=False):
         whole = stage == stages[-1]
-        for _, outline in groups(obstacles, "link"):
+        for _, outline in kit.groups(obstacles, "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
         _snapshot(axes, rows, whole=whole)
         style.operational_axes(axes, unit)
@@ -125,7 +122,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def paths_table(condition: ConditionResults) -> pd.DataFrame:
+def paths_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line, in configuration space.
 
     Returns:
@@ -145,12 +142,8 @@ def draw_paths(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
+def sampled_distances(condition: kit.ConditionResults, samples: int) -> pd.DataFrame:
     """Return the distances along the best motion and the straight line, and their range over all.
-
-    Args:
-        condition: With data.
-        samples: Configurations per segment.
 
     Returns:
         Columns series (straight line, best replicate, lowest and highest of all replicates),
@@ -185,10 +178,10 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
         }
         instants = np.arange(len(ranges[0].lowest)) / samples
         parts.append({"series": name, "instant": instants} | values)
-    return rounded(pd.concat(map(pd.DataFrame, parts), ignore_index=True))
+    return kit.rounded(pd.concat(map(pd.DataFrame, parts), ignore_index=True))
 
 
-def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]:
+def _measures(condition: kit.ConditionResults) -> dict[str, tuple[Measure, Measure]]:
     """Return column of `sampled_distances` → its exact measure, and one that is as good and quick.
 
     Both take configurations (nq, instants) [deg].
@@ -214,18 +207,14 @@ def _in_radians(measure: Measure) -> Measure:
     return lambda q: measure(DEGREE * q)
 
 
-def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
+def distances_table(condition: kit.ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
     """Return the distances that Fig. 7 shows.
-
-    Args:
-        condition: With data.
-        sampled: Of `sampled_distances`.
 
     Returns:
         Columns kind (between arms, to obstacles), measure (circle centres, links), series, instant,
         distance, safety_distance (of the kind) [length unit], length_unit.
     """
-    found = {name: rows.set_index("instant") for name, rows in groups(sampled, "series")}
+    found = {name: rows.set_index("instant") for name, rows in kit.groups(sampled, "series")}
     best = found[BEST]
     found[AT_VIA_POINTS] = best[best.index == best.index.to_numpy().round()]
     drawn = (BEST, AT_VIA_POINTS, LOWEST, HIGHEST, STRAIGHT)
@@ -242,7 +231,7 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
                 columns = {"measure": measure, "series": name, "instant": values.index}
                 rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
                 parts.append(rows.assign(kind=kind, safety_distance=margin))
-    table = rounded(pd.concat(parts, ignore_index=True))
+    table = kit.rounded(pd.concat(parts, ignore_index=True))
     return table.assign(length_unit=condition.condition.length_unit)
 
 
@@ -255,7 +244,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     kinds = list(dict.fromkeys(table["kind"]))
     panels = figure.subplots(2, len(kinds), sharex=True, squeeze=False)
     unit, letters = table["length_unit"].iloc[0], iter("abcd")
-    required = {kind: rows["safety_distance"].iloc[0] for kind, rows in groups(table, "kind")}
+    required = {kind: rows["safety_distance"].iloc[0] for kind, rows in kit.groups(table, "kind")}
     below = ", ".join(f"{required[kind]:g} {unit} {kind}" for kind in kinds)
     for axes_of_kind, kind in zip(panels.T, kinds, strict=True):
         own = table[table["kind"] == kind]
@@ -274,23 +263,15 @@ def draw_distances(table: pd.DataFrame) -> Figure:
 
 
 def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> None:
-    series = dict(groups(rows, "series"))
+    series = dict(kit.groups(rows, "series"))
     low, high, colour = series[LOWEST], series[HIGHEST], style.ARM_COLOURS[0]
-    axes.fill_between(
-        low["instant"],
-        low["distance"],
-        high["distance"],
-        color=colour,
-        alpha=0.18,
-        linewidth=0,
-        label="range over replicates",
-    )
+    ends = low["distance"], high["distance"]
+    marks.band(axes, low["instant"], *ends, colour, label="range over replicates")
     for name, look in LOOKS.items():
         if name in series and len(series[name]):
-            shown = (
-                {"label": name} | look | (CROWDED.get(name, {}) if len(series[name]) > MANY else {})
-            )
-            axes.plot(series[name]["instant"], series[name]["distance"], **shown)
+            crowded = CROWDED.get(name, {}) if len(series[name]) > MANY else {}
+            x, y = (series[name][column] for column in ("instant", "distance"))
+            axes.plot(x, y, **{"label": name} | look | crowded)
     label = f"below the required distance: {required}"
     axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
     axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))
@@ -299,25 +280,21 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> 
 def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
     """Draw the instants of one stage."""
     first, last = rows["instant"].min(), rows["instant"].max()
-    for arm, own in groups(rows, "arm"):
+    for arm, own in kit.groups(rows, "arm"):
         colour = style.arm_colour(arm)
         tips = own[own["link"] == own["link"].max()]
         axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
         between, shades = [], []
-        for instant, links in groups(own, "instant"):
+        for instant, links in kit.groups(own, "instant"):
             x, y = (np.append(links[name], links[f"{name}_end"].iloc[-1]) for name in "xy")
             if instant == last:
                 style.draw_arm(axes, arm, links)
             elif instant == first:
-                axes.plot(
-                    x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2
-                )
+                axes.plot(x, y, color=colour, **FIRST)
             else:
                 between.append(np.column_stack([x, y]))
                 shades.append(0.25 if whole else 0.7 - 0.5 * (last - instant) / (last - first))
         axes.add_collection(
             LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
         )
-        axes.plot(
-            own["x"].iloc[0], own["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2
-        )
+        marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)

@@ -6,24 +6,20 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.papers import marks
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
+VIEW = (24.0, -35.0)  # [deg] elevation, azimuth
 POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
 
 
 def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion.
-
-    Args:
-        condition: With the robot.
-        q: (nq, instants) [deg].
 
     Returns:
         Columns of `motion_geometry.links_table`, length_unit.
@@ -99,26 +95,15 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     for (arm, instant), rows in groups(table, ["arm", "instant"]):
         _arm(axes, arm, rows, dashed=instant == 1)
         x, y = [rows["x"].iloc[0], *rows["x_end"]], [rows["y"].iloc[0], *rows["y_end"]]
-        above.plot(
-            x,
-            y,
-            color=style.arm_colour(arm),
-            linestyle=(0, (2, 1)) if instant else "-",
-            marker="o",
-            ms=3,
-        )
+        colour, dashes = style.arm_colour(arm), (0, (2, 1)) if instant else "-"
+        above.plot(x, y, color=colour, linestyle=dashes, marker="o", ms=3)
         if instant == 0:
             _name_points(axes, arm, rows)
-            above.plot(x[0], y[0], "s", color=style.NEUTRAL, markersize=7)
+            marks.base(above, x[0], y[0], 7)
             turn = np.linspace(0.0, 360.0, 121)
             circle = np.array([sincos(DEGREE * angle) for angle in turn]) * rows["reach"].iloc[0]
-            above.fill(
-                x[0] + circle[:, 1],
-                y[0] + circle[:, 0],
-                color=style.arm_colour(arm),
-                alpha=0.12,
-                linewidth=0,
-            )
+            reach: dict[str, Any] = {"color": colour, "alpha": 0.12, "linewidth": 0}
+            above.fill(x[0] + circle[:, 1], y[0] + circle[:, 0], **reach)
     style.operational_axes(above, unit)
     _legend(figure, table, style.key("goal", color=style.NEUTRAL, linestyle=(0, (2, 1))))
     return figure
@@ -141,14 +126,8 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     lines = -(-len(stages) // 3)
     figure = style.figure(2.1 * lines + 0.4)
     for k, stage in enumerate(stages):
-        axes = _space(
-            figure,
-            (lines, 3, k + 1),
-            [table],
-            table["length_unit"].iloc[0],
-            zoom=1.08,
-            label_pad=-7.0,
-        )
+        place, unit = (lines, 3, k + 1), table["length_unit"].iloc[0]
+        axes = _space(figure, place, [table], unit, zoom=1.08, label_pad=-7.0)
         rows = table[table["stage"] == stage]
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
         axes.set_title(motions.stage_title(rows, whole=k == len(stages) - 1))
@@ -157,14 +136,8 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
             shade = 1.0 if newest else 0.15 + 0.45 * (instant - first) / max(1, last - first)
             _arm(axes, arm, links, width=2.4 if newest else 0.9, alpha=shade, joints=newest)
         for arm, links in groups(rows[rows["link"] == rows["link"].max()], "arm"):
-            axes.plot(
-                links["x_end"],
-                links["y_end"],
-                links["z_end"],
-                ":",
-                color=style.arm_colour(arm),
-                linewidth=1.0,
-            )
+            tips = (links[f"{name}_end"] for name in "xyz")
+            axes.plot(*tips, ":", color=style.arm_colour(arm), linewidth=1.0)
     _legend(figure, table, style.key("trace of the tip", color=style.NEUTRAL, lw=1.0, ls=":"))
     return figure
 
@@ -185,25 +158,15 @@ def _space(
     label_pad: float = -3.0,
 ) -> Any:
     """Return axes in space with equal scales that hold all links of the tables."""
-    axes: Any = figure.add_subplot(*place, projection="3d")
-    box = []
-    for name in "xyz":
-        values = np.concatenate(
-            [table[column].to_numpy() for table in tables for column in (name, f"{name}_end")]
-        )
-        low, high = float(values.min()), float(values.max())
-        pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
-        getattr(axes, f"set_{name}lim")(low - pad, high + pad)
-        pad_here = label_pad - (4.0 if name == "z" else 0.0)  # else it meets the panel beside it
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=pad_here, fontsize=7)
-        box.append(high - low + 2.0 * pad)
-    axes.set_box_aspect(box, zoom=zoom)
-    axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
-    axes.tick_params(labelsize=6, pad=-2)
-    for axis, side in zip((axes.xaxis, axes.yaxis, axes.zaxis), box, strict=True):
-        axis.set_major_locator(MaxNLocator(nbins=3 if side > 0.6 * max(box) else 2))
-    axes.view_init(elev=24.0, azim=-35.0)
-    return axes
+    columns = ([name, f"{name}_end"] for name in "xyz")
+    values = [
+        np.concatenate([table[pair].to_numpy().ravel() for table in tables]) for pair in columns
+    ]
+    low, high = np.min(values, axis=1), np.max(values, axis=1)
+    pad = 0.05 + 0.5 * np.maximum(0.0, 0.5 - (high - low))
+    pads = label_pad, label_pad, label_pad - 4.0  # else z's meets the panel beside it
+    look: dict[str, Any] = {"view": VIEW, "zoom": zoom, "label_pads": pads, "ticks": (2, 3)}
+    return marks.space(figure, place, low, high, pad, unit, **look)
 
 
 def _arm(
@@ -221,16 +184,9 @@ def _arm(
     kind: Any = (0, (2, 1)) if dashed else "-"
     axes.plot(*points, linestyle=kind, color=style.arm_colour(arm), linewidth=width, alpha=alpha)
     if joints:
-        axes.plot(
-            *points,
-            "o",
-            color="white",
-            markeredgecolor=style.arm_colour(arm),
-            markersize=3.2,
-            alpha=alpha,
-        )
-        base = [values[:1] for values in points]
-        axes.plot(*base, "s", color=style.NEUTRAL, markersize=5)
+        edge: dict[str, Any] = {"color": "white", "markeredgecolor": style.arm_colour(arm)}
+        axes.plot(*points, "o", markersize=3.2, alpha=alpha, **edge)
+        axes.plot(*(values[:1] for values in points), "s", color=style.NEUTRAL, markersize=5)
 
 
 def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
@@ -242,8 +198,7 @@ def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
         if k == 0:  # beside the square of the base
             axes.text(x, y, z, f"{text}    ", **look | {"ha": "right", "va": "center"})
         else:
-            halo = [withStroke(linewidth=2.0, foreground="white")]
-            axes.text(x, y, z + 0.11, text, path_effects=halo, **look)
+            axes.text(x, y, z + 0.11, text, path_effects=marks.HALO, **look)
 
 
 def _ball(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
 from evoexp.store.run_context import ORIGIN, run_context
@@ -68,7 +68,7 @@ def load(
     with searched_first(map(str, config_dir)):
         known = options("experiment")
         experiments = (
-            expansions.expand(
+            compose.expand(
                 [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
             )
             if what in known or is_file(what)

@@ -4,7 +4,6 @@ Every function returns one mapping with the keys of `KEYS`; `show --json` prints
 """
 
 import hashlib
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,9 +18,8 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError
 from evoexp.extras import lacking
 from evoexp.records import flatten
-from evoexp.registry import COMPONENTS, Registration, component_modules, registered
+from evoexp.registry import COMPONENTS, registered
 from evoexp.store.identity import TAKEN
-from evoexp.store.kept_facts import kept_fact
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
 from evoexp.store.plans import num_planned
@@ -71,7 +69,7 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
     around = run.manifest() if rows else None
     config_json = condition.to_json()
     if not lacking(config_json):  # else a note says how to install it
-        _find_notes(config_json)  # raises where the parts do not fit
+        condition.notes()  # raises where the parts do not fit
     return _facts(config_json, origin, around, rows, planned)
 
 
@@ -85,8 +83,9 @@ def stored_facts(run: RunDirectory) -> dict[str, Any]:
     origin |= {"code": manifest.get("git"), "directory": str(run.path)}
     config_json = run.config_json()
     found = _facts(config_json, origin, manifest, summary_table(run).to_pylist(), None)
-    if arrays := [_shapes(run.log_path(k)) for k in sorted(whole_logs(run))[:1]]:
-        found["result"]["arrays"] = arrays[0]
+    for replicate in sorted(whole_logs(run))[:1]:
+        arrays = read_log(run.log_path(replicate)).arrays()
+        found["result"]["arrays"] = {name: list(array.shape) for name, array in arrays.items()}
     return found
 
 
@@ -149,26 +148,17 @@ def _facts(
 
 def _components(config: Any) -> Iterator[dict[str, Any]]:
     """Yield every component once, with its revision here and as stored, and its package."""
-    stored = dict(reversed(list(_named(config))))  # of one that occurs twice the first
-    found = {name: registered(COMPONENTS, name) for name in dict(_named(config))}
-    here = _installed_revisions([each for each in found.values() if each is not None])
-    for name, registration in found.items():
+    revisions: dict[str, Any] = {}
+    for name, revision in _named(config):
+        revisions.setdefault(name, revision)
+    for name, revision in revisions.items():
+        registration = registered(COMPONENTS, name)
         yield {
             "component": name,
-            "revision": stored[name],
-            "installed_revision": here.get(name),
+            "revision": revision,
+            "installed_revision": registration and registration.load().revision,
             "package": registration and registration.package,
         }
-
-
-def _installed_revisions(registrations: Sequence[Registration]) -> dict[str, Any]:
-    """Return component → its revision in this installation."""
-
-    def find() -> dict[str, Any]:
-        return {each.name: each.load().revision for each in registrations}
-
-    modules = [each.module for each in registrations]
-    return dict(kept_fact("revisions", repr(registrations).encode(), modules, find))
 
 
 def _named(config: Any) -> Iterator[tuple[str, Any]]:
@@ -237,28 +227,9 @@ def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _shapes(path: Path) -> dict[str, list[int]]:
-    """Return name → shape of the arrays that references attach to a log."""
-    return {name: list(array.shape) for name, array in read_log(path).arrays().items()}
-
-
 def _notes(config_json: bytes) -> list[str]:
     """Return the remarks on a condition's settings, or the reason why there can be none."""
     try:
-        return _find_notes(config_json)
+        return list(Condition.from_json(config_json).notes())
     except EvoexpError as error:  # of another revision, or a package that is not installed
         return [str(error)]
-
-
-def _find_notes(config_json: bytes) -> list[str]:
-    """Return the remarks on a condition's settings.
-
-    Raises:
-        EvoexpError: If the condition cannot be built.
-    """
-
-    def find() -> list[str]:
-        return Condition.from_json(config_json).notes()
-
-    modules = component_modules(json.loads(config_json))
-    return list(kept_fact("notes", config_json, modules, find))

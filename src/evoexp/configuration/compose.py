@@ -28,7 +28,7 @@ from evoexp.configuration.assignment import assign_all
 from evoexp.configuration.building import build_condition, build_settings, planned_replicates
 from evoexp.configuration.conditions import Builder, Built, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
-from evoexp.configuration.interpolations import MARK, NotWhole, fill_in, refuse_functions
+from evoexp.configuration.interpolations import fill_in
 from evoexp.configuration.option_files import check_file, check_files
 from evoexp.configuration.overrides import (
     ADD,
@@ -47,19 +47,8 @@ from evoexp.configuration.overrides import (
     sweep,
 )
 from evoexp.configuration.problem_folders import FOLDER
-from evoexp.configuration.refusals import (
-    uncomposed,
-    unparsed,
-    unresolved,
-    without_header,
-)
-from evoexp.configuration.search_path import (
-    EXPERIMENT,
-    find,
-    folders,
-    groups,
-    is_file,
-)
+from evoexp.configuration.refusals import uncomposed, unparsed, without_header
+from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, is_file
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
@@ -287,11 +276,13 @@ def _entries(conditions: Any) -> Iterator[Entry]:
 
 def _condition(config: dict[str, Any], budget: Budget) -> tuple[Condition, bool]:
     """Build a composed configuration; return it with whether the budget capped it."""
-    plain, cap = _resolved(config), budget.max_generations
+    settings = {key: value for key, value in config.items() if key != "conditions"}
+    plain, cap = fill_in(settings, settings), budget.max_generations
     asked = (plain.get("ga") or {}).get("num_generations")
     is_capped = cap is not None and isinstance(asked, int) and asked > cap
     if is_capped:  # before a planner takes it in
-        plain = _resolved(config | {"ga": config["ga"] | {"num_generations": cap}})
+        settings["ga"] = settings["ga"] | {"num_generations": cap}
+        plain = fill_in(settings, settings)
     built = build_condition(plain, str(config["planner"]))
     most = budget.collision_queries
     return built._replace(max_collision_queries=most), is_capped or most is not None
@@ -300,18 +291,4 @@ def _condition(config: dict[str, Any], budget: Budget) -> tuple[Condition, bool]
 def _shared(config: dict[str, Any]) -> dict[str, Any]:
     """Return settings outside the conditions; they may be taken from those of a condition."""
     shared = {name: config[name] for name in NOT_IDENTITY if name in config}
-    shared = _resolved(config) if MARK in str(shared) else shared
-    return shared | {"conditions": config["conditions"]}  # whose overrides are resolved when set
-
-
-def _resolved(config: dict[str, Any]) -> dict[str, Any]:
-    """Return settings as plain data with their interpolations filled in."""
-    try:
-        return fill_in(config)
-    except NotWhole:
-        refuse_functions(config)
-    try:
-        plain: Any = OmegaConf.to_container(OmegaConf.create(config), resolve=True)
-    except (*_COMPOSER, RecursionError) as error:
-        raise unresolved(error, config) from None
-    return dict(plain)
+    return fill_in(shared, config) | {"conditions": config["conditions"]}

@@ -20,17 +20,14 @@ SEED = "seed"
 
 
 class Frames(NamedTuple):
-    """Results of one or several conditions.
+    """Results of one or several conditions."""
 
-    Attributes:
-        generations: One row per generation of every finished replicate, columns of
-            `evoexp.records.GenerationRow`.
-        summaries: One row per replicate, done or failed, columns of
-            `evoexp.records.ReplicateSummary`, `seed`, and the settings in which the conditions
-            differ, by the names that they have in `summary.parquet`.
-    """
-
+    # one row per generation of every finished replicate, columns of
+    # `evoexp.records.GenerationRow`
     generations: pd.DataFrame
+    # one row per replicate, done or failed, columns of `evoexp.records.ReplicateSummary`, `seed`,
+    # and the settings in which the conditions differ, by the names that they have in
+    # `summary.parquet`
     summaries: pd.DataFrame
 
 

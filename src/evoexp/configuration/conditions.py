@@ -29,15 +29,10 @@ Entry = tuple[str, Choice]  # label and overrides, each with one value, of an ex
 
 
 class Composed(NamedTuple):
-    """Chosen options, composed.
+    """Chosen options, composed."""
 
-    Attributes:
-        config: Their settings as plain data, interpolations as they are written.
-        options: The option taken of each group.
-    """
-
-    config: dict[str, Any]
-    options: tuple[Option, ...]
+    config: dict[str, Any]  # their settings as plain data, interpolations as they are written
+    options: tuple[Option, ...]  # the option taken of each group
 
 
 class Built(NamedTuple):

@@ -86,6 +86,6 @@ def test_a_refusal_stays_a_refusal(
     def refuse(*words: object) -> int:
         raise SettingError("ga.population_size", "positive", -1) from MemoryError()
 
-    monkeypatch.setattr("evoexp.cli._run", refuse)
+    monkeypatch.setattr("evoexp.commands.list_.main", refuse)
     assert main(["list"]) == 2
     assert capsys.readouterr().err == "evoexp: ga.population_size: must be positive, was -1\n"

@@ -1,10 +1,8 @@
 """The Python door: stored results as pandas frames."""
 
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 import pandas as pd
@@ -125,12 +123,3 @@ def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFram
     ]
     whole = pd.concat(parts, ignore_index=True)
     return whole[["label", *frame.columns]]
-
-
-class _CallableModule(ModuleType):
-    """`evoexp.load` names this module once it is imported: calling it calls the function."""
-
-    __call__ = staticmethod(load)
-
-
-sys.modules[__name__].__class__ = _CallableModule

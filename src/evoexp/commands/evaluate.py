@@ -11,9 +11,7 @@ from rich.table import Column, Table
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.commands.arguments import add_experiment_arguments, is_motion
-from evoexp.commands.console import new_table, plain_console, print_json, right, say
-from evoexp.commands.motion_files import nested
-from evoexp.commands.motions import (
+from evoexp.commands.chosen_motions import (
     FittingMotion,
     fitting_motions,
     initial_motion,
@@ -21,6 +19,8 @@ from evoexp.commands.motions import (
     stored_motion,
     write,
 )
+from evoexp.commands.console import new_table, plain_console, print_json, right, say
+from evoexp.commands.motion_files import nested
 from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from evoexp.commands.console import say
-from evoexp.commands.motions import (
+from evoexp.commands.chosen_motions import (
     add_motion_arguments,
     output_path,
     single,
     speed_limits,
     write,
 )
+from evoexp.commands.console import say
 from evoexp.errors import SettingError
 from evoexp.playback.joint_limits import Defaults, JointLimits, joint_limits
 from evoexp.playback.recording import Recording

@@ -2,7 +2,7 @@
 
 import argparse
 
-from evoexp.commands.motions import add_motion_arguments, output_path, single, write
+from evoexp.commands.chosen_motions import add_motion_arguments, output_path, single, write
 from evoexp.playback.playable_log import LAYOUT, layout, playable_log
 
 

@@ -38,7 +38,7 @@ class _Bars(Progress):
     look: Callable[[], None] = staticmethod(lambda: None)
 
     def get_renderables(self) -> Iterable[RenderableType]:
-        """Return what is drawn."""
+        """Return the bars, with the latest news."""
         self.look()
         return super().get_renderables()
 
@@ -133,7 +133,7 @@ class BatchProgress:
             self._bars.update(self._tasks[oldest], visible=False)
 
     def _read_curves(self) -> None:
-        """Draw what the workers left."""
+        """Draw the curves that the workers left."""
         levels = LEVELS if self._console.encoding.startswith("utf") else PLAIN_LEVELS
         for curve in [] if self._curves is None else read_curves(self._curves):
             key = curve.condition_id

@@ -2,7 +2,7 @@
 
 import argparse
 
-from evoexp.commands.motions import add_motion_arguments, output_path, recordings, write
+from evoexp.commands.chosen_motions import add_motion_arguments, output_path, recordings, write
 from evoexp.playback.player_page import page
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from command_samples import Evoexp
 
-from evoexp.commands.claims import KEYS, NOT_RUN
+from evoexp.commands.claim_list import KEYS, NOT_RUN
 from evoexp.configuration.search_path import options
 from evoexp.registry import CLAIMS, Registration, registrations
 

@@ -30,7 +30,7 @@ COMMANDS = {
     "new": "write a package with a planner of your own, to begin with",
     "completion": "print a script with which the shell completes commands",
 }
-MODULES = {"list": "list_"}  # where a module has another name
+MODULES = {"list": "list_", "claims": "claim_list"}  # where a module has another name
 
 
 class CommandParser(argparse.ArgumentParser):

@@ -62,7 +62,7 @@ class BatchProgress:
                 shown.
             clock: Tells the time [s].
         """
-        texts = ["{task.fields[failed]} failed", "best {task.fields[best]}"]
+        texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
         texts += ["{task.fields[curve]}"] if curves is not None else []
         self._bars = _Bars(
             TextColumn("{task.description}", markup=False),
@@ -85,9 +85,7 @@ class BatchProgress:
         self._last_line = clock()
 
     def _row(self, label: str, total: int, *, visible: bool = True) -> TaskID:
-        return self._bars.add_task(
-            label, total=total, visible=visible, failed=0, best="–", curve=""
-        )
+        return self._bars.add_task(label, total=total, visible=visible, failed=0, best="", curve="")
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
@@ -113,7 +111,7 @@ class BatchProgress:
         self._failed[key] += outcome.failed
         if outcome.summary is not None:
             self._best[key] = min(self._best[key], outcome.summary.best_cost)
-        best = f"{self._best[key]:.4g}" if np.isfinite(self._best[key]) else "–"
+        best = f"best {self._best[key]:.4g}" if np.isfinite(self._best[key]) else ""
         self._show_row(key)
         self._bars.update(self._tasks[key], advance=1, failed=self._failed[key], best=best)
         self._bars.update(self._all, advance=1, failed=sum(self._failed.values()))

@@ -153,7 +153,6 @@ def test_no_global_randomness_and_nothing_irreproducible() -> None:
         ("evoexp.paths.redistribution", ("hydra", "pandas", "pinocchio", "matplotlib")),
         ("evoexp.store.log", ("hydra", "pandas", "pinocchio", "matplotlib", "pyarrow")),
         ("evoexp.batch.replicate", ("hydra", "matplotlib", "pandas")),
-        ("evoexp.commands.report", ("matplotlib",)),
     ],
 )
 def test_imports_stay_light(module: str, absent: tuple[str, ...]) -> None:

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 from evoexp.version import __version__
 
 if TYPE_CHECKING:
-    from evoexp.load import Frames, load
+    from evoexp.loading import Frames, load
 
 __all__ = ["Frames", "__version__", "load"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import the module `load`, which needs pandas, only when it is asked for."""
+    """Import `load`, which needs pandas, only when it is asked for."""
     if name in ("load", "Frames"):
-        return getattr(importlib.import_module("evoexp.load"), name)
+        return getattr(importlib.import_module("evoexp.loading"), name)
     raise AttributeError(f"module 'evoexp' has no attribute '{name}'")
 
 

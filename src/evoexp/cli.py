@@ -11,9 +11,13 @@ import sys
 from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
+from evoexp.commands.command_process import (
+    memory_shortage,
+    refuse_too_little_memory,
+    use_temporary_folder,
+)
 from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
-from evoexp.commands.memory_shortage import refuse_too_little, shortage
 from evoexp.commands.standard_streams import OUTPUT, complain, open_streams, settle_streams
 from evoexp.errors import EvoexpError
 
@@ -35,9 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if is_process:
             os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
             os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
-            os.environ.setdefault(
-                "PYDANTIC_DISABLE_PLUGINS", "__all__"
-            )  # looked for in all packages
+            os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looked for everywhere
             open_streams()
             interruption.hear()
         code = _run(words, is_process)
@@ -55,15 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(words: Sequence[str], is_process: bool) -> int:
     """Run one command; return its exit code."""
     if not words or words[0] not in COMMANDS:
-        parser = whole_parser()
+        parser, _ = whole_parser()
         parser.parse_args(words)
         parser.print_help()
         return 0
     chosen = words[0]
-    refuse_too_little()
+    refuse_too_little_memory()
     if is_process:
-        from evoexp.commands.temporary_folder import use_temporary_folder
-
         use_temporary_folder()
     given = command_parser(chosen).parse_intermixed_args(words[1:])
     with contextlib.ExitStack() as stack:
@@ -90,7 +90,7 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
     if isinstance(error, EvoexpError):
         complain(str(error))
         return 2
-    if text := shortage(error):
+    if text := memory_shortage(error):
         complain(text)
         return 2
     if not isinstance(error, OSError) or error.errno is None:

@@ -28,7 +28,7 @@ from evoexp.condition import Condition
 from evoexp.store.run_directory import RunDirectory
 from matrix import examples
 
-PROGRESS = re.compile(r".{0,20}replicates|condition +done +failed|.* of 12 +\d+ ")
+PROGRESS = re.compile(r".{0,20}replicates|.*\d+/12 +\d+ failed")
 LINE = f"evoexp: interrupted; {KEPT}"
 MOMENTS_S = (0.2, 0.4, 0.6, 0.9, 1.2, 1.5, 2.0, 2.5, 3.5)  # after the command was started
 

@@ -12,8 +12,7 @@ from command_samples import SMALL, Evoexp
 
 from evoexp import shipped
 from evoexp.collision.certifier.certificate import Certificate
-from evoexp.commands import given_motion
-from evoexp.commands.given_motion import flatten
+from evoexp.commands.motion_files import flatten, nested
 from evoexp.configuration import compose
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -368,5 +367,5 @@ def test_options_that_do_not_fit_are_refused(
 def test_any_number_of_parts_are_nested_and_flattened() -> None:
     solution = np.arange(12.0)
     for shape in ((..., (3,)), ((2, 3), (6,)), ((), *[(11,)]), ((4, 3),)):
-        lists = given_motion.nested(solution, shape)
+        lists = nested(solution, shape)
         assert np.array_equal(flatten(lists, shape), solution)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from confinement import confined, no_longer
-from evoexp.commands.given_motion import flatten, read_motion
+from evoexp.commands.motion_files import flatten, read_motion
 from evoexp.errors import EvoexpError
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from evoexp.cli import main
-from evoexp.commands.memory_shortage import LEAST_MB, MEGABYTE, shortage
+from evoexp.commands.command_process import LEAST_MB, MEGABYTE, memory_shortage
 from evoexp.errors import SettingError
 from matrix import counts
 
@@ -66,10 +66,10 @@ def test_help_needs_little(tmp_path: Path) -> None:
     ],
 )
 def test_errors_that_mean_it(error: Exception, text: str) -> None:
-    assert shortage(error).startswith(f"out of memory: {text}")
+    assert memory_shortage(error).startswith(f"out of memory: {text}")
     outer = RuntimeError("a library explains at length")
     outer.__cause__ = error
-    assert text in shortage(outer)
+    assert text in memory_shortage(outer)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_errors_that_mean_it(error: Exception, text: str) -> None:
     [ImportError("no module named nothing"), OSError(errno.ENOSPC, "No space"), ValueError("x")],
 )
 def test_errors_that_mean_something_else(error: Exception) -> None:
-    assert shortage(error) == ""
+    assert memory_shortage(error) == ""
 
 
 def test_a_refusal_stays_a_refusal(
@@ -86,6 +86,6 @@ def test_a_refusal_stays_a_refusal(
     def refuse(*words: object) -> int:
         raise SettingError("ga.population_size", "positive", -1) from MemoryError()
 
-    monkeypatch.setattr("evoexp.cli._run", refuse)
+    monkeypatch.setattr("evoexp.commands.list_.main", refuse)
     assert main(["list"]) == 2
     assert capsys.readouterr().err == "evoexp: ga.population_size: must be positive, was -1\n"

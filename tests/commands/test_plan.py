@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from command_samples import SERIAL, Evoexp, content
 
-from evoexp.commands import stored_times
-from evoexp.commands.stored_times import OTHER_SETTINGS, Times, bounds
+from evoexp.commands import plan
+from evoexp.commands.plan import OTHER_SETTINGS, Times, bounds
 from evoexp.store.run_directory import RunDirectory, find_runs
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
@@ -50,13 +50,13 @@ def test_every_stored_run_is_read_once_for_any_number_of_conditions(
     evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read: list[str] = []
-    table = stored_times.summary_table
+    table = plan.summary_table
 
     def counted(run: RunDirectory) -> Any:
         read.append(run.hash12)
         return table(run)
 
-    monkeypatch.setattr(stored_times, "summary_table", counted)
+    monkeypatch.setattr(plan, "summary_table", counted)
     said = evoexp("plan", "-m", *PLANAR, "seed=range(1,9)", "--json")
     assert len(json.loads(said.out)) == 24
     assert sorted(read) == sorted(run.hash12 for run in find_runs(stored))

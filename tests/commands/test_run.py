@@ -4,8 +4,6 @@ import json
 import os
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
@@ -92,19 +90,6 @@ def test_terminal_and_report_have_all_stored_replicates(evoexp: Evoexp, stored: 
     assert "asked for: all" not in said.out
 
 
-def test_a_run_without_report_loads_neither_pandas_nor_matplotlib(outputs: Path) -> None:
-    """The two take as long to load as two hundred replicates of some planners."""
-    words = ["run", *PLANAR, "num_replicates=1", "--no-report"]
-    code = f"import sys; from evoexp.cli import main; assert main({words!r}) == 0\n"
-    code += "assert not {'pandas', 'matplotlib'} & set(sys.modules)"
-    environment = os.environ | {"EVOEXP_OUTPUTS": str(outputs)}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    assert len(find_runs(outputs)) == 3
-
-
 def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:
     said = evoexp(
         "run", *PLANAR, "num_replicates=1", "report=paper", "report.formats=[png]", "report.dpi=20"
@@ -116,6 +101,29 @@ def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:
     assert page.parent.parent == outputs / "reports"
     assert page.parent.name == compose.expand(PLANAR)[0].report_name
     assert "ga.population_size=8" in page.read_text()
+
+
+def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs: Path) -> None:
+    words = ("run", *PLANAR, "num_replicates=1", "report.formats=[png]", "report.dpi=20")
+    words = (*words, "--only", "via-point GA")
+    assert "(as it was)" not in evoexp(*words).out
+    (page,) = outputs.glob("reports/*/index.md")
+    content, drawn = page.read_bytes(), page.stat().st_mtime_ns
+    assert "index.md (as it was)\n" in evoexp(*words).out
+    assert page.stat().st_mtime_ns == drawn
+    assert evoexp("report", "--check", *words[1:]).code == 0
+    (log,) = outputs.glob("runs/*/replicates/0000.mcap")
+    changes = (
+        lambda: page.write_bytes(b"altered"),
+        lambda: page.with_suffix(".html").unlink(),
+        lambda: os.utime(log, ns=(1, 1)),
+    )
+    for change in changes:
+        change()
+        assert "(as it was)" not in evoexp(*words).out
+        assert page.read_bytes() == content
+    assert "(as it was)" in evoexp(*words).out
+    assert "(as it was)" not in evoexp(*words, "report.confidence=0.9").out
 
 
 def test_several_experiments_share_a_batch_and_a_condition_runs_once(

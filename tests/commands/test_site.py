@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp, content
 
-from evoexp.commands import all_reports
+from evoexp.commands import report
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, find_runs
 from html_reader import Page
@@ -83,10 +83,10 @@ def test_all_reports_are_those_of_experiments_that_were_run(
             experiment, budget, _ = done[self.condition_id]
             return {"experiment": experiment, "command": f"evoexp run budget={budget}"}
 
-    monkeypatch.setattr(all_reports, "RunDirectory", Run)
+    monkeypatch.setattr(report, "RunDirectory", Run)
 
     def folders() -> list[str]:
-        return [each.folder for each in all_reports.planned_reports(outputs)]
+        return [each.folder for each in report.planned_reports(outputs)]
 
     assert folders() == ["rana_planar@quick"]
     done[planar[1]] = ("rana_planar", "quick", 20)  # the paper's number of replicates, later

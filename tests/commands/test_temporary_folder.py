@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from evoexp.commands.temporary_folder import LOCK, PREFIX, remove_abandoned
+from evoexp.commands.command_process import LOCK, PREFIX, remove_abandoned
 
 COMMAND = """
 import os, signal, sys, tempfile

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_samples import SERIAL, Evoexp
+from command_samples import Evoexp
 
 from evoexp.commands.arguments import is_motion, is_override
 from evoexp.store.run_directory import find_runs
@@ -152,9 +152,3 @@ def test_an_experiment_that_is_a_file(evoexp: Evoexp, outputs: Path, conf: str) 
     typed = shlex.split(command.partition("evoexp ")[2].partition("`")[0])
     assert file in typed
     assert evoexp(*typed).code == 0
-
-
-def test_a_repeated_run_is_said_to_be_there(evoexp: Evoexp, outputs: Path) -> None:
-    words = ("run", "experiment=rana_obstacles", *SERIAL, "num_replicates=1", "--no-report")
-    assert evoexp(*words).code == 0
-    assert "nothing to run: every replicate is there" in evoexp(*words).out

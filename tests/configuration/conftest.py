@@ -13,15 +13,15 @@ COMPOSED: dict[Any, compose.Composed] = {}
 @pytest.fixture(autouse=True)
 def composed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have Hydra compose no choice of options twice, as long as the files stay the same."""
-    by_hydra = compose._Composer._by_hydra
+    by_hydra = compose.Composer.by_hydra
 
-    def remembered(composer: Any, words: list[str], file: Any) -> compose.Composed:
-        roots = [composer._root, *(folder.path for folder in folders())]
+    def remembered(composer: Any, words: list[str]) -> compose.Composed:
+        roots = [composer.root, *(folder.path for folder in folders())]
         files = [path for root in roots for path in root.glob("*/*.yaml")]
         state = [(path.name, path.stat().st_mtime_ns) for path in sorted(files)]
-        key = (*words, file, *(folder.path for folder in folders()), *state)
+        key = (*words, composer.file, *(folder.path for folder in folders()), *state)
         if key not in COMPOSED:
-            COMPOSED[key] = by_hydra(composer, words, file)
+            COMPOSED[key] = by_hydra(composer, words)
         return COMPOSED[key]
 
-    monkeypatch.setattr(compose._Composer, "_by_hydra", remembered)
+    monkeypatch.setattr(compose.Composer, "by_hydra", remembered)

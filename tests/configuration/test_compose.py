@@ -100,7 +100,7 @@ def test_settings_are_as_hydra_itself_sets_them(words: tuple[str, ...]) -> None:
     chosen = collect(map(compose.parse, words))
     experiment = find("experiment", chosen.pop("experiment").typed)
     with TemporaryDirectory() as root:
-        composed = compose._Composer(Path(root))(chosen, experiment)
+        composed = compose.Composer(Path(root), experiment)(chosen)
     assert composed.config == by_hydra
 
 

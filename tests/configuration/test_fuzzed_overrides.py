@@ -15,6 +15,7 @@ import pytest
 
 from evoexp.configuration import compose
 from evoexp.configuration.assignment import assign_all
+from evoexp.configuration.building import condition_of
 from evoexp.configuration.experiment import Budget
 from evoexp.configuration.overrides import collect
 from evoexp.configuration.search_path import find, groups
@@ -139,7 +140,7 @@ def test_a_mutated_override_is_refused_in_one_line_or_taken(experiment: str) -> 
     rng = random.Random(experiment)
     num_cases = counts(400, 4000)
     with TemporaryDirectory() as root:
-        base = compose._Composer(Path(root))({}, find("experiment", experiment)).config
+        base = compose.Composer(Path(root), find("experiment", experiment))({}).config
     paths = [path for path in places(base, "") if not path.startswith(("report", "conditions"))]
     taken = 0
     for _ in range(num_cases):
@@ -153,7 +154,7 @@ def test_a_mutated_override_is_refused_in_one_line_or_taken(experiment: str) -> 
             chosen = {key for key in given if key in groups()}
             assign_all(config, {key: each for key, each in given.items() if key not in chosen})
             if not any(each.is_swept for each in given.values()):
-                compose._condition(config, BUDGET)
+                condition_of(config, BUDGET)
                 taken += 1
         except EvoexpError as refusal:
             check(refusal, text)

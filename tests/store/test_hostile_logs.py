@@ -30,8 +30,8 @@ from mcap.records import Attachment, Metadata
 from store_samples import generations, write
 
 from confinement import confined, no_longer
-from evoexp.commands.fact_screen import screen
 from evoexp.commands.facts import log_facts
+from evoexp.commands.show import screen
 from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.records import FrontRow
 from evoexp.store import log_bounds, log_reader

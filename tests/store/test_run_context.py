@@ -7,9 +7,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from evoexp import load
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import expansions
-from evoexp.load import load
 from evoexp.shipped import shipped
 from evoexp.store.manifest import manifest
 from evoexp.store.run_context import origin, run_context

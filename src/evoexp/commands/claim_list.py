@@ -4,10 +4,10 @@ import argparse
 from collections.abc import Iterator
 from typing import Any, cast
 
-from rich.table import Table
+from rich.table import Column, Table
 
-from evoexp.commands.console import new_table, plain_console, print_json
-from evoexp.configuration import expansions
+from evoexp.commands.console import new_table, print_json, say
+from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.claim_rules import Rule, Rules
@@ -51,13 +51,12 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(found)
         return 0
-    console = plain_console()
     for row in found:
-        console.print(_block(row))
-        console.print()
+        say(_block(row))
+        say("")
     verdicts = [row["verdict"].split(" (")[0] for row in found]
     counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts)]
-    console.print(f"{len(found)} claim{'s' * (len(found) != 1)}: {', '.join(counts)}")
+    say(f"{len(found)} claim{'s' * (len(found) != 1)}: {', '.join(counts)}")
     return 0
 
 
@@ -83,7 +82,7 @@ def judged(name: str) -> tuple[Claim, ...]:
     Raises:
         NothingStored: If nothing of it has been run.
     """
-    (experiment,) = expansions.expand([f"experiment={name}"])
+    (experiment,) = compose.expand([f"experiment={name}"])
     results = gather(
         outputs_root(),
         experiment.conditions,
@@ -132,10 +131,9 @@ def _unjudged_row(paper: str, experiment: str, rule: Rule) -> dict[str, Any]:
 
 def _block(row: dict[str, Any]) -> Table:
     """Return one claim as a small table: what is claimed, by which rule, from which numbers."""
-    table = new_table(f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}")
+    title = f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}"
+    table = new_table(title, Column(no_wrap=True), "")
     table.show_header = False
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
     for key in ("claim", "source", "rule", "evidence", "n", "verdict", "command"):
         table.add_row({"evidence": "numbers"}.get(key, key), row[key] or "–")
     return table

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from evoexp.commands.console import add_columns, new_table, plain_console, print_json
+from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.condition import revisions
 from evoexp.errors import Busy, StoreError, UnknownOption
 from evoexp.store.files import is_set_aside, is_temporary
@@ -15,23 +15,17 @@ from evoexp.store.identity import CONFIG, REPLICATES, read
 from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
 
 SHOWN = 20
-KEYS = ("kind", "path", "bytes")
 
 
 class Waste(NamedTuple):
-    """A file or folder that no command needs; fields as in `KEYS`.
+    """A file or folder that no command needs: what `--json` prints."""
 
-    Attributes:
-        kind: Why, one of `KINDS`.
-        path: Its place.
-        size: [B] of it, with everything in it.
-    """
-
-    kind: str
+    kind: str  # why, one of `KINDS`
     path: Path
-    size: int
+    bytes: int  # with everything in it [B]
 
 
+KEYS = Waste._fields
 KINDS = {
     "temporary": "left by a process that was killed while it wrote",
     "damaged": "set aside by run, which ran it again",
@@ -67,7 +61,7 @@ def main(arguments: argparse.Namespace) -> int:
     outputs = outputs_root()
     found = [each for each in waste(outputs) if each.kind in wanted]
     if arguments.json:
-        print_json([dict(zip(KEYS, each, strict=True)) for each in found])
+        print_json([each._asdict() for each in found])
     else:
         _print(found, outputs)
     if arguments.yes:
@@ -117,24 +111,21 @@ def _size(path: Path) -> int:
 
 
 def _print(found: list[Waste], outputs: Path) -> None:
-    console = plain_console()
     if not found:
-        console.print(f"{outputs}: nothing to delete")
+        say(f"{outputs}: nothing to delete")
         return
-    table = new_table()
-    add_columns(table, "kind", "file")
-    add_columns(table, "kB", right=True)
+    table = new_table("", "kind", "file", *right("kB"))
     for each in found[:SHOWN]:
-        table.add_row(each.kind, str(each.path.relative_to(outputs)), f"{each.size / 1000:.0f}")
-    console.print(table)
+        table.add_row(each.kind, str(each.path.relative_to(outputs)), f"{each.bytes / 1000:.0f}")
+    say(table)
     more = f" ({len(found) - SHOWN} more than shown)" if len(found) > SHOWN else ""
-    size = sum(each.size for each in found) / 1e6
-    console.print(f"{len(found)} files or folders{more}, {size:.2f} MB")
+    size = sum(each.bytes for each in found) / 1e6
+    say(f"{len(found)} files or folders{more}, {size:.2f} MB")
 
 
 def _delete(found: list[Waste], outputs: Path) -> None:
     """Delete, run by run; a run that another process writes is left alone."""
-    console, deleted = plain_console(), 0
+    deleted = 0
     for each in found:
         name = each.path.relative_to(outputs / "runs").parts[0]
         lock = RunDirectory(outputs, name + "0" * (64 - len(name))).lock()
@@ -146,5 +137,5 @@ def _delete(found: list[Waste], outputs: Path) -> None:
                     each.path.unlink(missing_ok=True)
                 deleted += 1
         except Busy:
-            console.print(f"run {name}: another process is writing it now; left alone")
-    console.print(f"deleted: {deleted}")
+            say(f"run {name}: another process is writing it now; left alone")
+    say(f"deleted: {deleted}")

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+import re
 from types import ModuleType
 from typing import Any, NoReturn
 
@@ -39,30 +40,34 @@ class CommandParser(argparse.ArgumentParser):
     """
 
     def __init__(self, **settings: Any) -> None:
+        """Declare nothing but `--help` yet."""
+        self.declared: list[argparse.Action] = []
         super().__init__(allow_abbrev=False, **settings)
+
+    def add_argument(self, *names: Any, **settings: Any) -> argparse.Action:
+        """Declare an argument, and remember it."""
+        argument = super().add_argument(*names, **settings)
+        self.declared.append(argument)
+        return argument
 
     def error(self, message: str) -> NoReturn:
         """Exit with code 2 and one line that names the choices."""
-        choices = {
-            text: action.choices
-            for action in self._actions
-            for text in (*action.option_strings, action.dest)
-        }
-        option = message.removeprefix("argument ").split(":")[0]
-        if "invalid choice" in message and choices.get(option) and option != "command":
-            word, known = message.split("'")[1], list(choices[option] or ())
-            message = (
-                f"{option}: must be one of {', '.join(known)}, was '{word}'{nearest(word, known)}"
-            )
-        elif "invalid choice" in message:
-            word = message.split("'")[1]
-            message = (
-                f"no command '{word}'{nearest(word, COMMANDS)} (commands: {', '.join(COMMANDS)})"
-            )
-        elif "unrecognized arguments" in message:
+        if choice := re.match(
+            r"argument (\S+): invalid choice: '(.*)' \(choose from (.*)\)", message
+        ):
+            option, word, choices = choice.groups()
+            if option == "COMMAND":
+                told = f"no command '{word}'{nearest(word, COMMANDS)}"
+                message = f"{told} (commands: {', '.join(COMMANDS)})"
+            else:
+                known = [each.strip("'") for each in choices.split(", ")]
+                must = f"must be one of {', '.join(known)}"
+                message = f"{option}: {must}, was '{word}'{nearest(word, known)}"
+        elif message.startswith("unrecognized arguments: "):
             words = message.split(": ", 1)[1].split(" ")
             word = next((word for word in words if word.startswith("-")), words[0])
-            known = [text for action in self._actions for text in action.option_strings]
+            lines = re.findall(r"^  (-.+?)(?:  |$)", self.format_help(), re.MULTILINE)
+            known = re.findall(r"(?<![\w-])--?[a-z][\w-]*", "\n".join(lines))
             message = f"no option '{word}'{nearest(word, known)} (options: {', '.join(known)})"
         self.exit(2, f"evoexp: {message}\n")
 
@@ -80,8 +85,10 @@ def command_parser(name: str) -> CommandParser:
     return parser
 
 
-def whole_parser(*, with_arguments: bool = False) -> CommandParser:
-    """Return the parser of all commands.
+def whole_parser(
+    *, with_arguments: bool = False
+) -> tuple[argparse.ArgumentParser, list[argparse.Action]]:
+    """Return the parser of all commands, and the arguments of all of them.
 
     Args:
         with_arguments: Whether the arguments of every command are added; all are imported then.
@@ -91,8 +98,10 @@ def whole_parser(*, with_arguments: bool = False) -> CommandParser:
     )
     parser.add_argument("--version", action="version", version=f"evoexp {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=CommandParser)
+    declared: list[argparse.Action] = []
     for name, summary in COMMANDS.items():
         command = commands.add_parser(name, help=summary, add_help=with_arguments)
         if with_arguments:
             command_module(name).add_arguments(command)
-    return parser
+            declared += command.declared
+    return parser, declared

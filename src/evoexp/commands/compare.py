@@ -2,22 +2,20 @@
 
 import argparse
 import hashlib
-import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rich.table import Table
 
-from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
-from evoexp.commands.console import add_columns, new_table, plain_console, print_json
+from evoexp.commands.arguments import add_experiment_arguments, folder_words
+from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.commands.pack import unpacked
+from evoexp.commands.report_requests import MAX_NAMED, ReportRequest, chosen
 from evoexp.condition import Condition
-from evoexp.configuration import expansions
 from evoexp.configuration.labels import SAME
-from evoexp.configuration.search_path import is_file, options
-from evoexp.errors import SettingError, UnknownOption
+from evoexp.errors import SettingError
 from evoexp.report import build, markdown
 from evoexp.report.best_known import read_best_known, shipped_best_known
 from evoexp.report.comparison_files import as_csv, as_latex
@@ -27,13 +25,10 @@ from evoexp.report.pages import comparison
 from evoexp.report.planner_runs import PlannerRuns, of_results
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
-from evoexp.shipped import shipped
 from evoexp.store.files import write_file, write_files
-from evoexp.store.run_directory import outputs_root, resolve
+from evoexp.store.run_directory import outputs_root
 
 PAGE = "comparison"
-MAX_NAMED = 4  # runs whose hashes the name of a report spells out
-_HASH = re.compile("[0-9a-fA-F]{4,64}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,21 +57,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 class Drawn(NamedTuple):
-    """A comparison before it is written.
-
-    Attributes:
-        files: Of its page.
-        request: That it answers.
-        settings: Levels and formats.
-        runs: Of all planners, those given by `--data` included.
-        strange: Lines on problems that only the given data know.
-    """
+    """A comparison before it is written."""
 
     files: build.ReportFiles
     request: build.Request
     settings: ReportSettings
-    runs: list[PlannerRuns]
-    strange: list[str]
+    runs: list[PlannerRuns]  # of all planners, those given by `--data` included
+    strange: list[str]  # lines on problems that only the given data know
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -89,16 +76,21 @@ def main(arguments: argparse.Namespace) -> int:
     rows = comparison.rated(runs, settings)
     _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
     if arguments.json:
-        print_json([row._asdict() | _parts(row) for row in rows])
+        print_json(
+            [
+                row._asdict()
+                | {"interval": row.interval._asdict(), "lengths": row.lengths._asdict()}
+                for row in rows
+            ]
+        )
         return 0
-    console = plain_console()
-    console.print(_table(rows, request.report_name))
+    say(_table(rows, request.report_name))
     for line in strange:
-        console.print(line, highlight=False, soft_wrap=True)
+        say(line)
     for kind in ("csv", "latex", "ioh"):
         if written := getattr(arguments, kind):
-            console.print(f"{kind}: {written}", highlight=False, soft_wrap=True)
-    console.print(f"compare: {path}", highlight=False, soft_wrap=True)
+            say(f"{kind}: {written}")
+    say(f"compare: {path}")
     return 0
 
 
@@ -127,9 +119,8 @@ def drawn(arguments: argparse.Namespace) -> Drawn:
 
 
 def _table(rows: Sequence[comparison.Rated], title: str) -> Table:
-    table = new_table(title)
-    add_columns(table, "condition")
-    add_columns(table, "proven", "queries\neach", "best\nlength", "refuted", right=True)
+    numbers = right("proven", "queries\neach", "best\nlength", "refuted")
+    table = new_table(title, "condition", *numbers)
     for row in rows:
         table.add_row(
             row.condition,
@@ -161,55 +152,32 @@ def _write_files(
         write_files(files)
 
 
-def _parts(row: comparison.Rated) -> dict[str, Any]:
-    return {"interval": row.interval._asdict(), "lengths": row.lengths._asdict()}
-
-
-def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings, int | None]:
-    """Return the request of the page, its settings, and the planned replicates.
+def _asked(arguments: argparse.Namespace) -> ReportRequest:
+    """Return the request of the page.
 
     Raises:
-        UnknownOption: If a word is neither an experiment nor a hash.
-        SettingError: If runs are given by their hashes, and overrides beside them.
+        EvoexpError: As `report_requests.chosen`.
     """
-    multirun, only, known = arguments.multirun, arguments.only, options("experiment")
-    overrides = [word for word in arguments.overrides if is_override(word)]
-    names = [word for word in arguments.overrides if word not in overrides]
-    words = shlex.join([*arguments.overrides, *(["-m"] if multirun else [])])
-    words += f" --only {shlex.quote(','.join(only))}" if only else ""
+    words = shlex.join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
+    words += f" --only {shlex.quote(','.join(arguments.only))}" if arguments.only else ""
     words = " ".join([words, *folder_words(arguments.config_dir)])
-    if names and not any(name in known or is_file(name) for name in names):
-        for name in names:
-            if not _HASH.fullmatch(name):
-                raise UnknownOption("experiment", name, known)
-        if overrides or multirun or only:
-            must = "left out where runs are given by their hashes"
-            raise SettingError("overrides", must, " ".join([*overrides, *only]) or "-m")
-        runs = [resolve(outputs_root(), name) for name in names]
-        conditions = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
-        plain = expansions.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
-        name = _name("+".join(conditions), len(conditions))
-        request = build.Request(name, "", "", tuple(conditions.items()), words, None, "compare")
-        return request, _with_page(plain.report), None
-    for name in names:
-        if name not in known and not is_file(name):
-            raise UnknownOption("experiment", name, known)
-    chosen = [f"experiment={','.join(names)}"] if names else []
-    experiments = expansions.expand(
-        [*chosen, *overrides], multirun=multirun or len(names) > 1, only=only
-    )
-    several = len(experiments) > 1
+    runs, experiments, _, settings = chosen(arguments)
+    settings = settings.model_copy(update={"figures": PAGE})
+    if runs:
+        name = _name("+".join(runs), len(runs))
+        request = build.Request(name, "", "", tuple(runs.items()), words, None, "compare")
+        return ReportRequest(request, settings, None)
     rows: dict[str, tuple[str, Condition]] = {}  # experiments share conditions
     for experiment in experiments:
         for label, condition in experiment.conditions:
-            name = f"{experiment.name}: {label}" if several else label
+            name = f"{experiment.name}: {label}" if len(experiments) > 1 else label
             before = [rows[condition.id][0]] if condition.id in rows else []
             rows[condition.id] = SAME.join([*before, name]), condition
     first = experiments[0]
     name = _name("+".join(experiment.report_name for experiment in experiments), len(experiments))
     title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
     request = build.Request(name, title, first.budget, tuple(rows.values()), words, None, "compare")
-    return request, _with_page(first.report), first.num_replicates
+    return ReportRequest(request, settings, first.num_replicates)
 
 
 def _check_empty(path: str) -> None:
@@ -237,7 +205,3 @@ def _name(parts: str, count: int) -> str:
     if count > MAX_NAMED:
         parts = f"{count}+{hashlib.sha256(parts.encode()).hexdigest()[:8]}"
     return f"compare_{parts}"
-
-
-def _with_page(settings: ReportSettings) -> ReportSettings:
-    return settings.model_copy(update={"figures": PAGE})

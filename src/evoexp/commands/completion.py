@@ -5,6 +5,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import shtab
+
 from evoexp.commands.arguments import add_config_dir_argument
 from evoexp.commands.command_parser import whole_parser
 from evoexp.configuration.search_path import groups, options
@@ -46,21 +48,17 @@ def main(arguments: argparse.Namespace) -> int:
 
 def script(shell: str) -> str:
     """Return the script of a shell."""
-    import shtab  # only this command needs it
-
-    parser: Any = whole_parser(with_arguments=True)
-    commands = next(action for action in parser._actions if action.dest == "command")
-    for command in commands.choices.values():
-        for action in command._actions:
-            if action.dest == "config_dir":
-                action.complete = shtab.DIRECTORY
-            elif action.type is Path:
-                action.complete = shtab.FILE
-            elif not action.option_strings and action.nargs in ("*", "+"):
-                action.complete = dict.fromkeys(SHELLS, "_evoexp_words")
+    parser, declared = whole_parser(with_arguments=True)
+    for argument in declared:
+        completed: Any = argument  # as shtab documents it, by an attribute of the argument
+        if argument.dest == "config_dir":
+            completed.complete = shtab.DIRECTORY
+        elif argument.type is Path:
+            completed.complete = shtab.FILE
+        elif not argument.option_strings and argument.nargs in ("*", "+"):
+            completed.complete = dict.fromkeys(SHELLS, "_evoexp_words")
     keys = " ".join(f"{name}=" for name in (*groups(), *SINGLE))
-    words = _asset(f"words.{shell}").replace("GROUPS", keys)
-    preamble: Any = {shell: words}
+    preamble: Any = {shell: _asset(f"words.{shell}").replace("GROUPS", keys)}
     text = str(shtab.complete(parser, shell, preamble=preamble))
     return text + (_asset("no_space.bash") if shell == "bash" else "")
 

@@ -5,15 +5,14 @@ import math
 import os
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
-from evoexp.commands.word_tables import WordTable
-from evoexp.errors import printable
+from evoexp.errors import EvoexpError, printable
 
 PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it on a narrow screen
 
@@ -47,32 +46,53 @@ def plain_console() -> Console:
     return _Console(markup=False, emoji=False, highlight=False, **size)
 
 
+def say(*parts: str | Text | Table) -> None:
+    """Print a table, or a line, which a pipe has whole."""
+    plain_console().print(*parts, soft_wrap=not isinstance(parts[0], Table))
+
+
+def say_each(draws: Iterable[Callable[[], object]]) -> None:
+    """Draw reports, and say where each is; one that cannot be drawn keeps no other from it.
+
+    Raises:
+        EvoexpError: Once all others are drawn, why some could not be.
+    """
+    errors = []
+    for draw in draws:
+        try:
+            say(f"report: {draw()}")
+        except EvoexpError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise EvoexpError("; ".join(map(str, errors)))
+
+
 def coloured(text: str, colour: str = "") -> Text:
     """Return a text for a cell, in a colour, its control characters made visible."""
     return Text(printable(text), colour)
 
 
-def new_table(title: str = "") -> WordTable:
-    """Return an empty table."""
-    return WordTable(title=title or None, title_justify="left")
+def new_table(title: str, *columns: str | Column) -> Table:
+    """Return an empty table whose cells are folded where the terminal is too narrow, never cut.
+
+    Args:
+        title: May be empty.
+        columns: Names, or what `hash_column` and `right` return.
+    """
+    heads = [Column(each, overflow="fold") if isinstance(each, str) else each for each in columns]
+    return Table(*heads, title=title or None, title_justify="left")
 
 
-def table_without_lines() -> WordTable:
-    """Return an empty table whose cells stand two columns apart."""
-    table = WordTable(box=None)
-    table.gap = 2
-    return table
+def hash_column(name: str = "hash") -> Column:
+    """Return a column of twelve hex digits, which are never broken."""
+    return Column(name, no_wrap=True, min_width=12)
 
 
-def add_hash_column(table: Table, name: str = "hash") -> None:
-    """Add a column of twelve hex digits, which are never cut."""
-    table.add_column(name, no_wrap=True, min_width=12)
-
-
-def add_columns(table: Table, *names: str, right: bool = False) -> None:
-    """Add columns whose cells are folded where the terminal is too narrow, never cut."""
-    for name in names:
-        table.add_column(name, justify="right" if right else "left", overflow="fold")
+def right(*names: str) -> list[Column]:
+    """Return columns of numbers, which stand on the right."""
+    return [Column(name, justify="right", overflow="fold") for name in names]
 
 
 def print_json(value: Any) -> None:

@@ -6,19 +6,15 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from rich.console import Console
 
-from evoexp import shipped
-from evoexp.commands.console import add_columns, new_table, plain_console, print_json
-from evoexp.commands.hashes import with_candidates
+from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.pack import NAMED, in_archive, looked_into
-from evoexp.condition import Condition
-from evoexp.configuration import expansions
-from evoexp.errors import AmbiguousHash, UnknownHash
+from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.errors import UnknownHash
 from evoexp.records import TIMES
 from evoexp.store.identity import TAKEN
 from evoexp.store.manifest import differences
-from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
 
 ABSENT = "–"
@@ -28,19 +24,12 @@ KEYS = ("a", "b", "settings", "environment", "results", "same_replicates")
 
 
 class Side(NamedTuple):
-    """A condition, with its run where it was run here.
+    """A condition, with its run where it was run here."""
 
-    Attributes:
-        condition_id: 64 hex digits.
-        settings: Its canonical form as plain data.
-        manifest: Environment of its run; None: it was not run here.
-        rows: Its replicates, done ones only.
-    """
-
-    condition_id: str
-    settings: dict[str, Any]
-    manifest: dict[str, Any] | None
-    rows: dict[int, dict[str, Any]]
+    condition_id: str  # 64 hex digits
+    settings: dict[str, Any]  # its canonical form as plain data
+    manifest: dict[str, Any] | None  # environment of its run; None: it was not run here
+    rows: dict[int, dict[str, Any]]  # its replicates, done ones only
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,17 +61,13 @@ def main(arguments: argparse.Namespace) -> int:
         values = (one.condition_id, two.condition_id, settings, environment, results, same)
         print_json(dict(zip(KEYS, values, strict=True)))
     else:
-        console = plain_console()
         heads = one.condition_id[:12], two.condition_id[:12]
-        _print(console, "settings", heads, settings)
+        _print("settings", heads, settings)
         if one.manifest is not None and two.manifest is not None:
-            _print(console, "environment", heads, environment)
-        _print(console, "results: median over replicates", heads, results)
+            _print("environment", heads, environment)
+        _print("results: median over replicates", heads, results)
         if common:
-            console.print(
-                f"{len(same)} of {len(common)} common replicates are the same, bit for bit",
-                soft_wrap=True,
-            )
+            say(f"{len(same)} of {len(common)} common replicates are the same, bit for bit")
     other = len(same) < len(common) or one.rows.keys() != two.rows.keys()
     return 1 if settings or environment or other else 0
 
@@ -124,19 +109,11 @@ def _side(prefix: str) -> Side:
                 choices = ", ".join(f"{prefix}:{run.hash12}" for run in runs[:NAMED])
                 raise UnknownHash(f"{prefix}: holds {len(runs)} runs; choose one: {choices}")
             return _stored(runs[0])
-    try:
-        run = resolve(outputs_root(), prefix)
-    except UnknownHash as error:
-        found = shipped.find(prefix)
-        if len(found) > 1:
-            raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found]) from None
-        if not found:
-            raise with_candidates(error, outputs_root()) from None
-        row = found[0]
-        words = [f"experiment={row.experiment}", f"budget={row.budget}"]
-        condition: Condition = expansions.expand(words, only=[row.label])[0].conditions[0].condition
-        return Side(condition.id, json.loads(condition.to_json()), None, {})
-    return _stored(run)
+    run = stored_or_shipped(prefix)
+    if isinstance(run, RunDirectory):
+        return _stored(run)
+    condition = shipped_experiment(run).conditions[0].condition
+    return Side(condition.id, json.loads(condition.to_json()), None, {})
 
 
 def _stored(run: RunDirectory) -> Side:
@@ -186,17 +163,14 @@ def _median(side: Side, name: str) -> float | None:
     return float(np.median(known)) if known else None
 
 
-def _print(
-    console: Console, title: str, heads: tuple[str, str], rows: list[tuple[str, Any, Any]]
-) -> None:
+def _print(title: str, heads: tuple[str, str], rows: list[tuple[str, Any, Any]]) -> None:
     if not rows:
-        console.print(f"{title}: the same")
+        say(f"{title}: the same")
         return
-    table = new_table(title)
-    add_columns(table, "", *heads)
+    table = new_table(title, "", *heads)
     for name, one, two in rows:
         table.add_row(name, _text(one), _text(two))
-    console.print(table)
+    say(table)
 
 
 def _text(value: Any) -> str:

@@ -7,19 +7,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
+from rich.table import Column, Table
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.commands.arguments import add_experiment_arguments, is_motion
-from evoexp.commands.console import add_columns, new_table, plain_console, print_json
-from evoexp.commands.given_motion import (
+from evoexp.commands.chosen_motions import (
     FittingMotion,
     fitting_motions,
     initial_motion,
-    nested,
+    run_or_log,
     stored_motion,
+    write,
 )
-from evoexp.commands.motion_words import run_or_log, write
+from evoexp.commands.console import new_table, plain_console, print_json, right, say
+from evoexp.commands.motion_files import nested
 from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion
@@ -84,18 +85,17 @@ def main(arguments: argparse.Namespace) -> int:
         whole = [_with_rows(*pair) for pair in zip(rows, listings, strict=True)]
         print_json(whole if len(whole) > 1 else whole[0])
         return 0
-    console = plain_console()
     groups = _alike(list(zip(rows, listings, strict=True)))
     for group in groups:
         if (listing := group[0][1]) is not None:
-            console.print(_listing(_labels(group), listing))
-    for table in _tables([[row for row, _ in group] for group in groups], console.width):
-        console.print(table)
+            say(_listing(_labels(group), listing))
+    for table in _tables([[row for row, _ in group] for group in groups], plain_console().width):
+        say(table)
     for group in groups:
         for departure in group[0][0][DEPARTURES]:
-            console.print(f"{_labels(group)} – no solution of the task: {departure}")
+            say(f"{_labels(group)} – no solution of the task: {departure}")
     for remark in dict.fromkeys(remark for row in rows for remark in row.get(REMARKS, ())):
-        console.print(remark)
+        say(remark)
     return 0
 
 
@@ -148,8 +148,7 @@ def _with_rows(row: dict[str, Any], listing: Listing | None) -> dict[str, Any]:
 
 def _listing(label: str, listing: Listing) -> Table:
     """Return a table with one row per configuration of the motion."""
-    table = new_table(label)
-    add_columns(table, *listing.names, right=True)
+    table = new_table(label, *right(*listing.names))
     for row in listing.rows:
         table.add_row(*(_cell(value) for value in row))
     return table
@@ -166,11 +165,8 @@ def _tables(columns: list[list[dict[str, Any]]], width: int) -> list[Table]:
 
 
 def _table(columns: list[list[dict[str, Any]]], names: list[str]) -> Table:
-    table = new_table()
-    table.add_column("", no_wrap=True)
-    for group in columns:
-        heads = (f"{row['label']}\n{row['condition'][:12]}" for row in group)
-        add_columns(table, "\n".join(heads), right=True)
+    heads = [[f"{row['label']}\n{row['condition'][:12]}" for row in group] for group in columns]
+    table = new_table("", Column(no_wrap=True), *right(*map("\n".join, heads)))
     for name in names:
         table.add_row(name, *(_cell(group[0].get(name)) for group in columns))
     return table

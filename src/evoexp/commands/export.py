@@ -6,9 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from evoexp.commands.console import plain_console
-from evoexp.commands.motion_files import file_name, single, speed_limits
-from evoexp.commands.motion_words import add_motion_arguments, output_path, write
+from evoexp.commands.chosen_motions import (
+    add_motion_arguments,
+    output_path,
+    single,
+    speed_limits,
+    write,
+)
+from evoexp.commands.console import say
 from evoexp.errors import SettingError
 from evoexp.playback.joint_limits import Defaults, JointLimits, joint_limits
 from evoexp.playback.recording import Recording
@@ -63,8 +68,8 @@ def main(arguments: argparse.Namespace) -> int:
     else:
         content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
     ending = ".csv" if arguments.format == "csv" else ".json"
-    write(output_path(arguments, [file_name(found)], ending), content)
-    plain_console().print(_described(timed, limits), soft_wrap=True)
+    write(output_path(arguments, [found], ending), content)
+    say(_described(timed, limits))
     return 0
 
 

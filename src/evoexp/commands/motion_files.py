@@ -1,73 +1,127 @@
-"""The motions that a command shows or writes: of stored replicates, of logs, or out of a file."""
+"""Files of motions: nested lists in a planner's documented shape, or joint trajectories."""
 
-import argparse
 import math
+from pathlib import Path
+from typing import Any
 
-from evoexp.commands.motion_words import MANY, ChosenLog, check_speeds, chosen_logs
-from evoexp.errors import MotionFileError, RevisionMismatch
-from evoexp.playback.recording import Heading, Recording, record_motion
-from evoexp.playback.stored import stored_recording
-from evoexp.playback.timing import SpeedLimits
+import numpy as np
 
+from evoexp.commands.arguments import MOTION_ENDINGS
+from evoexp.errors import MotionFileError, printable
+from evoexp.input_files import MEGABYTE, TableError, read_bounded, read_npy
+from evoexp.playback.trajectory_files import LARGEST, parse_message, read_columns, read_message
+from evoexp.records import FloatArray
 
-def recordings(arguments: argparse.Namespace) -> list[Recording]:
-    """Return the motions that the arguments choose, in the order of the words.
-
-    Raises:
-        EvoexpError: One line says what is wrong.
-    """
-    limits = speed_limits(arguments)
-    if logs := chosen_logs(arguments):
-        return [_stored(log, limits) for log in logs]
-    return _own(arguments.what, arguments.only, limits)
+MAX_MOTION = 8 * MEGABYTE
+MOST_VALUES = 200_000  # numbers of a motion; the longest of a shipped experiment has 4,000
+MAX_DEPTH = 16  # nested lists; no planner's shape comes near
+ENDINGS = f"{', '.join(MOTION_ENDINGS[:-1])} or {MOTION_ENDINGS[-1]}"
 
 
-def single(arguments: argparse.Namespace) -> Recording:
-    """Return the single motion that the arguments choose.
+def read_motion(path: Path) -> Any:
+    """Read a motion as nested lists (an array from `.npy`), or a joint trajectory.
 
     Raises:
-        MotionFileError: If it is not one.
+        MotionFileError: If the file is missing, of another kind, or holds anything but finite
+            numbers.
     """
-    found = recordings(arguments)
-    if len(found) != 1:
-        raise MotionFileError(f"motion: one at a time, got {len(found)}; choose with --only LABEL")
-    return found[0]
-
-
-def file_name(recording: Recording) -> str:
-    """Return the name of a file with a motion, without its ending."""
-    return f"{recording.condition_id[:12]}-{recording.heading.replicate:04d}"
-
-
-def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
-    """Return the joints' limits.
-
-    Raises:
-        SettingError: If one is not above 0.
-    """
-    check_speeds(arguments)
-    return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
-
-
-def _stored(log: ChosenLog, limits: SpeedLimits) -> Recording:
     try:
-        return stored_recording(log.path, log.title, limits)
-    except RevisionMismatch as error:
-        if log.run is None:
-            raise
-        raise RevisionMismatch(
-            f"run {log.run.hash12}: {error}; run it anew with what is installed: {log.run.command}"
-        ) from None
+        if path.suffix not in MOTION_ENDINGS:
+            raise MotionFileError(f"{path}: a motion file ends in {ENDINGS}")
+        content = read_bounded(path, MAX_MOTION)
+        if path.suffix == ".csv":
+            return read_columns(content)
+        if path.suffix == ".npy":
+            values = read_npy(content).tolist()
+        else:
+            values = parse_message(content.decode("utf-8-sig"), path.suffix != ".json")
+    except TableError as error:
+        raise MotionFileError(f"{path}, {error}") from None
+    except OSError as error:
+        raise MotionFileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, EOFError, RecursionError, MemoryError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
+    if isinstance(values, dict):
+        try:
+            return read_message(values)
+        except ValueError as error:
+            raise MotionFileError(f"{path}: {error}") from None
+    if (count := _num_values(values)) > MOST_VALUES:
+        must = f"{path}: must hold at most {MOST_VALUES:,} numbers"
+        raise MotionFileError(f"{must}, was {count:,}")
+    if wrong := _not_finite(values, ""):
+        raise MotionFileError(f"{path}: must hold nested lists of finite numbers, {wrong}")
+    return values
 
 
-def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
-    """Return the motion of a file in every condition that it fits, in the first `MANY` of them."""
-    from evoexp.commands.given_motion import fitting_motions  # Hydra's words, of no stored run
+def _num_values(values: Any) -> int:
+    """Return how many numbers and lists there are in nested lists, however deep."""
+    count, lists = 0, [values] if isinstance(values, list) else []
+    while lists:
+        inner = lists.pop()
+        count += len(inner)
+        lists += [value for value in inner if isinstance(value, list)]
+    return count
 
-    path, fitting = fitting_motions(words, only=(only,) if only else ())
-    for remark in fitting[0].remarks[1:]:
-        print(f"{path.name}: {remark}")
-    return [
-        record_motion(each.condition, each.motion, Heading(f"{path.name} · {each.label}"), limits)
-        for each in fitting[:MANY]
-    ]
+
+def _not_finite(values: Any, place: str) -> str:
+    """Return the first entry that is no finite number, and its place; nothing if there is none."""
+    if isinstance(values, list) and place.count("[") <= MAX_DEPTH:
+        wrong = (_not_finite(value, f"{place}[{k}]") for k, value in enumerate(values))
+        return next(filter(None, wrong), "")
+    was = f"was {printable(str(values)[:40])} at {place or 'its top'}"
+    if place and type(values) in (int, float) and abs(values) < math.inf:
+        return "" if abs(values) <= LARGEST else f"of at most {LARGEST:g}, {was}"
+    return was
+
+
+def nested(solution: FloatArray, shape: Any) -> list[Any]:
+    """Return a flat solution as nested lists of a planner's documented shape, for `flatten`."""
+    if len(shape) and shape[0] is ...:
+        count = solution.size // sum(math.prod(part) for part in shape[1:])
+        shape = tuple(shape[1:]) * count
+    ends = np.cumsum([math.prod(part) for part in shape])
+    parts = zip(np.split(solution, ends[:-1]), shape, strict=True)
+    return [values.reshape(part).tolist() for values, part in parts]
+
+
+def flatten(values: list[Any], shape: Any) -> FloatArray | None:
+    """Return a motion as a flat solution of a planner's documented shape, None if it does not fit.
+
+    A shape that begins with an ellipsis is that of any number of equal parts.
+    """
+    if len(shape) and shape[0] is ...:
+        shape = tuple(shape[1:]) * (len(values) if isinstance(values, list) else 0)
+    if len(values) != len(shape):
+        return None
+    parts = []
+    for part, expected in zip(values, shape, strict=True):
+        try:
+            array = np.asarray(part, dtype=np.float64)
+        except ValueError:  # ragged
+            return None
+        if array.shape != tuple(expected):
+            return None
+        parts.append(array.ravel())
+    return np.concatenate(parts) if parts else None
+
+
+def shape_text(shape: Any) -> str:
+    """Say a planner's documented shape."""
+    if len(shape) and shape[0] is ...:
+        return f"any number × {shape_text(shape[1:]).removeprefix('1 × ')}"
+    if not any(shape):
+        return f"{len(shape)} numbers"
+    parts = [" × ".join(map(str, part)) for part in shape]
+    if len(set(parts)) == 1:
+        return f"{len(parts)} × {parts[0]}"
+    return f"{len(parts)} lists: {', '.join(parts)}"
+
+
+def shape_of(values: Any) -> str:
+    """Say the shape of nested lists."""
+    try:
+        return " × ".join(map(str, np.asarray(values, dtype=np.float64).shape))
+    except ValueError:
+        return f"a ragged list of {len(values)}"

@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from evoexp.commands.console import plain_console
-from evoexp.commands.hashes import with_candidates
+from evoexp.commands.console import say
+from evoexp.commands.stored_runs import stored_run
 from evoexp.errors import NothingStored, UnknownHash, printable
 from evoexp.store.archive import pack, take_in
-from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.store.run_directory import RunDirectory, outputs_root
 
 ENDING = ".tar"
 NAMED = 3  # runs whose hashes the name of an archive spells out
@@ -36,8 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the archive."""
-    outputs = outputs_root()
-    runs = {run.condition_id: run for run in (_run(outputs, text) for text in arguments.hashes)}
+    runs = {run.condition_id: run for run in map(stored_run, arguments.hashes)}
     for run in runs.values():
         if not run.completed():
             raise NothingStored(f"run {run.hash12}: no finished replicate to pack")
@@ -47,10 +46,9 @@ def main(arguments: argparse.Namespace) -> int:
     path.parent.mkdir(parents=True, exist_ok=True)
     count = pack(list(runs.values()), path)
     size = path.stat().st_size / 1e6
-    plain_console().print(
+    say(
         f"{printable(str(path))}: {len(runs)} run{'s' * (len(runs) > 1)}, {count} logs, "
-        f"{size:.2f} MB; elsewhere: evoexp show, reproduce or report {printable(path.name)}",
-        soft_wrap=True,
+        f"{size:.2f} MB; elsewhere: evoexp show, reproduce or report {printable(path.name)}"
     )
     return 0
 
@@ -106,16 +104,8 @@ def unpacked(words: Sequence[str]) -> list[str]:
             continue
         for taken in take_in(Path(word), outputs_root()):
             found.append(taken.run.condition_id)
-            plain_console().print(
+            say(
                 f"{printable(word)}: run {taken.run.hash12}: {taken.added} replicates added to "
-                f"{outputs_root()}, {taken.kept} there already",
-                soft_wrap=True,
+                f"{outputs_root()}, {taken.kept} there already"
             )
     return found
-
-
-def _run(outputs: Path, prefix: str) -> RunDirectory:
-    try:
-        return resolve(outputs, prefix)
-    except UnknownHash as error:
-        raise with_candidates(error, outputs) from None

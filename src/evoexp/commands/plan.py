@@ -4,84 +4,72 @@ Nothing is run or written.
 """
 
 import argparse
+import hashlib
 import json
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 from rich.table import Table
 
 from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
 from evoexp.batch.workers import num_cores
 from evoexp.commands.arguments import add_experiment_arguments
-from evoexp.commands.console import (
-    add_columns,
-    add_hash_column,
-    new_table,
-    plain_console,
-    print_json,
-)
-from evoexp.commands.stored_times import StoredTimes
+from evoexp.commands.console import hash_column, new_table, print_json, right, say
 from evoexp.condition import Condition
-from evoexp.configuration import expansions
-from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import damaged_logs
+from evoexp.configuration import compose
+from evoexp.errors import StoreError
+from evoexp.store.identity import CONFIG, read
+from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
+from evoexp.store.summaries import damaged_logs, summary_table
+from evoexp.validation import TARGET
 
 START_S = 5.0  # [s] assumed: at most, to start workers and compile nothing
 CONDITION_S = 0.05  # [s] assumed: at most, to prepare a condition and write its files
-KEYS = (
-    "experiment",
-    "label",
-    "hash",
-    "planned",
-    "cached",
-    "missing",
-    "failed",
-    "damaged",
-    "other_revision",
-    "cpu_s_each",
-    "cpu_s_least",
-    "cpu_s_most",
-    "cpu_s_from",
-    "memory_gb_each",
-)
+FEW = 3  # replicates, below which their spread is not known
+OTHER_SETTINGS = 1.5  # an evaluation with other settings takes so many times as long, or as short
+ALL_GENERATIONS = "generations"  # reason to stop of a replicate that had all of them
 
 
 class PlannedCondition(NamedTuple):
-    """One condition of a batch, and how much of it is stored; fields as in `KEYS`.
-
-    Attributes:
-        experiment: Name of the experiment.
-        label: Name of the condition in it.
-        condition_id: 64 hex digits.
-        planned: Replicates that are asked for.
-        cached: Those that are stored.
-        missing: Those that a run would start: `planned` without `cached` and `failed`.
-        failed: Those that failed before, which start only if told so.
-        damaged: Those of the missing ones whose log is damaged.
-        other_revision: Hashes of stored runs of the same settings by components of another
-            revision.
-        cpu_s_each: CPU time of a replicate [s], as far as it is known; None: unknown.
-        cpu_s_least: The least that it may take in the mean [s].
-        cpu_s_most: The most that it may take in the mean [s].
-        cpu_s_from: Origin of that time.
-        memory_gb_each: Estimate of the memory of a replicate [GB].
-    """
+    """One condition of a batch, and how much of it is stored: what `--json` prints."""
 
     experiment: str
     label: str
-    condition_id: str
-    planned: int
-    cached: int
-    missing: int
-    failed: int
-    damaged: int
-    other_revision: tuple[str, ...]
-    cpu_s_each: float | None
-    cpu_s_least: float | None
-    cpu_s_most: float | None
-    cpu_s_from: str
-    memory_gb_each: float
+    hash: str  # 64 hex digits
+    planned: int  # replicates that are asked for
+    cached: int  # those that are stored
+    missing: int  # those that a run would start: neither stored nor failed before
+    failed: int  # those that failed before, which start only if told so
+    damaged: int  # those of the missing ones whose log is damaged
+    other_revision: tuple[str, ...]  # runs of the same settings by components of another revision
+    cpu_s_each: float | None  # of a replicate [s]; None: unknown
+    cpu_s_least: float | None  # that it may take in the mean [s]
+    cpu_s_most: float | None  # that it may take in the mean [s]
+    cpu_s_from: str  # origin of these times
+    memory_gb_each: float  # of a replicate [GB]
+
+
+class Estimate(NamedTuple):
+    """Mean CPU time of replicates that were not run yet [s]; None: unknown."""
+
+    seconds: float | None
+    least: float | None
+    most: float | None
+    source: str
+
+
+class Times(NamedTuple):
+    """Times of a run's finished replicates."""
+
+    cpu_s: list[float]  # of each replicate [s]
+    evaluations: list[int]  # of each replicate
+    stopped_early: bool  # whether one did not have all generations
+
+
+KEYS = PlannedCondition._fields
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,29 +82,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print the plan."""
-    experiments = expansions.expand(
+    experiments = compose.expand(
         arguments.overrides, multirun=arguments.multirun, only=arguments.only
     )
     stored = StoredTimes(outputs_root())
-    rows, seen = [], set[str]()
+    rows: dict[str, PlannedCondition] = {}
     for experiment in experiments:
         for label, condition in experiment.conditions:
-            if condition.id not in seen:
-                seen.add(condition.id)
+            if condition.id not in rows:
                 count = condition.num_replicates(experiment.num_replicates)
-                rows.append(_planned(experiment.name, label, condition, count, stored))
+                rows[condition.id] = _planned(experiment.name, label, condition, count, stored)
+    planned = list(rows.values())
     if arguments.json:
-        print_json([dict(zip(KEYS, row, strict=True)) for row in rows])
+        print_json([row._asdict() for row in planned])
         return 0
-    console = plain_console()
-    console.print(_table(rows))
-    workers = experiments[0].runner.num_workers or num_cores()
-    console.print(_total(rows, workers), soft_wrap=True)
+    say(_table(planned))
+    say(_total(planned, experiments[0].runner.num_workers or num_cores()))
     return 0
 
 
 def _planned(
-    experiment: str, label: str, condition: Condition, count: int, stored: StoredTimes
+    experiment: str, label: str, condition: Condition, count: int, stored: "StoredTimes"
 ) -> PlannedCondition:
     run = RunDirectory(outputs_root(), condition.id)
     asked = set(range(count))
@@ -124,7 +110,6 @@ def _planned(
     cached = (run.completed() - damaged) & asked
     failed = run.failed() & asked
     settings = json.loads(condition.to_json())
-    estimate = stored.estimate(condition, run, settings)
     return PlannedCondition(
         experiment,
         label,
@@ -135,27 +120,20 @@ def _planned(
         len(failed),
         len(damaged & asked),
         stored.other_revisions(settings, condition.id),
-        *estimate,
+        *stored.estimate(condition, run, settings),
         round(replicate_memory(condition) / GIGABYTE, 4),
     )
 
 
-def _table(rows: list[PlannedCondition]) -> Table:
-    table = new_table()
-    add_columns(table, "condition")
-    add_hash_column(table)
-    add_columns(table, "planned", "there", "to run", "failed\nbefore", "damaged", right=True)
-    add_columns(table, "other revision")
-    add_columns(table, "CPU s\neach", "GB\neach", right=True)
+def _table(rows: Sequence[PlannedCondition]) -> Table:
+    counts = right("planned", "there", "to run", "failed\nbefore", "damaged")
+    costs = right("CPU s\neach", "GB\neach")
+    table = new_table("", "condition", hash_column(), *counts, "other revision", *costs)
     for row in rows:
         table.add_row(
             row.label,
-            row.condition_id[:12],
-            str(row.planned),
-            str(row.cached),
-            str(row.missing),
-            str(row.failed),
-            str(row.damaged),
+            row.hash[:12],
+            *map(str, (row.planned, row.cached, row.missing, row.failed, row.damaged)),
             ", ".join(row.other_revision) or "–",
             _seconds(row.cpu_s_each, row.cpu_s_least, row.cpu_s_most),
             f"{row.memory_gb_each:.3g}",
@@ -170,11 +148,9 @@ def _seconds(mean: float | None, least: float | None, most: float | None) -> str
     return f"{mean:.3g}" if most <= 2 * least else f"{least:.2g} to {most:.2g}"
 
 
-def _total(rows: list[PlannedCondition], workers: int) -> str:
+def _total(rows: Sequence[PlannedCondition], workers: int) -> str:
     """Say how many replicates would run, and how long it would take."""
-    missing, failed = (
-        sum(counts) for counts in zip(*((row.missing, row.failed) for row in rows), strict=True)
-    )
+    missing, failed = sum(row.missing for row in rows), sum(row.failed for row in rows)
     again = f"{failed} failed before, which start with --retry-failed" if failed else ""
     if not missing:
         return f"nothing to run{f': {again}' if failed else ': every replicate is there'}"
@@ -196,3 +172,105 @@ def _total(rows: list[PlannedCondition], workers: int) -> str:
         again,
     )
     return "; ".join(part for part in parts if part)
+
+
+class StoredTimes:
+    """The times of all stored runs; a run's table is read when the first condition needs it."""
+
+    def __init__(self, outputs: Path) -> None:
+        """Read the configurations of all runs; those that cannot be read are left out."""
+        self._named: dict[str, list[str]] = {}  # settings → ids of runs
+        self._alike: dict[str, list[RunDirectory]] = {}  # planner and scene → runs
+        self._known: dict[str, list[Times]] = {}
+        for name in run_names(outputs):
+            try:
+                content = read(outputs / "runs" / name / CONFIG)
+                settings = json.loads(content)
+            except (StoreError, ValueError):
+                continue
+            condition_id = hashlib.sha256(content).hexdigest()
+            if condition_id.startswith(name) and isinstance(settings, dict):
+                self._named.setdefault(_key(_without_revisions(settings)), []).append(condition_id)
+                run = RunDirectory(outputs, condition_id)
+                self._alike.setdefault(_scene(settings), []).append(run)
+
+    def other_revisions(self, settings: Any, condition_id: str) -> tuple[str, ...]:
+        """Return the hashes of runs of the same settings by components of another revision."""
+        same = self._named.get(_key(_without_revisions(settings)), ())
+        return tuple(other[:12] for other in same if other != condition_id)
+
+    def estimate(self, condition: Condition, run: RunDirectory, settings: Any) -> Estimate:
+        """Estimate the CPU time of a replicate: from its own ones, else from runs like it.
+
+        Args:
+            condition: Of which replicates shall be run.
+            run: Where those that were run are stored.
+            settings: Of the condition, as plain data.
+        """
+        if (own := _times(run)).cpu_s:
+            widening = 1.0 if len(own.cpu_s) >= FEW else 2.0
+            least, most = min(own.cpu_s) / widening, max(own.cpu_s) * widening
+            mean = float(np.mean(own.cpu_s))
+            return Estimate(mean, least, most, f"{len(own.cpu_s)} of its own")
+        scene = _scene(settings)
+        if scene not in self._known:
+            runs = map(_times, self._alike.get(scene, ()))
+            self._known[scene] = [times for times in runs if any(times.evaluations)]
+        if not (alike := self._known[scene]):
+            return Estimate(None, None, None, "nothing stored like it")
+        generations = range(min(condition.planner.num_generations, 10_000) + 1)
+        least, most = bounds(alike, sum(map(condition.planner.num_evaluations, generations)))
+        source = f"{len(alike)} other runs of the scene"
+        return Estimate(float(np.sqrt(least * most)), least, most, source)
+
+
+def bounds(alike: Sequence[Times], evaluations: int) -> tuple[float, float]:
+    """Return the least and the most that a replicate of so many evaluations may take [s].
+
+    More evaluations take more time, but no more than in proportion: a part of the time is the same
+    for any number. Runs of about as many evaluations, or the nearest number, tell the most.
+    """
+    ratios = np.array(
+        [evaluations / max(1.0, float(np.mean(times.evaluations))) for times in alike]
+    )
+    spent = np.array([np.mean(times.cpu_s) for times in alike])  # [s]
+    distance = np.abs(np.log(np.maximum(ratios, 1e-9)))
+    near = distance <= distance.min() + 0.1
+    least, most = (spent * np.minimum(ratios, 1.0))[near], (spent * np.maximum(ratios, 1.0))[near]
+    low, high = float(np.quantile(least, 0.1)), float(np.quantile(most, 0.9))
+    if any(times.stopped_early for times in alike):  # as the next one may
+        low = min(low, *(min(times.cpu_s) for times in alike))
+    return low / OTHER_SETTINGS, high * OTHER_SETTINGS
+
+
+def _times(run: RunDirectory) -> Times:
+    if not run.completed():
+        return Times([], [], False)
+    columns = ["status", "cpu_s", "evaluations", "stop_reason"]
+    rows = [row for row in summary_table(run).select(columns).to_pylist() if row["cpu_s"]]
+    done = [row for row in rows if row["status"] == "done"]
+    return Times(
+        [float(row["cpu_s"]) for row in done],
+        [int(row["evaluations"] or 0) for row in done],
+        any(row["stop_reason"] != ALL_GENERATIONS for row in done),
+    )
+
+
+def _without_revisions(config: Any) -> Any:
+    """Return plain data of a condition without the revisions of its components."""
+    if isinstance(config, Mapping):
+        return {key: _without_revisions(v) for key, v in config.items() if key != "revision"}
+    if isinstance(config, list):
+        return [_without_revisions(value) for value in config]
+    return config
+
+
+def _scene(settings: Mapping[str, Any]) -> str:
+    """Return a key of the planner's component and the scene, shared by runs of other settings."""
+    planner = settings.get("planner")
+    name = planner.get(TARGET) if isinstance(planner, Mapping) else None
+    return _key([name, settings.get("robot"), settings.get("scenario")])
+
+
+def _key(value: Any) -> str:
+    return json.dumps(value, sort_keys=True)

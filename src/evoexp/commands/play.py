@@ -2,8 +2,7 @@
 
 import argparse
 
-from evoexp.commands.motion_files import file_name, single
-from evoexp.commands.motion_words import add_motion_arguments, output_path, write
+from evoexp.commands.chosen_motions import add_motion_arguments, output_path, single, write
 from evoexp.playback.playable_log import LAYOUT, layout, playable_log
 
 
@@ -14,8 +13,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the log, and the layout file beside it."""
-    found = single(arguments)
-    path = output_path(arguments, [file_name(found)], ".mcap")
-    write(path, playable_log(found))
+    motion = single(arguments)
+    path = output_path(arguments, [motion], ".mcap")
+    write(path, playable_log(motion))
     write(path.with_name(LAYOUT), layout())
     return 0

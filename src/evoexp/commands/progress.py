@@ -1,35 +1,29 @@
-"""Progress of a batch: a live table and bar on a terminal, plain lines in a pipe."""
+"""Progress of a batch: bars by condition on a terminal, plain lines in a pipe."""
 
+import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
-from rich.live import Live
+from rich.console import Console, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
-    SpinnerColumn,
+    TaskID,
     TextColumn,
-    TimeElapsedColumn,
+    TimeRemainingColumn,
 )
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.live_curves import Curve, read_curves
-from evoexp.commands.console import add_columns, table_without_lines
-from evoexp.commands.word_tables import WordTable
 
 PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
-MOST_ROWS = 12  # conditions in the table: those that a replicate ended of last
+MOST_ROWS = 12  # conditions on the screen: those that a replicate ended of last
 MINUTES_FROM_S = 100.0  # [s] from which the rest is told in minutes
-BURST_S = 0.1  # [s] replicates that end so soon after the first one came with it, in one task
-SHOWN_CURSOR = "\x1b[?25h"
-REFRESHED = 4  # [1/s] how often the table is drawn
-CURVE_WIDTH, NARROW_CURVE_WIDTH = 16, 11  # characters of a curve; where a terminal is narrow
+SPEED_OVER_S = 3600.0  # [s] of the past from which the rest is estimated
+CURVE_WIDTH = 16  # characters of a curve
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
 UNSOLVED = "x"
 LIVE_NOTE = (
@@ -38,197 +32,125 @@ LIVE_NOTE = (
 )
 
 
-class ConditionCount:
-    """A condition while it runs: its counts and its best cost.
+class _Bars(Progress):
+    """Bars that look for news before they are drawn."""
 
-    Attributes:
-        place: Its row among those that are shown.
-        label: Its name.
-        total: Replicates to run.
-        done: Of these.
-        failed: Of these.
-        best: Least cost of those that are done.
-        curve: Of one that is running, or was; None: nothing is known.
-        first_end: When the first of its replicates ended [s]; None: none has.
-    """
+    look: Callable[[], None] = staticmethod(lambda: None)
 
-    def __init__(self, place: int, label: str, total: int) -> None:
-        """Begin with nothing done."""
-        self.place, self.label, self.total = place, label, total
-        self.done = self.failed = 0
-        self.best = np.inf
-        self.curve: Curve | None = None
-        self.first_end: float | None = None
-
-    def count(self, outcome: Outcome) -> None:
-        """Count one replicate."""
-        self.failed += outcome.failed
-        self.done += not outcome.failed
-        if outcome.summary is not None:
-            self.best = min(self.best, outcome.summary.best_cost)
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """Return the bars, with the latest news."""
+        self.look()
+        return super().get_renderables()
 
 
 class BatchProgress:
-    """Counts replicates done and failed, condition by condition, and says when the rest will be.
-
-    The first replicate of a condition compiles or loads kernels, so that the time of the others is
-    told by those that end after it.
-    """
+    """Counts replicates done and failed, condition by condition, and says when the rest will be."""
 
     def __init__(
         self,
         console: Console,
         wanted: Mapping[str, tuple[str, int]],
         curves: Path | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Prepare; shown from `__enter__` to `__exit__`.
+        """Prepare; shown inside `shown`.
 
         Args:
             console: Where to show it.
             wanted: Condition's id → its label, and its replicates to run.
             curves: Folder in which workers leave the convergence of what they run; None: it is not
                 shown.
+            clock: Tells the time [s].
         """
-        self._console, self._curves = console, curves
-        self._counts = {
-            key: ConditionCount(place, *each) for place, (key, each) in enumerate(wanted.items())
-        }
-        self._total = sum(each.total for each in self._counts.values())
-        self._done = self._failed = 0
-        self._last_line = time.monotonic()
-        self._first: tuple[float, int] | None = None  # when the first had ended, and how many
-        self._last_end = self._last_line  # of a replicate
-        self._measured = (0.0, 0)  # [s] up to the ends of later ones of a condition, and how many
-        self._bar = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description}"),
-            BarColumn(),
+        texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
+        texts += ["{task.fields[curve]}"] if curves is not None else []
+        self._bars = _Bars(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=10),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[failed]} failed"),
-            TimeElapsedColumn(),
-            TextColumn("ETA {task.fields[eta]}"),
+            *(TextColumn(text, markup=False) for text in texts),
+            TimeRemainingColumn(),
             console=console,
+            get_time=clock,
+            speed_estimate_period=SPEED_OVER_S,
         )
-        self._task = self._bar.add_task("replicates", total=self._total, failed=0, eta="–")
-        self._live = Live(console=console, get_renderable=self._shown, refresh_per_second=REFRESHED)
+        self._bars.look = self._read_curves
+        self._console, self._curves, self._clock = console, curves, clock
+        self._tasks = {key: self._row(*each, visible=False) for key, each in wanted.items()}
+        self._all = self._row("replicates", sum(total for _, total in wanted.values()))
+        self._best = dict.fromkeys(wanted, np.inf)
+        self._failed = dict.fromkeys(wanted, 0)
+        self._known: dict[str, Curve] = {}
+        self._last_shown: dict[str, None] = {}  # conditions on the screen, the newest last
+        self._last_line = clock()
 
-    def __enter__(self) -> Self:
-        """Show it."""
-        if self._console.is_terminal:
+    def _row(self, label: str, total: int, *, visible: bool = True) -> TaskID:
+        return self._bars.add_task(label, total=total, visible=visible, failed=0, best="", curve="")
+
+    @contextlib.contextmanager
+    def shown(self) -> Iterator[None]:
+        """Show it while the body runs; leave its last state."""
+        if not self._console.is_terminal:
             try:
-                self._live.start()
-            except BaseException:  # interrupted: nobody else would give the terminal back
-                self._live.stop()
-                raise
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave its last state; where that is interrupted, too, at least the terminal."""
-        if self._console.is_terminal:
-            try:
-                self._live.stop()
-            except BaseException:
-                self._live.stop()  # it may not have begun
-                self._console.file.write(f"\n{SHOWN_CURSOR}")
-                self._console.file.flush()
-                raise
-        elif self._ended:
-            self._plain()
-
-    @property
-    def _ended(self) -> int:
-        return self._done + self._failed
+                yield
+            finally:
+                if self._bars.tasks[-1].completed:
+                    self._say()
+            return
+        if self._curves is not None:
+            self._console.print(LIVE_NOTE)
+        try:
+            with self._bars:
+                yield
+        finally:
+            self._console.show_cursor(True)  # also where the end was interrupted
 
     def advance(self, outcome: Outcome) -> None:
         """Count one replicate."""
-        own = self._counts.pop(outcome.condition_id)
-        self._counts[outcome.condition_id] = own  # the last one of all
-        own.count(outcome)
-        self._failed += outcome.failed
-        self._done += not outcome.failed
-        now = time.monotonic()
-        if own.first_end is None:
-            own.first_end = now
-        elif now - own.first_end >= BURST_S:
-            seconds, count = self._measured
-            self._measured = seconds + now - self._last_end, count + 1
-        self._last_end = now
-        if self._first is None or now - self._first[0] < BURST_S:
-            self._first = now if self._first is None else self._first[0], self._ended
-        self._bar.update(self._task, advance=1, failed=self._failed, eta=self._eta())
+        key = outcome.condition_id
+        self._failed[key] += outcome.failed
+        if outcome.summary is not None:
+            self._best[key] = min(self._best[key], outcome.summary.best_cost)
+        best = f"best {self._best[key]:.4g}" if np.isfinite(self._best[key]) else ""
+        self._show_row(key)
+        self._bars.update(self._tasks[key], advance=1, failed=self._failed[key], best=best)
+        self._bars.update(self._all, advance=1, failed=sum(self._failed.values()))
+        now = self._clock()
         if not self._console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
             self._last_line = now
-            self._plain()
+            self._say()
 
-    def _shown(self) -> Group:
-        self._hear()
-        begun = [each for each in self._counts.values() if each.done or each.failed or each.curve]
-        last = sorted(begun[-MOST_ROWS:], key=lambda one: one.place)
-        table = self._table(last)
-        if not table.fits(self._console):
-            table = self._table(last, is_narrow=True)
-        parts: list[RenderableType] = [table] if begun else []
-        if begun and self._curves is not None:
-            parts.append(LIVE_NOTE)
-        return Group(*parts, self._bar.get_renderable())
+    def _show_row(self, key: str) -> None:
+        """Show a condition; the one that nothing was heard of for the longest time makes room."""
+        self._last_shown.pop(key, None)
+        self._last_shown[key] = None
+        self._bars.update(self._tasks[key], visible=True)
+        if len(self._last_shown) > MOST_ROWS:
+            oldest = next(iter(self._last_shown))
+            del self._last_shown[oldest]
+            self._bars.update(self._tasks[oldest], visible=False)
 
-    def _table(self, rows: Sequence[ConditionCount], *, is_narrow: bool = False) -> WordTable:
-        """Return the conditions; where it is narrow, with shorter curves and fewer columns."""
-        table = table_without_lines()
-        add_columns(table, "condition")
-        table.add_column("done", justify="right", no_wrap=not is_narrow)
-        add_columns(table, "failed", "best\ncost" if is_narrow else "best cost", right=True)
-        if self._curves is not None:
-            if not is_narrow:
-                add_columns(table, "generation", right=True)
-            width = NARROW_CURVE_WIDTH if is_narrow else CURVE_WIDTH
-            table.add_column("convergence", no_wrap=True, min_width=width)
-        for each in rows:
-            best = f"{each.best:.4g}" if np.isfinite(each.best) else "–"
-            cells = [each.label, f"{each.done} of {each.total}", str(each.failed), best]
-            if self._curves is not None:
-                generation = str(each.curve.generation) if each.curve else "–"
-                cells += [] if is_narrow else [generation]
-                cells.append(self._drawn(each.curve, width) if each.curve else "")
-            table.add_row(*cells)
-        return table
-
-    def _hear(self) -> None:
-        """Take note of what the workers left; conditions that are running stand last."""
+    def _read_curves(self) -> None:
+        """Draw the curves that the workers left."""
+        levels = LEVELS if self._console.encoding.startswith("utf") else PLAIN_LEVELS
         for curve in [] if self._curves is None else read_curves(self._curves):
-            own = self._counts.get(curve.condition_id)
-            if own is not None and own.curve != curve:
-                own.curve = curve
-                self._counts[curve.condition_id] = self._counts.pop(curve.condition_id)
+            key = curve.condition_id
+            if key in self._tasks and self._known.get(key) != curve:
+                self._known[key] = curve
+                self._show_row(key)
+                text = f"{curve.generation} {drawn(curve.costs, levels)}"
+                self._bars.update(self._tasks[key], curve=text)
 
-    def _drawn(self, curve: Curve, width: int) -> str:
-        is_plain = not self._console.encoding.startswith("utf")
-        return drawn(curve.costs, PLAIN_LEVELS if is_plain else LEVELS, width)
-
-    def _plain(self) -> None:
-        text = (
-            f"replicates: {self._done} of {self._total} done, {self._failed} failed, ETA "
-            f"{self._eta()}"
-        )
+    def _say(self) -> None:
+        total, failed = self._bars.tasks[-1], sum(self._failed.values())
+        done, seconds = int(total.completed) - failed, total.time_remaining
+        if seconds is None:
+            rest = "–"
+        else:
+            in_minutes = seconds >= MINUTES_FROM_S
+            rest = f"{seconds / 60:.0f} min" if in_minutes else f"{seconds:.0f} s"
+        text = f"replicates: {done} of {total.total:.0f} done, {failed} failed, ETA {rest}"
         self._console.print(text, soft_wrap=True)
-
-    def _eta(self) -> str:
-        left = self._total - self._ended
-        if left == 0:
-            return "0 s"
-        since, num_first = self._first or (0.0, self._ended)
-        if self._ended == num_first:
-            return "–"
-        took, count = self._measured
-        if not count:  # all were the first of a condition
-            took, count = time.monotonic() - since, self._ended - num_first
-        seconds = took / count * left
-        return f"{seconds / 60:.0f} min" if seconds >= MINUTES_FROM_S else f"{seconds:.0f} s"
 
 
 def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH) -> str:

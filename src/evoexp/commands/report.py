@@ -1,26 +1,37 @@
 """`evoexp report`: figures, tables and verdicts again, from the outputs alone."""
 
 import argparse
+import contextlib
 import functools
-import importlib
-from collections.abc import Sequence
+import io
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
-from rich.console import Console
-
+from evoexp.commands import compare
 from evoexp.commands.arguments import add_experiment_arguments
-from evoexp.commands.console import plain_console
-from evoexp.commands.drafts import Draft, check_reports, draft_of, drafts
-from evoexp.commands.drawn_reports import name_reports
+from evoexp.commands.command_parser import command_parser
+from evoexp.commands.console import say, say_each
 from evoexp.commands.pack import unpacked
-from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.search_path import options
-from evoexp.errors import NothingStored, SettingError
+from evoexp.commands.report_requests import request_of, requests
+from evoexp.commands.site import home_files, write_site
+from evoexp.configuration import compose
+from evoexp.configuration.search_path import options, searched_first
+from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError
 from evoexp.report import build
+from evoexp.report.home_page import summaries
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 ASSUMPTIONS = "assumptions"  # stands for the experiments of that name, one per paper
+
+
+class PlannedReport(NamedTuple):
+    """A report to be drawn: its folder's name, and the function that draws it."""
+
+    folder: str
+    draw: Callable[[], build.ReportFiles]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,33 +57,83 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Draw, or check; exit code 1 if something differs or cannot be drawn."""
-    console = plain_console()
+    """Draw, or check; exit code 1 if something differs, or one of all cannot be drawn."""
     if arguments.all:
-        from evoexp.commands.all_reports import report_all  # composes every experiment
-
-        return report_all(arguments, console)
+        return _main_of_all(arguments)
     if not arguments.overrides:
         raise SettingError("experiment", "named, or --all given", "none")
     arguments.overrides = unpacked(arguments.overrides)
     if ASSUMPTIONS in arguments.overrides:
-        arguments.overrides = _with_assumptions(arguments.overrides, console)
-    found = drafts(arguments)
+        arguments.overrides = _with_assumptions(arguments.overrides)
+    found = requests(arguments)
     if arguments.check:
-        return check_reports((draft.files() for draft in found), console)
-    if len(found) > 1:  # what all copies of this process need
-        importlib.import_module("evoexp.report.style")  # matplotlib
-    return name_reports(
-        [functools.partial(_written, draft) for draft in found],
-        console,
+        return _check(request.files() for request in found)
+    say_each(request.write for request in found)
+    return 0
+
+
+def _main_of_all(arguments: argparse.Namespace) -> int:
+    """Draw all reports and the home page, or check them.
+
+    Raises:
+        SettingError: If words are given, too.
+        NothingStored: If nothing is stored.
+    """
+    given = [*arguments.overrides, *arguments.only, *(["-m"] if arguments.multirun else [])]
+    if given:
+        raise SettingError("--all", "given alone", " ".join(given))
+    planned = list(planned_reports(outputs_root()))
+    if not planned:
+        raise NothingStored(
+            f"report: no experiment is stored in {outputs_root()}, and no report; see: evoexp list"
+        )
+    failed: list[str] = []
+    reports = _drawn(planned, failed)
+    if arguments.check:
+        code = _check(_with_home(reports))
+    else:
+        code = 0
+        for report in reports:
+            say(f"report: {build.write_report(report)}")
+        write_site()
+    return 1 if failed else code
+
+
+def _check(reports: Iterable[build.ReportFiles]) -> int:
+    """Compare reports with what is on disk, and name every file that is not the same.
+
+    Returns:
+        The exit code: 1 if a file differs, is missing or left over.
+    """
+    num_reports = num_files = num_wrong = 0
+    for report in reports:
+        for line in _differences(report):
+            say(line)
+            num_wrong += 1
+        num_reports += 1
+        num_files += len(report.files)
+    checked = f"check: {num_files} files of {num_reports} report{'s' * (num_reports != 1)}"
+    say(
+        f"{checked}: {num_wrong or 'all'} {'not ' * bool(num_wrong)}as they follow from the outputs"
     )
+    return 1 if num_wrong else 0
 
 
-def _written(draft: Draft) -> str:
-    return str(build.write_report(draft.files()))
+def _differences(report: build.ReportFiles) -> Iterator[str]:
+    """Yield a line for every file that differs, is missing or left over."""
+    directory, files = report
+    for name, content in sorted(files.items()):
+        path = directory / name
+        if not path.exists():
+            yield f"missing: {path}"
+        elif path.read_bytes() != content:
+            yield f"differs: {path}"
+    # the home page owns no folder
+    for path in build.stale_files(report) if build.INDEX in files else ():
+        yield f"left over: {path}"
 
 
-def _with_assumptions(words: Sequence[str], console: Console) -> list[str]:
+def _with_assumptions(words: Sequence[str]) -> list[str]:
     """Return the words with `assumptions` replaced by the papers' experiments of that name.
 
     An experiment that nothing is stored of is named instead, with the command that runs it.
@@ -90,21 +151,124 @@ def _with_assumptions(words: Sequence[str], console: Console) -> list[str]:
     if not stored:
         raise NothingStored(f"{ASSUMPTIONS}: nothing stored in {outputs}; try: {missing[:-1]}")
     if missing:
-        console.print(f"nothing stored yet: {missing[:-1]}", soft_wrap=True)
+        say(f"nothing stored yet: {missing[:-1]}")
     return [name for word in words for name in (stored if word == ASSUMPTIONS else [word])]
 
 
-def of_experiment(
-    experiment: Experiment,
-    overrides: Sequence[str],
-    multirun: bool = False,
-    only: Sequence[str] = (),
-    config_dir: Sequence[str] = (),
-) -> Path:
-    """Draw the report of one experiment, as `run` does at its end; see `draft_of`.
+# all reports
 
-    Returns:
-        Path of its `index.md`.
+
+def _with_home(reports: Iterator[build.ReportFiles]) -> Iterator[build.ReportFiles]:
+    yield from reports
+    yield home_files()
+
+
+def _drawn(planned: Sequence[PlannedReport], failed: list[str]) -> Iterator[build.ReportFiles]:
+    """Draw reports one after the other; name those that cannot be drawn, and leave them."""
+    for folder, draw in planned:
+        try:
+            report = draw()
+            if report.directory.name != folder:
+                raise StoreError(f"its command draws {report.directory.name}")
+        except (EvoexpError, OSError) as error:
+            failed.append(folder)
+            say(f"cannot be drawn: {folder}: {error}")
+            continue
+        yield report
+
+
+def planned_reports(outputs: Path) -> Iterator[PlannedReport]:
+    """Yield the reports of all experiments that are stored, then the others that are there."""
+    seen = set()
+    for name in options("experiment"):
+        for budget in _budgets(outputs, name):
+            folder, words = name, [f"experiment={name}"]
+            if budget != "paper":
+                folder, words = f"{name}@{budget}", [*words, f"budget={budget}"]
+            seen.add(folder)
+            yield PlannedReport(folder, functools.partial(_of_experiment, words))
+    for each in summaries(outputs / "reports"):
+        if each.folder not in seen:
+            yield PlannedReport(each.folder, functools.partial(_again, each.folder, each.command))
+
+
+def _of_experiment(words: Sequence[str]) -> build.ReportFiles:
+    (experiment,) = compose.expand(words)
+    return request_of(experiment, words).files()
+
+
+def _budgets(outputs: Path, name: str) -> Iterator[str]:
+    """Yield the budgets at which an experiment was run.
+
+    It began one of its runs, or all of them are there: experiments share conditions, so one of
+    them alone does not mean that all were asked for.
     """
-    draft = draft_of(experiment, overrides, multirun, only, config_dir)
-    return build.write_report(draft.files())
+    for budget in ("paper", "smoke"):
+        ids = _ids(name, budget)
+        runs = (RunDirectory(outputs, each) for each in ids)
+        begun = [run for run in runs if run.completed() or run.failed()]
+        own = [run for run in begun if _notes(run).get("experiment") == name]
+        if own or (begun and len(begun) == len(ids)):
+            is_quick = budget == "paper" and _is_quick(name, own or begun)
+            yield "quick" if is_quick else budget
+
+
+def _ids(name: str, budget: str) -> set[str]:
+    """Return the hashes of an experiment's conditions; one that is not shipped is composed."""
+    rows = [row for row in shipped() if row.experiment == name]
+    if rows:
+        return {row.condition_id for row in rows if row.budget == budget}
+    (experiment,) = compose.expand([f"experiment={name}", f"budget={budget}"])
+    return {condition.id for _, condition in experiment.conditions}
+
+
+def _is_quick(name: str, begun: Sequence[RunDirectory]) -> bool:
+    """Return whether runs, whose hashes are those of the paper's budget, are of `quick`."""
+    commands = [_words(str(_notes(run).get("command", ""))) for run in begun]
+    if not all("budget=quick" in words for words in commands):
+        return False
+    (quick,) = compose.expand([f"experiment={name}", "budget=quick"])
+    return all(len(run.completed()) <= quick.num_replicates for run in begun)
+
+
+def _notes(run: RunDirectory) -> dict[str, Any]:
+    """Return the notes on a run's origin; none if they are damaged."""
+    with contextlib.suppress(EvoexpError):
+        return run.manifest()
+    return {}
+
+
+def _again(folder: str, command: str) -> build.ReportFiles:
+    """Draw a report by the command that its page names; nothing is written.
+
+    Raises:
+        StoreError: If it names no command that draws a report.
+        EvoexpError: If that cannot be done any more.
+    """
+    name, *words = _words(command)
+    if name not in ("report", "compare"):
+        raise StoreError(f"{folder}: names no command that draws it")
+    arguments = _parsed(name, words)
+    with searched_first(arguments.config_dir):
+        if name == "compare":
+            return compare.drawn(arguments).files
+        found = [] if arguments.all else requests(arguments)
+        if len(found) != 1:
+            raise StoreError(f"{folder}: names no command that draws it alone")
+        return found[0].files()
+
+
+def _words(command: str) -> list[str]:
+    try:
+        return shlex.split(command) or [""]
+    except ValueError:
+        return [""]
+
+
+def _parsed(name: str, words: Sequence[str]) -> argparse.Namespace:
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(complaint):
+            return command_parser(name).parse_intermixed_args(words)
+    except SystemExit as error:
+        raise StoreError(complaint.getvalue().strip().removeprefix("evoexp: ")) from error

@@ -7,10 +7,6 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from rich.console import Console
-from rich.text import Text
-
-from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import (
     Comparison,
@@ -21,24 +17,12 @@ from evoexp.batch.reproduction import (
     same_fingerprint,
 )
 from evoexp.batch.workers import Workers, in_order, num_cores
-from evoexp.commands.console import (
-    add_columns,
-    add_hash_column,
-    coloured,
-    new_table,
-    plain_console,
-)
-from evoexp.commands.hashes import with_candidates
+from evoexp.commands.console import coloured, hash_column, new_table, right, say
 from evoexp.commands.pack import in_archive, looked_into
-from evoexp.configuration import expansions
-from evoexp.errors import (
-    AmbiguousHash,
-    NothingStored,
-    RevisionMismatch,
-    UnknownHash,
-    printable,
-)
-from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.errors import NothingStored, RevisionMismatch, UnknownHash, printable
+from evoexp.shipped import Shipped
+from evoexp.store.run_directory import RunDirectory, outputs_root
 
 FEW = 8  # replicates below this are run here, without worker processes
 
@@ -56,25 +40,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
-    console = plain_console()
     path = Path(arguments.what)
     if packed := in_archive(arguments.what):
         with looked_into(*packed) as runs:
             rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
-        code = _report(console, rows)
-        console.print(
+        code = _report(rows)
+        say(
             f"{printable(str(packed[0]))}: its logs were compared where they are; nothing was "
-            f"taken into {outputs_root()}",
-            soft_wrap=True,
+            f"taken into {outputs_root()}"
         )
         return code
     if path.suffix == ".mcap" or path.is_file():
-        return _report(console, [reproduce_log(path)])
+        return _report([reproduce_log(path)])
     try:
-        run = resolve(outputs_root(), arguments.what)
+        run = stored_or_shipped(arguments.what)
     except UnknownHash as error:
-        return _without_stored_run(console, arguments.what, arguments.replicate, error)
-    return _report(console, _of_run(run, arguments.replicate))
+        raise UnknownHash(f"NOTHING TO COMPARE: {error}") from None
+    if not isinstance(run, RunDirectory):
+        return _without_stored_run(run, arguments.replicate)
+    return _report(_of_run(run, arguments.replicate))
 
 
 def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison | DamagedLog]:
@@ -121,11 +105,9 @@ def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Compariso
         return [*compared, *in_order(workers, reproduce_stored, waiting)]
 
 
-def _report(console: Console, rows: Sequence[Comparison | DamagedLog]) -> int:
-    table = new_table()
-    add_hash_column(table, "run")
-    add_columns(table, "replicate", "generations", right=True)
-    add_columns(table, "verdict")
+def _report(rows: Sequence[Comparison | DamagedLog]) -> int:
+    numbers = right("replicate", "generations")
+    table = new_table("", hash_column("run"), *numbers, "verdict")
     for row in rows:
         if isinstance(row, DamagedLog):
             verdict, generations = coloured(f"damaged: {row.reason}", "red"), "–"
@@ -133,55 +115,30 @@ def _report(console: Console, rows: Sequence[Comparison | DamagedLog]) -> int:
             verdict = coloured(row.verdict, "green" if row.matches else "red")
             generations = str(row.num_generations)
         table.add_row(row.condition_id[:12], str(row.replicate), generations, verdict)
-    console.print(table)
+    say(table)
     compared = [row for row in rows if isinstance(row, Comparison)]
     diverging = [row for row in compared if not row.matches]
     if diverging:
         lines = diverging[0].environment or ("none: the environment is the same",)
-        console.print(
-            "differences of environment:",
-            *(f"  {line}" for line in lines),
-            sep="\n",
-            soft_wrap=True,
-        )
+        say("\n".join(["differences of environment:", *(f"  {line}" for line in lines)]))
     damaged = len(rows) - len(compared)
     lost = f", {damaged} damaged" if damaged else ""
-    console.print(f"{len(compared) - len(diverging)} of {len(rows)} MATCH{lost}")
+    say(f"{len(compared) - len(diverging)} of {len(rows)} MATCH{lost}")
     return 1 if diverging or damaged else 0
 
 
-def _without_stored_run(
-    console: Console, prefix: str, replicate: int | None, error: UnknownHash
-) -> int:
-    """Compare replicate 0 of a shipped condition with the shipped table.
-
-    Nothing was ever run here.
-    """
-    found = shipped.find(prefix)
-    if len(found) > 1:
-        raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found])
-    if not found:
-        raise UnknownHash(f"NOTHING TO COMPARE: {with_candidates(error, outputs_root())}")
+def _without_stored_run(row: Shipped, replicate: int | None) -> int:
+    """Compare replicate 0 of a shipped condition, which was never run here, with the table."""
     if replicate not in (None, 0):
-        where = (
-            f"is neither stored in {outputs_root()} nor in the shipped table, which holds "
-            "replicate 0"
+        raise UnknownHash(
+            f"NOTHING TO COMPARE: replicate {replicate} of {row.condition_id[:12]} is neither "
+            f"stored in {outputs_root()} nor in the shipped table, which holds replicate 0"
         )
-        raise UnknownHash(f"NOTHING TO COMPARE: replicate {replicate} of {prefix} {where}")
-    row = found[0]
-    experiment = expansions.expand(
-        [f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label]
-    )[0]
-    condition = experiment.conditions[0].condition
+    condition = shipped_experiment(row).conditions[0].condition
     summary = run_replicate(condition, 0).summary
-    matches = (
-        same_fingerprint(fingerprint(condition, summary), row.digest)
-        and condition.id == row.condition_id
-    )
-    verdict = Text("MATCH", "green") if matches else Text("DIVERGES", "red")
-    console.print(f"{row.condition_id[:12]} replicate 0 against the shipped table:", verdict)
-    console.print(
-        f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})",
-        soft_wrap=True,
-    )
+    is_same = same_fingerprint(fingerprint(condition, summary), row.digest)
+    matches = is_same and condition.id == row.condition_id
+    verdict = coloured("MATCH", "green") if matches else coloured("DIVERGES", "red")
+    say(f"{row.condition_id[:12]} replicate 0 against the shipped table:", verdict)
+    say(f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})")
     return 0 if matches else 1

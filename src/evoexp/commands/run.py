@@ -3,34 +3,37 @@
 import argparse
 import contextlib
 import functools
+import hashlib
+import importlib.util
 import shlex
 import sys
 import tempfile
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments, folder_words
-from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
-from evoexp.commands.drawn_reports import name_reports
+from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
+from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
+from evoexp.registry import COMPONENTS, registrations
 from evoexp.report.pages import page_registration
-from evoexp.store.plans import num_planned
+from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
-INDEX = "index.md"
+DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,8 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
-    console = plain_console()
-    experiments = expansions.expand(
+    experiments = compose.expand(
         arguments.overrides, multirun=arguments.multirun, only=arguments.only
     )
     for experiment in experiments:
@@ -63,79 +65,31 @@ def main(arguments: argparse.Namespace) -> int:
             _notes(experiment, labelled.label, command),
         )
         for experiment in experiments
-        for labelled in _that_can_run(experiment, console)
+        for labelled in _that_can_run(experiment)
     ]
     runner = experiments[0].runner
     if arguments.live and runner.backend != "loky":
         raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
-    with _folder_for_curves(arguments.live) as curves:
+    with contextlib.ExitStack() as stack:
+        curves = None
+        if arguments.live:
+            folder = tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True)
+            curves = Path(stack.enter_context(folder))
         batch = Batch(
             wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
         )
         batch.prepare()
         left = batch.num_left_failed
-        failures = _run(batch, wanted, console, curves)
+        failures = _run(batch, wanted, curves)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
-        console.print(
-            f"{which}: evoexp list --failed; run again with --retry-failed", soft_wrap=True
-        )
+        say(f"{which}: evoexp list --failed; run again with --retry-failed")
     try:
-        code = _tell(experiments, arguments, console)
+        _show(experiments, arguments)
     finally:
         if failures:
-            console.print(_failure_table(batch, failures))
-    return code or (1 if failures or left else 0)
-
-
-@contextlib.contextmanager
-def _folder_for_curves(wanted: bool) -> Iterator[Path | None]:
-    if not wanted:
-        yield None
-        return
-    with tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True) as folder:
-        yield Path(folder)
-
-
-def _tell(
-    experiments: Sequence[Experiment], arguments: argparse.Namespace, console: Console
-) -> int:
-    """Print the table of every experiment and the place of its report; return the exit code."""
-    if arguments.no_report:
-        for experiment in experiments:
-            console.print(summary_table(experiment))
-        return 0
-
-    def drawn(number: int) -> str:
-        from evoexp.commands.report import of_experiment
-
-        return str(of_experiment(experiments[number], *_asked(arguments)))
-
-    return name_reports(
-        [functools.partial(drawn, number) for number in range(len(experiments))],
-        console,
-        before=lambda number: console.print(summary_table(experiments[number])),
-    )
-
-
-def _asked(arguments: argparse.Namespace) -> tuple[Any, ...]:
-    """Return the words that ask for a report."""
-    return arguments.overrides, arguments.multirun, arguments.only, arguments.config_dir
-
-
-def _that_can_run(experiment: Experiment, console: Console) -> list[Labelled]:
-    """Return the conditions of an experiment, without those that need an extra that is not there.
-
-    Raises:
-        SettingError: If all of them do.
-    """
-    lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
-    for label, what in lacks.items():
-        if what:
-            console.print(f"skipped: {label}: {what}", soft_wrap=True, markup=False)
-    if all(lacks.values()):
-        raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
-    return [each for each in experiment.conditions if not lacks[each.label]]
+            say(_failure_table(batch, failures))
+    return 1 if failures or left else 0
 
 
 def _command(arguments: argparse.Namespace) -> str:
@@ -146,38 +100,19 @@ def _command(arguments: argparse.Namespace) -> str:
     return shlex.join(["evoexp", "run", *words])
 
 
-def _run(
-    batch: Batch,
-    wanted: Sequence[tuple[Condition, int, dict[str, Any]]],
-    console: Console,
-    curves: Path | None,
-) -> list[Outcome]:
-    if not batch.jobs:
-        if batch.is_damaged:
-            deque(batch.run(), maxlen=0)  # mends what is no replicate
-        if not batch.num_left_failed:
-            console.print("nothing to run: every replicate is there")
-        return []
-    planned = sorted({count for _, count, _ in wanted})
-    console.print(
-        f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}"
-    )
-    from evoexp.commands.progress import BatchProgress
+def _that_can_run(experiment: Experiment) -> list[Labelled]:
+    """Return the conditions of an experiment, without those that need an extra that is not there.
 
-    failures, counts = [], Counter(job.condition_id for job in batch.jobs)
-    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    shown = {key: (labels[key], counts[key]) for key in counts}
-    with (
-        BatchProgress(console, shown, curves) as progress,
-        contextlib.closing(batch.run()) as outcomes,
-    ):
-        for outcome in outcomes:
-            progress.advance(outcome)
-            if outcome.failed:
-                failures.append(outcome)
-                failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
-                print(f"{failed}: {printable(outcome.reason)}", file=sys.stderr)
-    return failures
+    Raises:
+        SettingError: If all of them do.
+    """
+    lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
+    for label, what in lacks.items():
+        if what:
+            say(f"skipped: {label}: {what}")
+    if all(lacks.values()):
+        raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
+    return [each for each in experiment.conditions if not lacks[each.label]]
 
 
 def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
@@ -191,19 +126,94 @@ def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
     }
 
 
+def _run(
+    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
+) -> list[Outcome]:
+    """Run what is missing; return the replicates that failed."""
+    if not batch.jobs:
+        if batch.is_damaged:
+            deque(batch.run(), maxlen=0)  # mends what is no replicate
+        if not batch.num_left_failed:
+            say("nothing to run: every replicate is there")
+        return []
+    planned = sorted({count for _, count, _ in wanted})
+    say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
+    failures, counts = [], Counter(job.condition_id for job in batch.jobs)
+    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
+    progress = BatchProgress(
+        plain_console(), {key: (labels[key], counts[key]) for key in counts}, curves
+    )
+    with progress.shown(), contextlib.closing(batch.run()) as outcomes:
+        for outcome in outcomes:
+            progress.advance(outcome)
+            if outcome.failed:
+                failures.append(outcome)
+                failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
+                print(f"{failed}: {printable(outcome.reason)}", file=sys.stderr)
+    return failures
+
+
+def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> None:
+    """Print the table of every experiment and the place of its report, drawn where it must be."""
+    if arguments.no_report:
+        for experiment in experiments:
+            say(summary_table(experiment))
+        return
+    sources = _stamps([*_code(), *(folder.path for folder in folders()), outputs_root() / "runs"])
+
+    def drawn(experiment: Experiment) -> str:
+        say(summary_table(experiment))
+        asked = (arguments.overrides, arguments.multirun, arguments.only, arguments.config_dir)
+        directory = outputs_root() / "reports" / experiment.report_name
+        note = directory / DRAWN_FROM
+        if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
+            return f"{directory / 'index.md'} (as it was)"
+        from evoexp.commands.report_requests import request_of  # pandas, where there is no need
+
+        page = request_of(experiment, *asked).write()
+        note.write_text(_drawn_from(experiment, asked, sources, directory))
+        return str(page)
+
+    say_each(functools.partial(drawn, experiment) for experiment in experiments)
+
+
+def _drawn_from(experiment: Experiment, asked: Any, sources: str, directory: Path) -> str:
+    """Return a hash of all that a report follows from, and of its files."""
+    conditions = [(label, condition.id) for label, condition in experiment.conditions]
+    settings = (experiment.num_replicates, experiment.report, environment()["versions"])
+    text = repr((conditions, settings, asked, sources, _stamps([directory])))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _stamps(roots: Iterable[Path]) -> str:
+    """Return a hash of paths, sizes and times of the files in folders; hidden ones do not count."""
+    digest = hashlib.sha256()
+    for path in sorted({path for root in roots for path in root.rglob("[!.]*")}):
+        if path.is_file() and path.suffix != ".pyc":
+            status = path.stat()
+            digest.update(repr((str(path), status.st_size, status.st_mtime_ns)).encode())
+    return digest.hexdigest()
+
+
+def _code() -> list[Path]:
+    """Return the folders with the code of evoexp and of all guests."""
+    packages = {each.module.partition(".")[0] for each in registrations(COMPONENTS)}
+    specs = [importlib.util.find_spec(package) for package in sorted(packages)]
+    found = (spec.submodule_search_locations or () for spec in specs if spec is not None)
+    return [Path(location) for locations in found for location in locations]
+
+
 def summary_table(experiment: Experiment) -> Table:
     """Return a table of the conditions: replicates done, solved, cost and time.
 
     As the report, it has all stored replicates, also those beyond the number that is asked for.
     """
-    table = new_table(experiment.report_name)
-    add_columns(table, "condition")
-    add_hash_column(table)
-    add_columns(table, "replicates", "solved", "median\nbest cost", "CPU s\neach", right=True)
+    numbers = right("replicates", "solved", "median\nbest cost", "CPU s\neach")
+    table = new_table(experiment.report_name, "condition", hash_column(), *numbers)
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
         rows = stored_summaries(run)
-        planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
+        planned = num_planned(run, condition.num_replicates(experiment.num_replicates))
         columns = rows.select(["status", "solved", "best_cost", "cpu_s"]).to_pylist()
         done = [row for row in columns if row["status"] == "done"]
         table.add_row(
@@ -225,10 +235,8 @@ def _median(values: list[float], form: str) -> str:
 
 
 def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:
-    table = new_table(f"{len(failures)} failed")
-    add_hash_column(table)
-    add_columns(table, "#", right=True)
-    add_columns(table, "reason", "traceback in")
+    title = f"{len(failures)} failed"
+    table = new_table(title, hash_column(), *right("#"), "reason", "traceback in")
     for outcome in failures:
         path = batch.runs[outcome.condition_id].failure_path(outcome.replicate)
         table.add_row(outcome.condition_id[:12], str(outcome.replicate), outcome.reason, str(path))

@@ -3,34 +3,41 @@
 import argparse
 import itertools
 import shlex
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+import yaml
 from rich.table import Table
 
-from evoexp import shipped
 from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
 from evoexp.commands.console import (
-    add_columns,
-    add_hash_column,
+    coloured,
+    hash_column,
     new_table,
     plain_console,
     print_json,
+    right,
+    say,
 )
-from evoexp.commands.fact_screen import compact, screen, typed_parts
 from evoexp.commands.facts import KEYS, composed_facts, log_facts, stored_facts
-from evoexp.commands.hashes import with_candidates
 from evoexp.commands.pack import in_archive, looked_into
-from evoexp.commands.replicate_table import replicate_table
-from evoexp.configuration import expansions
+from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.search_path import options
-from evoexp.errors import AmbiguousHash, SettingError, UnknownHash, printable
-from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.errors import SettingError, printable
+from evoexp.store.identity import TAKEN
+from evoexp.store.run_directory import RunDirectory
+from evoexp.store.summaries import summary_table
+from evoexp.validation import MOST_QUERIES, TARGET
 
 MAX_CHANGES = 6  # settings per row of a table of conditions
+INDENT = 13  # columns of the names on the left
+VERSIONS = ("python", "evoexp", "numpy", "numba", "pin", "coal")  # those on the screen
+MAX_LINES = 3  # of one entry; `show --all` prints everything
+MAX_ENTRIES = 4  # of one kind: names, differences, failures
+WHOLE = ("condition", "origin", "environment", "result", "verdict", "note")  # never cut
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,70 +61,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print a screen of facts; of several conditions a table."""
-    run: RunDirectory | None = None
-    experiments: list[Experiment] = []
-    if any(map(is_override, arguments.overrides)):
-        experiments = expansions.expand(
-            arguments.overrides, multirun=arguments.multirun, only=arguments.only
-        )
-        swept, folders = (["-m"] if arguments.multirun else []), folder_words(arguments.config_dir)
-        words = ["evoexp", "run", *swept, *arguments.overrides, *folders]
+    words: list[str] = arguments.overrides
+    as_table = not (arguments.all or arguments.json)
+    if any(map(is_override, words)):
+        experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
+        swept = ["-m"] if arguments.multirun else []
+        command = ["evoexp", "run", *swept, *words, *folder_words(arguments.config_dir)]
         found = [
-            composed_facts(experiment, label, shlex.join([*words, "--only", label]))
+            composed_facts(experiment, label, shlex.join([*command, "--only", label]))
             for experiment in experiments
             for label, _ in experiment.conditions
         ]
-    elif packed := in_archive(" ".join(arguments.overrides)):
-        return _show_archive(arguments, *packed)
-    elif len(arguments.overrides) > 1:
-        raise SettingError("show", "given one hash or log", " ".join(arguments.overrides))
-    elif (path := Path(arguments.overrides[0])).suffix == ".mcap" or path.is_file():
-        found = [log_facts(path)]
-    else:
-        run, facts = _by_hash(arguments.overrides[0])
-        found = [facts]
-    console = plain_console()
-    if len(found) > 1 and not (arguments.all or arguments.json):
-        for experiment in experiments:
-            console.print(_conditions(experiment, found))
-        console.print("one condition on a screen: --only LABEL", soft_wrap=True)
-        return 0
-    _print_screens(console, arguments, found, [run] * len(found))
-    return 0
-
-
-def _show_archive(arguments: argparse.Namespace, path: Path, prefix: str) -> int:
-    """Show the runs of an archive, which stay where they are."""
-    console = plain_console()
-    with looked_into(path, prefix) as runs:
-        found = [stored_facts(run) for run in runs]
-        for facts in found:
-            facts["origin"]["directory"] = str(path)
-        if len(found) > 1 and not (arguments.all or arguments.json):
-            console.print(_packed(found))
-            which = f"{printable(str(path))}:{runs[0].hash12}"
-            console.print(f"one run on a screen: evoexp show {which}", soft_wrap=True)
+        if len(found) > 1 and as_table:
+            for experiment in experiments:
+                say(_condition_table(experiment, found))
+            say("one condition on a screen: --only LABEL")
         else:
-            _print_screens(console, arguments, found, runs)
+            _print_screens(arguments, found, [None] * len(found))
+    elif packed := in_archive(" ".join(words)):
+        path, prefix = packed
+        with looked_into(path, prefix) as runs:
+            found = [stored_facts(run) for run in runs]
+            for facts in found:
+                facts["origin"]["directory"] = str(path)
+            if len(found) > 1 and as_table:
+                say(_archive_table(found))
+                say(f"one run on a screen: evoexp show {printable(str(path))}:{runs[0].hash12}")
+            else:
+                _print_screens(arguments, found, runs)
+    elif len(words) > 1:
+        raise SettingError("show", "given one hash or log", " ".join(words))
+    elif (path := Path(words[0])).suffix == ".mcap" or path.is_file():
+        _print_screens(arguments, [log_facts(path)], [None])
+    else:
+        run = stored_or_shipped(words[0])
+        if isinstance(run, RunDirectory):
+            _print_screens(arguments, [stored_facts(run)], [run])
+        else:
+            facts = composed_facts(shipped_experiment(run), run.label, run.command)
+            _print_screens(arguments, [facts], [None])
     return 0
-
-
-def _packed(found: Sequence[dict[str, Any]]) -> Table:
-    """Return a table of the runs of an archive."""
-    table = new_table()
-    add_hash_column(table)
-    add_columns(table, "experiment", "condition")
-    add_columns(table, "done", "solved", right=True)
-    for facts in found:
-        origin, result = facts["origin"], facts["result"] or {"done": 0, "solved": 0}
-        names = (str(origin.get(name) or "–") for name in ("experiment", "label"))
-        counts = (str(result[name]) for name in ("done", "solved"))
-        table.add_row(facts["condition"][:12], *names, *counts)
-    return table
 
 
 def _print_screens(
-    console: Console,
     arguments: argparse.Namespace,
     found: Sequence[dict[str, Any]],
     runs: Sequence[RunDirectory | None],
@@ -126,66 +112,49 @@ def _print_screens(
         print_json(found if len(found) > 1 else found[0])
         return
     for facts, run in zip(found, runs, strict=True):
-        for line in screen(facts, console.width):
-            console.print(line, soft_wrap=True)
+        for line in screen(facts, plain_console().width):
+            say(line)
         if arguments.all:
-            _print_all(console, facts, run)
+            _say_yaml({"settings": facts["settings"]})
+            if run is not None:
+                say(_replicate_table(run))
+                manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
+                _say_yaml({"manifest": manifest})
 
 
-def _by_hash(prefix: str) -> tuple[RunDirectory | None, dict[str, Any]]:
-    """Return the run and the facts that a hash names: of a stored run, or a shipped condition.
-
-    Raises:
-        UnknownHash: If nothing has this hash.
-        AmbiguousHash: If several shipped conditions begin with it.
-    """
-    try:
-        run = resolve(outputs_root(), prefix)
-        return run, stored_facts(run)
-    except UnknownHash as error:
-        rows = shipped.find(prefix)
-        if len(rows) > 1:
-            raise AmbiguousHash(prefix, [row.condition_id[:12] for row in rows]) from None
-        if not rows and prefix in options("experiment"):
-            raise UnknownHash(f"{error}; did you mean 'experiment={prefix}'?") from None
-        if not rows:
-            raise with_candidates(error, outputs_root()) from None
-    row = rows[0]
-    words = [f"experiment={row.experiment}", f"budget={row.budget}"]
-    experiment = expansions.expand(words, only=[row.label])[0]
-    return None, composed_facts(experiment, row.label, row.command)
-
-
-def _print_all(console: Console, facts: Mapping[str, Any], run: RunDirectory | None) -> None:
-    """Print settings as YAML, the table of replicates and the manifest."""
-    _print_yaml(console, {"settings": facts["settings"]})
-    if run is not None:
-        console.print(replicate_table(run))
-        manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
-        _print_yaml(console, {"manifest": manifest})
-
-
-def _print_yaml(console: Console, data: Mapping[str, Any]) -> None:
-    import yaml  # which only `--all` needs
-
-    text = yaml.safe_dump(
-        dict(data), sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+def _say_yaml(data: Mapping[str, Any]) -> None:
+    say(
+        yaml.safe_dump(
+            data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+        )
     )
-    console.print(text, soft_wrap=True)
 
 
-def _conditions(experiment: Experiment, found: list[dict[str, Any]]) -> Table:
+def _archive_table(found: Sequence[dict[str, Any]]) -> Table:
+    """Return a table of the runs of an archive."""
+    table = new_table("", hash_column(), "experiment", "condition", *right("done", "solved"))
+    for facts in found:
+        origin, result = facts["origin"], facts["result"] or {"done": 0, "solved": 0}
+        names = (str(origin.get(name) or "–") for name in ("experiment", "label"))
+        counts = (str(result[name]) for name in ("done", "solved"))
+        table.add_row(facts["condition"][:12], *names, *counts)
+    return table
+
+
+def _condition_table(experiment: Experiment, found: list[dict[str, Any]]) -> Table:
     """Return a table of an experiment's conditions and the settings in which they differ."""
     by_id = {facts["condition"]: facts for facts in found}
     rows = [(label, by_id[condition.id]) for label, condition in experiment.conditions]
     settings = [dict(_leaves(typed_parts(facts["settings"]))) for _, facts in rows]
     names = list(dict.fromkeys(itertools.chain.from_iterable(settings)))
     differing = [name for name in names if len({str(each.get(name)) for each in settings}) > 1]
-    table = new_table(experiment.report_name)
-    add_columns(table, "condition")
-    add_hash_column(table)
-    add_columns(table, "done", right=True)
-    add_columns(table, "settings in which they differ")
+    table = new_table(
+        experiment.report_name,
+        "condition",
+        hash_column(),
+        *right("done"),
+        "settings in which they differ",
+    )
     for (label, facts), values in zip(rows, settings, strict=True):
         given = [f"{name}={compact(values[name])}" for name in differing if name in values]
         more = [f"… {len(given) - MAX_CHANGES} more"] if len(given) > MAX_CHANGES else []
@@ -193,6 +162,24 @@ def _conditions(experiment: Experiment, found: list[dict[str, Any]]) -> Table:
         done = f"{result['done']} of {result['planned']}" if result else "–"
         changes = "\n".join([*given[:MAX_CHANGES], *more])
         table.add_row(label, facts["condition"][:12], done, changes)
+    return table
+
+
+def _replicate_table(run: RunDirectory) -> Table:
+    """Return one row per replicate, done or failed."""
+    numbers = right("best cost", "solved", "certified", "clearance", "evaluations", "CPU s")
+    table = new_table(
+        f"replicates in {run.path}", *right("#"), "status", *numbers, "digest, or why it failed"
+    )
+    for row in summary_table(run).to_pylist():
+        if row["status"] != "done":
+            failed = coloured("failed", "red")
+            table.add_row(str(row["replicate"]), failed, *6 * ["–"], str(row["stop_reason"]))
+            continue
+        verdict = ["–" if row[name] is None else str(row[name]) for name in ("solved", "certified")]
+        effort = [f"{row['clearance']:.4g}", str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
+        cells = [f"{row['best_cost']:.6g}", *verdict, *effort]
+        table.add_row(str(row["replicate"]), "done", *cells, str(row["digest"]))
     return table
 
 
@@ -207,3 +194,200 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(item, f"{name}.{k}")
     else:
         yield name, value
+
+
+# one screen
+
+
+def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
+    """Yield the facts about a condition as aligned lines.
+
+    Args:
+        facts: As `facts` gives them.
+        width: Columns of the terminal.
+    """
+    for name, text in _entries(facts):
+        room = max(width - INDENT, 30)
+        lines = [
+            line
+            for paragraph in text.splitlines() or [""]
+            for line in textwrap.wrap(paragraph, room, break_on_hyphens=False) or [""]
+        ]
+        if len(lines) > MAX_LINES and name not in WHOLE:
+            lines = [*lines[: MAX_LINES - 1], f"{lines[MAX_LINES - 1][: room - 2]} …"]
+        for k, line in enumerate(lines):
+            yield f"{'' if k else name:{INDENT}}{line}".rstrip()
+
+
+def _entries(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield name and text of every entry."""
+    yield "condition", facts["condition"]
+    if facts["shipped_as"]:
+        named = (f"{s['experiment']}, {s['label']}, {s['budget']}" for s in facts["shipped_as"])
+        yield "shipped as", _first("; ", list(named))
+    yield "components", ", ".join(map(_component, facts["components"]))
+    yield "origin", "\n".join(_origin(facts["origin"], facts["result"] is not None))
+    yield "environment", "\n".join(_environment(facts["environment"]))
+    yield "result", "\n".join(_result(facts["result"], facts["origin"]))
+    yield "verdict", "\n".join(_verdict(facts["verdict"]))
+    for name, component in typed_parts(facts["settings"]).items():
+        yield name, compact(component)
+    for note in facts["notes"]:
+        yield "note", note
+
+
+def _first(separator: str, texts: Sequence[str]) -> str:
+    """Join the first texts, and say how many more there are."""
+    more = len(texts) - MAX_ENTRIES
+    return separator.join(texts[:MAX_ENTRIES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _component(component: Mapping[str, Any]) -> str:
+    """Say a component's revision, and its package unless it is evoexp's own."""
+    text = f"{component['component']} {component['revision']}"
+    installed, package = component["installed_revision"], component["package"]
+    if package is None:
+        return f"{text} (not installed here)"
+    if installed != component["revision"]:
+        text += f" (here {installed})"
+    return text if package.startswith("evoexp ") else f"{text} ({package})"
+
+
+def _origin(origin: Mapping[str, Any], was_run: bool) -> Iterator[str]:
+    """Yield the origin: names, options by the places they come from, the command, files."""
+    names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
+    if origin.get("budget"):
+        names.append(f"budget {origin['budget']}")
+    if archive := origin.get(TAKEN):
+        yield f"out of {archive}, according to which this is:"
+    if names:
+        yield ", ".join(names)
+    places: dict[str, list[str]] = {}
+    for group, option in (origin.get("options") or {}).items():
+        places.setdefault(option["origin"], []).append(f"{group}={option['name']}")
+    for place, options in places.items():
+        yield f"{place}: {' '.join(options)}"
+    if was_run and origin.get("command") and not archive:  # somebody's command is none to be typed
+        yield origin["command"]
+    if origin.get("log"):
+        yield f"{origin['log']}, replicate {origin['replicate']}"
+    if code := origin.get("code"):
+        yield f"commit {str(code.get('commit'))[:12]}" + (", changed" if code.get("dirty") else "")
+    if origin.get("directory"):
+        yield f"stored in {origin['directory']}"
+
+
+def _environment(environment: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield versions, processor, and the differences from the environment here."""
+    if environment is None:
+        yield "–"
+        return
+    versions, platform = environment.get("versions") or {}, environment.get("platform") or {}
+    yield ", ".join(f"{name} {versions[name]}" for name in VERSIONS if versions.get(name))
+    cpu = (environment.get("cpu") or {}).get("name")
+    yield ", ".join(str(part) for part in (*platform.values(), cpu) if part)
+    if differing := environment["differences"]:
+        yield _first("\n", [f"not as here: {each}" for each in differing])
+
+
+def _result(result: Mapping[str, Any] | None, origin: Mapping[str, Any]) -> Iterator[str]:
+    """Yield replicates, costs and effort; or the command that runs the condition."""
+    if result is None:
+        yield f"not run here; run it: {origin['command']}"
+        return
+    if origin.get("log"):
+        stopped = result["stop_reason"]
+        solved = "solved" if result["solved"] else "not solved"
+        reason = f" ({stopped})" if stopped != "generations" else ""
+        yield f"{solved} after {result['generations']} generations{reason}"
+        yield f"digest {result['digest']}"
+    else:
+        planned = f" of {result['planned']}" if result["planned"] is not None else ""
+        failed = f", {result['failed']} failed" if result["failed"] else ""
+        yield f"{result['done']}{planned} replicates done{failed}, {result['solved']} solved"
+    if result["done"]:
+        several = f", median {_number(result['median_cost'])}" if result["done"] > 1 else ""
+        best = f"best cost {_number(result['best_cost'])} (replicate {result['best_replicate']})"
+        yield best + several
+        yield (
+            f"each {_number(result['median_evaluations'])} evaluations, "
+            f"{_number(result['median_collision_queries'])} collision queries, "
+            f"{result['median_cpu_s']:.3g} s CPU"
+        )
+    for name, shape in (result.get("arrays") or {}).items():
+        yield f"array {name}: {' × '.join(map(str, shape))}"
+    if result["failures"]:
+        yield _first(
+            "\n", [f"replicate {f['replicate']}: {f['reason']}" for f in result["failures"]]
+        )
+
+
+def _verdict(verdict: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield the certifier's counts, the closest approach, and the first contacts."""
+    if verdict is None:
+        yield "–"
+        return
+    counts = [f"{verdict[name]} {name}" for name in ("certified", "refuted", "undecided")]
+    if verdict["without_motion"]:
+        counts.append(f"{verdict['without_motion']} without a motion")
+    kept, certified = verdict["certified_margin"], verdict["certified"]
+    yield ", ".join(counts) + f"; required margin kept by {kept} of the {certified} certified"
+    if verdict["clearance"] is not None:
+        yield f"least clearance {_place(verdict, 'clearance')}"
+    if verdict["allowed_contacts"]:
+        yield f"may touch: {', '.join(verdict['allowed_contacts'])}"
+        yield f"deepest overlap of these {_place(verdict, 'penetration')}"
+    if verdict["contacts"]:
+        contacts = [
+            f"replicate {c['replicate']} touches at {c['refuted_at']:.4g} ({c['refuted_pair']})"
+            for c in verdict["contacts"]
+        ]
+        yield _first("\n", contacts)
+
+
+def _place(verdict: Mapping[str, Any], name: str) -> str:
+    """Say a distance, with the replicate and the pair of bodies that have it."""
+    pair = f" ({verdict[f'{name}_pair']})" if verdict[f"{name}_pair"] else ""
+    unit, replicate = verdict["length_unit"], verdict[f"{name}_replicate"]
+    return f"{_number(verdict[name])} {unit}, replicate {replicate}{pair}"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.6g}"
+
+
+def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a canonical form by the names under which their settings are typed.
+
+    A planner's components come out of it (`ga`, `collision`), and a planner out of its control.
+    """
+    parts: dict[str, Any] = {}
+    for name, component in settings.items():
+        if isinstance(component, Mapping) and isinstance(component.get("planner"), Mapping):
+            around = {key: value for key, value in component.items() if key != "planner"}
+            parts |= {"control": around} | typed_parts({"planner": component["planner"]})
+        elif name == "planner":
+            inner = {
+                key: value
+                for key, value in component.items()
+                if isinstance(value, Mapping) and TARGET in value
+            }
+            own = {key: value for key, value in component.items() if key not in inner}
+            parts |= {"planner": own} | inner
+        elif name == MOST_QUERIES:
+            parts["budget"] = {"collision_queries": component}
+        else:
+            parts[name] = component
+    return parts
+
+
+def compact(value: Any) -> str:
+    """Return plain configuration data in one line: `arms(arms=[planar_chain(…), …])`."""
+    if isinstance(value, Mapping):
+        shown = (f"{k}={compact(v)}" for k, v in value.items() if k not in (TARGET, "revision"))
+        return f"{value.get(TARGET, '')}({', '.join(shown)})"
+    if isinstance(value, list):
+        return f"[{', '.join(map(compact, value))}]"
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value)

@@ -6,11 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
 
-from rich.console import Console
-
-from evoexp.commands.console import plain_console
-from evoexp.commands.hashes import stored_runs
-from evoexp.commands.run_origins import origin_of
+from evoexp.commands.console import say
+from evoexp.commands.stored_runs import origin_of, stored_runs
 from evoexp.configuration.search_path import options
 from evoexp.errors import EvoexpError, NothingStored
 from evoexp.registry import CLAIMS, names, registered
@@ -34,12 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    console = plain_console()
-    write_site(console)
+    write_site()
     return 0
 
 
-def write_site(console: Console) -> None:
+def write_site() -> None:
     """Write the home page, and name it.
 
     Raises:
@@ -48,8 +44,8 @@ def write_site(console: Console) -> None:
     directory, files = home_files()
     directory.mkdir(parents=True, exist_ok=True)
     write_file(directory / HTML, files[HTML])
-    console.print(f"site: {directory / HTML}", soft_wrap=True)
-    say_busy(console)
+    say(f"site: {directory / HTML}")
+    _say_busy()
 
 
 def home_files() -> ReportFiles:
@@ -68,7 +64,7 @@ def home_files() -> ReportFiles:
     return ReportFiles(outputs / "reports", {HTML: home_page(found, papers(), runs)})
 
 
-def say_busy(console: Console) -> None:
+def _say_busy() -> None:
     """Name the unfinished runs that another process is writing now."""
     busy = [
         name
@@ -80,10 +76,9 @@ def say_busy(console: Console) -> None:
     if busy:
         more = ", …" if len(busy) > MAX_NAMED else ""
         which = "runs are" if len(busy) > 1 else "run is"
-        console.print(
+        say(
             f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
-            "their results are partial",
-            soft_wrap=True,
+            "their results are partial"
         )
 
 

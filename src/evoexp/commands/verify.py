@@ -11,43 +11,36 @@ from rich.table import Table
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import (
-    add_columns,
-    add_hash_column,
+    hash_column,
     new_table,
     plain_console,
     print_json,
+    right,
+    say,
 )
-from evoexp.commands.hashes import with_candidates
-from evoexp.errors import UnknownHash
+from evoexp.commands.stored_runs import stored_run
 from evoexp.store.identity import CONFIG
 from evoexp.store.integrity import LogCheck, RunCheck, check_logs, check_rows, check_run
-from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, resolve, run_names
+from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, run_names
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
 MANY = 200  # logs, likewise: their solutions are evaluated
 PART = 64  # logs per task of a worker
 SHOWN = 4  # problems of a run
-RUN_KEYS = ("hash", "logs", "problems", "leftovers", "mend", "unevaluated")
 
 
 class Checked(NamedTuple):
-    """A run with everything that was found.
+    """A run with everything that was found: what `--json` prints."""
 
-    Attributes:
-        name: The first twelve digits of its hash.
-        num_logs: Logs that were looked at.
-        problems: File → what is wrong with it.
-        leftovers: Files that are no part of a run.
-        mend: The command that mends it; empty if nothing is wrong or no command does.
-        unevaluated: Why solutions of logs could not be evaluated; empty if all were.
-    """
+    hash: str  # its first twelve digits
+    logs: int  # that were looked at
+    problems: dict[str, str]  # file → what is wrong with it
+    leftovers: list[str]  # files that are no part of a run
+    mend: str  # the command that mends it; empty if nothing is wrong or no command does
+    unevaluated: str  # why solutions of logs could not be evaluated; empty if all were
 
-    name: str
-    num_logs: int
-    problems: dict[str, str]
-    leftovers: list[str]
-    mend: str
-    unevaluated: str
+
+RUN_KEYS = Checked._fields
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,43 +60,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Check; exit code 1 if anything is damaged. Nothing is written."""
-    outputs, console = outputs_root(), plain_console()
+    outputs = outputs_root()
     names = [_name(outputs, prefix) for prefix in arguments.hashes] or run_names(outputs)
     runs = [check_run(outputs, name) for name in dict.fromkeys(names)]
-    with console.status("checking logs"):
+    with plain_console().status("checking logs"):
         found = [_checked(run, logs) for run, logs in zip(runs, _all_logs(runs), strict=True)]
     damaged = [run for run in found if run.problems]
     if arguments.json:
-        print_json([dict(zip(RUN_KEYS, run, strict=True)) for run in found])
+        print_json([run._asdict() for run in found])
         return 1 if damaged else 0
     if damaged:
-        console.print(_table(damaged))
+        say(_table(damaged))
         for mend in dict.fromkeys(run.mend for run in damaged if run.mend):
-            console.print(f"mend: {mend}", soft_wrap=True)
+            say(f"mend: {mend}")
     for run in found:
         if run.leftovers:
             listed = ", ".join(run.leftovers[:SHOWN])
             more = f", … {len(run.leftovers) - SHOWN} more" if run.leftovers[SHOWN:] else ""
-            console.print(f"no part of run {run.name}: {listed}{more}", soft_wrap=True)
+            say(f"no part of run {run.hash}: {listed}{more}")
         if run.unevaluated:
-            console.print(
-                f"run {run.name}: its solutions were not evaluated: {run.unevaluated}",
-                soft_wrap=True,
-            )
-    logs, problems = sum(r.num_logs for r in found), sum(len(r.problems) for r in found)
+            say(f"run {run.hash}: its solutions were not evaluated: {run.unevaluated}")
+    logs, problems = sum(r.logs for r in found), sum(len(r.problems) for r in found)
     found_in = f"{problems} damaged file{'s' * (problems > 1)} in {len(damaged)} of them"
     said = found_in if damaged else "all is well"
-    console.print(f"{len(found)} runs, {logs} logs: {said}", soft_wrap=True)
+    say(f"{len(found)} runs, {logs} logs: {said}")
     return 1 if damaged else 0
 
 
 def _name(outputs: Path, prefix: str) -> str:
     """Return the name of the run directory that a prefix names, whatever is damaged in it."""
     names = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
-    try:
-        return names[0] if len(names) == 1 else resolve(outputs, prefix).hash12
-    except UnknownHash as error:
-        raise with_candidates(error, outputs) from None
+    return names[0] if len(names) == 1 else stored_run(prefix).hash12
 
 
 def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
@@ -155,12 +142,10 @@ def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
 
 
 def _table(runs: Sequence[Checked]) -> Table:
-    table = new_table(f"damaged runs in {outputs_root()}")
-    add_hash_column(table, "run")
-    add_columns(table, "logs", right=True)
-    add_columns(table, "damaged files")
+    title = f"damaged runs in {outputs_root()}"
+    table = new_table(title, hash_column("run"), *right("logs"), "damaged files")
     for run in runs:
         lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
         more = [f"… {len(lines) - SHOWN} more"] if lines[SHOWN:] else []
-        table.add_row(run.name[:HASH_LENGTH], str(run.num_logs), "\n".join(lines[:SHOWN] + more))
+        table.add_row(run.hash[:HASH_LENGTH], str(run.logs), "\n".join(lines[:SHOWN] + more))
     return table

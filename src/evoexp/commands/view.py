@@ -2,7 +2,8 @@
 
 import argparse
 
-from evoexp.commands.motion_words import add_motion_arguments, output_path, write
+from evoexp.commands.chosen_motions import add_motion_arguments, output_path, recordings, write
+from evoexp.playback.player_page import page
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -12,10 +13,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    from evoexp.commands.motion_files import file_name, recordings  # Pinocchio, coal and numba
-    from evoexp.playback.player_page import page
-
     motions = recordings(arguments)
-    names = [file_name(each) for each in motions]
-    write(output_path(arguments, names, ".html"), page(motions))
+    write(output_path(arguments, motions, ".html"), page(motions))
     return 0

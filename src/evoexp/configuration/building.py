@@ -6,6 +6,7 @@ from pydantic import ValidationError
 
 from evoexp.condition import PARTS, Condition, read_files
 from evoexp.configuration.experiment import Budget
+from evoexp.configuration.interpolations import fill_in
 from evoexp.configuration.named_states import with_named_states
 from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
 from evoexp.configuration.planning_groups import with_planning_group, with_shared_packages
@@ -18,6 +19,20 @@ from evoexp.validation import TARGET, Settings, build, settings_error
 MOST_REPLICATES = 1_000_000  # of one condition, each of which is a file
 
 AnySettings = TypeVar("AnySettings", bound=Settings)
+
+
+def condition_of(config: dict[str, Any], budget: Budget) -> tuple[Condition, bool]:
+    """Build a composed configuration; return it with whether the budget capped it."""
+    settings = {key: value for key, value in config.items() if key != "conditions"}
+    plain, cap = fill_in(settings, settings), budget.max_generations
+    asked = (plain.get("ga") or {}).get("num_generations")
+    is_capped = cap is not None and isinstance(asked, int) and asked > cap
+    if is_capped:  # before a planner takes it in
+        settings["ga"] = settings["ga"] | {"num_generations": cap}
+        plain = fill_in(settings, settings)
+    built = build_condition(plain, str(config["planner"]))
+    most = budget.collision_queries
+    return built._replace(max_collision_queries=most), is_capped or most is not None
 
 
 def build_condition(config: dict[str, Any], planner: str) -> Condition:

@@ -23,12 +23,11 @@ from omegaconf.errors import OmegaConfBaseException
 
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.condition import Condition
 from evoexp.configuration.assignment import assign_all
-from evoexp.configuration.building import build_condition, build_settings, planned_replicates
+from evoexp.configuration.building import build_settings, planned_replicates
 from evoexp.configuration.conditions import Builder, Built, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
-from evoexp.configuration.interpolations import MARK, NotWhole, fill_in, refuse_functions
+from evoexp.configuration.interpolations import fill_in
 from evoexp.configuration.option_files import check_file, check_files
 from evoexp.configuration.overrides import (
     ADD,
@@ -47,19 +46,8 @@ from evoexp.configuration.overrides import (
     sweep,
 )
 from evoexp.configuration.problem_folders import FOLDER
-from evoexp.configuration.refusals import (
-    uncomposed,
-    unparsed,
-    unresolved,
-    without_header,
-)
-from evoexp.configuration.search_path import (
-    EXPERIMENT,
-    find,
-    folders,
-    groups,
-    is_file,
-)
+from evoexp.configuration.refusals import uncomposed, unparsed, without_header
+from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, is_file
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
@@ -90,9 +78,7 @@ def expand(
     files = [None if name is None else find(EXPERIMENT, name) for name in names]
     if len({file and file.name for file in files}) < len(files):
         raise SettingError(EXPERIMENT, "names that differ", ",".join(map(str, names)))
-    with tempfile.TemporaryDirectory() as root:
-        compose = _Composer(Path(root))
-        return [_expand_one(file, given, only, compose) for file in files]
+    return [_expand_one(file, given, only) for file in files]
 
 
 def parse(text: str) -> Override:
@@ -130,21 +116,22 @@ def _with_text_keys(value: Any) -> Any:
     return [_with_text_keys(item) for item in value] if isinstance(value, list) else value
 
 
-class _Composer:
-    """Composes configurations of one expansion; Hydra composes every choice of options once.
+class Composer:
+    """Composes configurations of one experiment; Hydra composes every choice of options once.
 
     Hydra applies settings, too, but takes a tenth of a second and more each time, and reaches no
     setting in a list.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, file: Option | None) -> None:
         """Begin with the shipped root configuration.
 
         Args:
-            root: An empty folder. It comes first in the search path and holds, beside the root,
-                experiments that are given as files: of a user's folders only the options count.
+            root: An empty folder. It comes first in the search path and holds, beside the root, an
+                experiment that is given as a file: of a user's folders only the options count.
+            file: The experiment.
         """
-        self._root = root
+        self.root, self.file = root, file
         self._known: dict[tuple[str, ...], Composed] = {}
         shutil.copy(shipped.config_directory() / "config.yaml", root)
         (root / EXPERIMENT).mkdir()
@@ -153,23 +140,20 @@ class _Composer:
                 check_files(folder.path)
         self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
 
-    def __call__(self, overrides: Choice, file: Option | None) -> Composed:
+    def __call__(self, overrides: Choice) -> Composed:
         """Return the options that overrides choose, with the settings that overrides change.
-
-        Args:
-            overrides: By key, each with one value.
-            file: The experiment.
 
         Raises:
             EvoexpError: If they cannot be composed.
         """
-        base = self.chosen(overrides, file)
+        base = self.chosen(overrides)
         config = copy.deepcopy(base.config)
         assign_all(config, {key: each for key, each in overrides.items() if key not in groups()})
         return Composed(config, base.options)
 
-    def chosen(self, overrides: Choice, file: Option | None) -> Composed:
+    def chosen(self, overrides: Choice) -> Composed:
         """Return the options that overrides choose, with the settings that these have."""
+        file = self.file
         choices = {key: overrides[key] for key in sorted(overrides) if key in groups()}
         words = [_choosing(override) for override in choices.values()]
         names = {group: override.option() for group, override in choices.items()}
@@ -180,16 +164,17 @@ class _Composer:
         if key not in self._known:
             if file is not None and is_file(file.origin):
                 check_file(Path(file.path))
-                shutil.copy(file.path, self._root / EXPERIMENT / f"{file.name}.yaml")
+                shutil.copy(file.path, self.root / EXPERIMENT / f"{file.name}.yaml")
             try:
-                self._known[key] = self._by_hydra(words, file)
+                self._known[key] = self.by_hydra(words)
             except _COMPOSER as error:
                 raise uncomposed(error, names, file) from None
         return self._known[key]
 
-    def _by_hydra(self, words: list[str], file: Option | None) -> Composed:
+    def by_hydra(self, words: list[str]) -> Composed:
+        """Have Hydra compose options, chosen by words of its own grammar."""
         words = [*words, f"hydra.searchpath=[{self._path}]"]
-        with hydra.initialize_config_dir(str(self._root), version_base="1.3"):
+        with hydra.initialize_config_dir(str(self.root), version_base="1.3"):
             composed = hydra.compose("config", overrides=words, return_hydra_config=True)
         taken = composed.hydra.runtime.choices
         config: Any = OmegaConf.to_container(composed, resolve=False)
@@ -203,7 +188,7 @@ class _Composer:
                 raise SettingError(group, "a mapping of settings", config[group])
         named = ((group, taken.get(group)) for group in groups() if group != EXPERIMENT)
         options = tuple(find(group, name) for group, name in named if name)
-        return Composed(config, options if file is None else (file, *options))
+        return Composed(config, options if self.file is None else (self.file, *options))
 
 
 def _choosing(override: Override) -> str:
@@ -220,59 +205,49 @@ def _quoted(text: str) -> str:
     return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
-def _expand_one(
-    file: Option | None, overrides: Choice, only: Sequence[str], compose: _Composer
-) -> Experiment:
-    base, budget, builder = _builder(file, overrides, compose)
-    built = builder.build_all(overrides, only)
-    return Experiment(
-        builder.name,
-        budget.name,
-        tuple(Labelled(label, each.condition) for label, each in built.items()),
-        planned_replicates(base["num_replicates"], budget),
-        build_settings(RunnerSettings, base["runner"], "runner"),
-        build_settings(ReportSettings, base["report"], "report"),
-        _is_changed(file, overrides, only, built, compose),
-        {label: each.options for label, each in built.items()},
-        tuple(label for label, each in built.items() if each.is_capped),
-    )
+def _expand_one(file: Option | None, overrides: Choice, only: Sequence[str]) -> Experiment:
+    with tempfile.TemporaryDirectory() as root:
+        compose = Composer(Path(root), file)
+        base, builder = _builder(compose, overrides)
+        built = builder.build_all(overrides, only)
+        return Experiment(
+            builder.name,
+            builder.budget.name,
+            tuple(Labelled(label, each.condition) for label, each in built.items()),
+            planned_replicates(base["num_replicates"], builder.budget),
+            build_settings(RunnerSettings, base["runner"], "runner"),
+            build_settings(ReportSettings, base["report"], "report"),
+            _is_changed(compose, overrides, only, built),
+            {label: each.options for label, each in built.items()},
+            tuple(label for label, each in built.items() if each.is_capped),
+        )
 
 
-def _builder(
-    file: Option | None, overrides: Choice, compose: _Composer
-) -> tuple[dict[str, Any], Budget, Builder]:
-    """Return the settings that all conditions share, their budget, and who builds them."""
+def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Builder]:
+    """Return the settings that all conditions share, and who builds the conditions."""
     first = {key: each for key, each in next(sweep(overrides)).items() if key != FOLDER}
-    base = _shared(compose(concerning(first, compose.chosen(first, file).config), file).config)
+    config = compose(concerning(first, compose.chosen(first).config)).config
+    # settings outside the conditions may be taken from those of a condition
+    shared = {name: config[name] for name in NOT_IDENTITY if name in config}
+    base = fill_in(shared, config)
     budget = build_settings(Budget, base["budget"], "budget")
-    builder = Builder(
-        file.name if file else "custom",
-        list(_entries(base["conditions"])),
-        lambda choice: compose.chosen(choice, file),
-        lambda choice: compose(choice, file),
-        lambda config: _condition(config, budget),
-    )
-    return base, budget, builder
+    name = compose.file.name if compose.file else "custom"
+    return base, Builder(name, list(_entries(config["conditions"])), compose, budget)
 
 
 def _is_changed(
-    file: Option | None,
-    overrides: Choice,
-    only: Sequence[str],
-    built: Mapping[str, Built],
-    compose: _Composer,
+    compose: Composer, overrides: Choice, only: Sequence[str], built: Mapping[str, Built]
 ) -> bool:
     """Whether the conditions differ from those that the experiment has by itself."""
     plain = {key: each for key, each in overrides.items() if key in NOT_IDENTITY}
-    if file is None or (len(plain) == len(overrides) and not only):
-        return file is None
+    if compose.file is None or (len(plain) == len(overrides) and not only):
+        return compose.file is None
     try:
-        own = _builder(file, plain, compose)[2].build_all(plain, ())
+        own = _builder(compose, plain)[1].build_all(plain, ())
     except EvoexpError:  # a file that the experiment names need not be there
         return True
-    return [(label, each.condition.id) for label, each in built.items()] != [
-        (label, each.condition.id) for label, each in own.items()
-    ]
+    identities = [[(k, each.condition.id) for k, each in of.items()] for of in (built, own)]
+    return identities[0] != identities[1]
 
 
 def _entries(conditions: Any) -> Iterator[Entry]:
@@ -283,35 +258,3 @@ def _entries(conditions: Any) -> Iterator[Entry]:
         if not isinstance(entry, list) or not all(isinstance(text, str) for text in entry):
             raise SettingError(f"conditions.{template}", "a list of overrides", entry)
         yield from expand_entry(str(template), map(parse, entry))
-
-
-def _condition(config: dict[str, Any], budget: Budget) -> tuple[Condition, bool]:
-    """Build a composed configuration; return it with whether the budget capped it."""
-    plain, cap = _resolved(config), budget.max_generations
-    asked = (plain.get("ga") or {}).get("num_generations")
-    is_capped = cap is not None and isinstance(asked, int) and asked > cap
-    if is_capped:  # before a planner takes it in
-        plain = _resolved(config | {"ga": config["ga"] | {"num_generations": cap}})
-    built = build_condition(plain, str(config["planner"]))
-    most = budget.collision_queries
-    return built._replace(max_collision_queries=most), is_capped or most is not None
-
-
-def _shared(config: dict[str, Any]) -> dict[str, Any]:
-    """Return settings outside the conditions; they may be taken from those of a condition."""
-    shared = {name: config[name] for name in NOT_IDENTITY if name in config}
-    shared = _resolved(config) if MARK in str(shared) else shared
-    return shared | {"conditions": config["conditions"]}  # whose overrides are resolved when set
-
-
-def _resolved(config: dict[str, Any]) -> dict[str, Any]:
-    """Return settings as plain data with their interpolations filled in."""
-    try:
-        return fill_in(config)
-    except NotWhole:
-        refuse_functions(config)
-    try:
-        plain: Any = OmegaConf.to_container(OmegaConf.create(config), resolve=True)
-    except (*_COMPOSER, RecursionError) as error:
-        raise unresolved(error, config) from None
-    return dict(plain)

@@ -5,11 +5,13 @@ setting; one that concerns none is refused.
 """
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple, Protocol
 
 from evoexp.condition import Condition
 from evoexp.configuration.assignment import known_instead
+from evoexp.configuration.building import condition_of
+from evoexp.configuration.experiment import Budget
 from evoexp.configuration.interpolations import MARK
 from evoexp.configuration.labels import Crossed, Group, labels_of, refuse_equal_labels, rejoined
 from evoexp.configuration.overrides import (
@@ -29,15 +31,10 @@ Entry = tuple[str, Choice]  # label and overrides, each with one value, of an ex
 
 
 class Composed(NamedTuple):
-    """Chosen options, composed.
+    """Chosen options, composed."""
 
-    Attributes:
-        config: Their settings as plain data, interpolations as they are written.
-        options: The option taken of each group.
-    """
-
-    config: dict[str, Any]
-    options: tuple[Option, ...]
+    config: dict[str, Any]  # their settings as plain data, interpolations as they are written
+    options: tuple[Option, ...]  # the option taken of each group
 
 
 class Built(NamedTuple):
@@ -48,28 +45,32 @@ class Built(NamedTuple):
     is_capped: bool
 
 
+class Composes(Protocol):
+    """Composes configurations of one experiment."""
+
+    def __call__(self, overrides: Choice) -> Composed:
+        """Return the options that overrides choose, with the settings that overrides change."""
+
+    def chosen(self, overrides: Choice) -> Composed:
+        """Return the options that overrides choose, with the settings that these have."""
+
+
 class Builder:
     """Builds the conditions of an experiment at one budget, each choice of overrides once."""
 
     def __init__(
-        self,
-        name: str,
-        entries: Sequence[Entry],
-        choose: Callable[[Choice], Composed],
-        compose: Callable[[Choice], Composed],
-        build: Callable[[dict[str, Any]], tuple[Condition, bool]],
+        self, name: str, entries: Sequence[Entry], compose: Composes, budget: Budget
     ) -> None:
-        """Keep the experiment and the steps from a choice to a condition.
+        """Keep the experiment, and who composes it.
 
         Args:
             name: Of the experiment, which is the label of a condition that has no other.
             entries: Of the experiment's file.
-            choose: Composes the options of a choice, without its settings.
             compose: Composes a choice.
-            build: Builds a composed condition; tells whether the budget capped it.
+            budget: Caps the conditions.
         """
-        self.name = name
-        self._entries, self._choose, self._compose, self._build = entries, choose, compose, build
+        self.name, self.budget = name, budget
+        self._entries, self._compose = entries, compose
         self._known: dict[frozenset[str], Built] = {}
 
     def build_all(self, overrides: Choice, only: Sequence[str]) -> dict[str, Built]:
@@ -117,7 +118,7 @@ class Builder:
         key = frozenset(each.word for each in choice.values() if each.root not in NOT_IDENTITY)
         if key not in self._known:
             composed = self._compose(choice)
-            condition, is_capped = self._build(composed.config)
+            condition, is_capped = condition_of(composed.config, self.budget)
             self._known[key] = Built(condition, composed.options, is_capped)
         return self._known[key]
 
@@ -148,18 +149,18 @@ class Builder:
             choice: Of the command line, each with one value.
             own: Of the condition's entry.
         """
-        planner = str(self._choose({**own, **choice}).config.get("planner"))
+        planner = str(self._compose.chosen({**own, **choice}).config.get("planner"))
         parts = [key for key in choice if key in PLANNER_PARTS and choice[key].option()]
         not_taken = {key for key in parts if f"{MARK}{key}" not in planner}
         choice = {key: each for key, each in choice.items() if key not in not_taken}
-        return concerning(choice, self._choose({**own, **choice}).config)
+        return concerning(choice, self._compose.chosen({**own, **choice}).config)
 
     def _refuse_unused(self, overrides: Choice, rows: Sequence[Crossed]) -> None:
         """Refuse an override of the command line that concerns none of the conditions."""
         for key, override in overrides.items():
             if any(key in row.typed for row in rows):
                 continue
-            configs = [self._choose(row.choice).config for row in rows]
+            configs = [self._compose.chosen(row.choice).config for row in rows]
             known = {name for each in configs for name in known_instead(each, override) or ()}
             if known:
                 raise UnknownSetting(key, sorted(known))

@@ -23,19 +23,13 @@ Queries = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=LARGEST_CAP)]
 
 
 class Budget(Settings):
-    """A cap on what an experiment may cost.
+    """A cap on what an experiment may cost."""
 
-    Attributes:
-        name: `paper` caps nothing.
-        max_replicates: Cap on the number of replicates.
-        max_generations: Cap on the number of generations; changes the condition.
-        collision_queries: Cap on the configurations asked for: a run ends before the generation
-            that takes it beyond; changes the condition.
-    """
-
-    name: str
-    max_replicates: Count | None
-    max_generations: Count | None
+    name: str  # `paper` caps nothing
+    max_replicates: Count | None  # cap on the number of replicates
+    max_generations: Count | None  # cap on the number of generations; changes the condition
+    # cap on the configurations asked for: a run ends before the generation that takes it beyond;
+    # changes the condition
     collision_queries: Queries | None = None
 
 
@@ -47,31 +41,20 @@ class Labelled(NamedTuple):
 
 
 class Experiment(NamedTuple):
-    """The conditions that one call asks for, and how they are run and reported.
+    """The conditions that one call asks for, and how they are run and reported."""
 
-    Attributes:
-        name: Of the experiment file; "custom" without one.
-        budget: Name of the budget.
-        conditions: In the order of the file, each condition once.
-        num_replicates: Of every condition, but for references (`Condition.num_replicates`).
-        runner: How to run them.
-        report: How to report them.
-        changed: Whether overrides or `--only` make this another set of conditions than the file's
-            own.
-        options: Label → the option that was taken of each group, the experiment file included. No
-            part of any identity: the same settings may come from other options.
-        capped: Labels of the conditions that the budget changed.
-    """
-
-    name: str
-    budget: str
-    conditions: tuple[Labelled, ...]
-    num_replicates: int
-    runner: RunnerSettings
-    report: ReportSettings
+    name: str  # of the experiment file; "custom" without one
+    budget: str  # name of the budget
+    conditions: tuple[Labelled, ...]  # in the order of the file, each condition once
+    num_replicates: int  # of every condition, but for references (`Condition.num_replicates`)
+    runner: RunnerSettings  # how to run them
+    report: ReportSettings  # how to report them
+    # whether overrides or `--only` make this another set of conditions than the file's own
     changed: bool
+    # label → the option that was taken of each group, the experiment file included. No part of
+    # any identity: the same settings may come from other options.
     options: Mapping[str, tuple[Option, ...]]
-    capped: tuple[str, ...]
+    capped: tuple[str, ...]  # labels of the conditions that the budget changed
 
     @property
     def report_name(self) -> str:

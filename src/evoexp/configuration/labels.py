@@ -26,25 +26,16 @@ PLANNER = ("planner", *AROUND)  # groups whose option is named by the planner th
 
 
 class Crossed(NamedTuple):
-    """An entry of an experiment's conditions with one value of each override.
+    """An entry of an experiment's conditions with one value of each override."""
 
-    Attributes:
-        experiment: Its name is the label where nothing else tells conditions apart.
-        entry: Label in the experiment's file; empty if the file labels no conditions.
-        swept: Key → `name=value` of the overrides that the command line sweeps over.
-        problem: Name of the problem of a folder of problems; else empty.
-        own: Overrides of the entry, each with one value.
-        typed: Overrides of the command line that concern the condition, each with one value.
-        choice: All overrides of the condition, each with one value.
-    """
-
-    experiment: str
-    entry: str
+    experiment: str  # its name is the label where nothing else tells conditions apart
+    entry: str  # label in the experiment's file; empty if the file labels no conditions
+    # key → `name=value` of the overrides that the command line sweeps over
     swept: Mapping[str, str]
-    problem: str
-    own: Choice
-    typed: Choice
-    choice: Choice
+    problem: str  # name of the problem of a folder of problems; else empty
+    own: Choice  # overrides of the entry, each with one value
+    typed: Choice  # overrides of the command line that concern the condition, each with one value
+    choice: Choice  # all overrides of the condition, each with one value
 
     @property
     def label(self) -> str:
@@ -57,17 +48,11 @@ class Crossed(NamedTuple):
 
 
 class Group(NamedTuple):
-    """All combinations that are one condition.
+    """All combinations that are one condition."""
 
-    Attributes:
-        members: In the order of the experiment.
-        planner: Name of the component of its planner.
-        is_capped: Whether the budget capped it.
-    """
-
-    members: Sequence[Crossed]
-    planner: str
-    is_capped: bool
+    members: Sequence[Crossed]  # in the order of the experiment
+    planner: str  # name of the component of its planner
+    is_capped: bool  # whether the budget capped it
 
 
 Holds = Callable[[Crossed, Choice], bool]  # whether a condition is the same with another choice

@@ -18,33 +18,20 @@ SCALARS = ("seed", "num_replicates")  # settings outside the groups
 
 
 class Value(NamedTuple):
-    """A value of an override.
+    """A value of an override."""
 
-    Attributes:
-        text: As it was typed.
-        data: As plain data.
-    """
-
-    text: str
-    data: Any
+    text: str  # as it was typed
+    data: Any  # as plain data
 
 
 class Override(NamedTuple):
-    """A change of a configuration.
+    """A change of a configuration."""
 
-    Attributes:
-        prefix: `ADD`, `FORCE`, `DELETE`, or empty.
-        key: A group, or the dotted path of a setting.
-        values: One value, several if they are swept over, none of a deletion.
-        is_swept: Whether the values are swept over.
-        text: As it was typed.
-    """
-
-    prefix: str
-    key: str
-    values: tuple[Value, ...]
-    is_swept: bool
-    text: str
+    prefix: str  # `ADD`, `FORCE`, `DELETE`, or empty
+    key: str  # a group, or the dotted path of a setting
+    values: tuple[Value, ...]  # one value, several if they are swept over, none of a deletion
+    is_swept: bool  # whether the values are swept over
+    text: str  # as it was typed
 
     @property
     def root(self) -> str:

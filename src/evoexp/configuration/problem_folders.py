@@ -17,17 +17,11 @@ MOST_PROBLEMS = 10_000  # conditions of one call
 
 
 class ProblemFiles(NamedTuple):
-    """A problem of a folder.
+    """A problem of a folder."""
 
-    Attributes:
-        name: The folder's name and the number: `box_panda 0001`.
-        scene: Path of the planning scene.
-        request: Path of the motion plan request.
-    """
-
-    name: str
-    scene: Path
-    request: Path
+    name: str  # the folder's name and the number: `box_panda 0001`
+    scene: Path  # path of the planning scene
+    request: Path  # path of the motion plan request
 
 
 def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:

@@ -7,8 +7,6 @@ from typing import Any
 
 import yaml
 
-from evoexp.configuration.interpolations import interpolations
-from evoexp.configuration.overrides import PLANNER_PARTS
 from evoexp.configuration.search_path import EXPERIMENT, groups, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption
 from evoexp.shipped import Option
@@ -92,29 +90,6 @@ def _miswritten(file: Option) -> EvoexpError | None:
             if group in groups() and name is not None and str(name) not in options(group):
                 return UnknownOption(group, str(name), options(group))
     return None
-
-
-def unresolved(error: Exception, config: Mapping[str, Any]) -> SettingError:
-    """Return the refusal of an interpolation, `${name}`, that names nothing.
-
-    Args:
-        error: Of the composer.
-        config: The composed settings, as plain data.
-    """
-    text = str(error)
-    if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in text]:
-        return SettingError(absent[0], chosen(absent[0]), None)
-    found = dict(interpolations(config))
-    field = str(getattr(error, "full_key", None) or "")
-    if field not in found:
-        field = next((key for key, value in found.items() if value in text), next(iter(found), ""))
-    if name := re.search(r"(?:key|variable) '([^']+)' not found", text):
-        reason = f"there is no '{name[1]}'"
-    else:
-        is_circle = isinstance(error, RecursionError) or "recursi" in text.lower()
-        reason = "it leads round in a circle" if is_circle else "it cannot be read"
-    must = f"a value, or the name of another setting in ${{…}} ({reason})"
-    return SettingError(field, must, found.get(field))
 
 
 def _first_line(error: Exception) -> str:

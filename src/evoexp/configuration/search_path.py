@@ -32,15 +32,10 @@ _given: ContextVar[tuple[str, ...]] = ContextVar("_given", default=())
 
 
 class Folder(NamedTuple):
-    """A folder of options.
+    """A folder of options."""
 
-    Attributes:
-        path: Absolute.
-        origin: As it is shown: the folder as it was typed, `my-planner 0.3`, or `evoexp`.
-    """
-
-    path: Path
-    origin: str
+    path: Path  # absolute
+    origin: str  # as it is shown: the folder as it was typed, `my-planner 0.3`, or `evoexp`
 
 
 @contextlib.contextmanager

@@ -1,16 +1,26 @@
-"""Errors that mean that the system gives no more memory, whichever library noticed it.
+"""The process of a command: a folder for its temporary files, and errors that mean no memory.
+
+Whatever library makes a temporary file makes it in the folder. The command holds a lock there,
+which the system releases when the process ends, however it ends: a folder of this user whose lock
+is free was left by a command that was killed, and is removed. Nothing else is ever removed.
 
 Where addresses are limited (`ulimit -v`), a library that cannot be loaded is an `ImportError`, a
 thread that cannot be started a `RuntimeError`, and some libraries end the process by themselves.
 """
 
+import atexit
 import contextlib
 import errno
+import fcntl
 import os
 import resource
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+PREFIX = "evoexp-command-"
+LOCK = "owner.lock"
 MEGABYTE = 10**6
 LEAST_MB = 250  # [MB] of addresses, below which no command can load its libraries
 LARGEST_MB = 400  # [MB] of addresses that loading one library and its kernels takes, at most
@@ -18,7 +28,41 @@ _TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new th
 _STATUS = Path("/proc/self/statm")
 
 
-def refuse_too_little() -> None:
+def use_temporary_folder() -> None:
+    """Have temporary files of this process, and of those it starts, in a folder of its own.
+
+    Without one, where none can be made, they are where they would be anyhow.
+    """
+    with contextlib.suppress(OSError):
+        place = Path(tempfile.gettempdir())
+        remove_abandoned(place)
+        folder = place / f"{PREFIX}{os.urandom(8).hex()}"
+        folder.mkdir(mode=0o700)
+        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)  # held until the process ends
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if (folder / LOCK).exists():  # else another command has just removed it
+            atexit.register(_remove, folder, os.getpid())
+            os.environ["TMPDIR"] = tempfile.tempdir = str(folder)
+
+
+def remove_abandoned(place: Path) -> None:
+    """Remove the folders of commands that have ended without removing them."""
+    for folder in place.glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
+            if folder.lstat().st_uid == os.geteuid() and not folder.is_symlink():
+                # one without a lock may just begin
+                lock = os.open(folder / LOCK, os.O_RDWR | os.O_NOFOLLOW)
+                stack.callback(os.close, lock)
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # fails while its owner lives
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _remove(folder: Path, process: int) -> None:
+    if os.getpid() == process:  # and not a copy of it
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def refuse_too_little_memory() -> None:
     """Refuse limits with which libraries end the process before they can be asked.
 
     Raises:
@@ -29,15 +73,15 @@ def refuse_too_little() -> None:
         raise MemoryError(f"a command needs {LEAST_MB} MB of addresses at least")
 
 
-def shortage(error: BaseException) -> str:
+def memory_shortage(error: BaseException) -> str:
     """Describe the lack of memory that an error means; empty if it means something else."""
     texts = [text for each in _chain(error) if (text := _shortage(each))]
+    allowed = _allowed()
     if not texts and isinstance(error, ImportError | OSError | RuntimeError | SystemError):
-        left = _left()
-        texts = [_first_line(error)] if left is not None and left < LARGEST_MB * MEGABYTE else []
+        is_little = allowed is not None and allowed - _used() < LARGEST_MB * MEGABYTE
+        texts = [_first_line(error)] if is_little else []
     if not texts:
         return ""
-    allowed = _allowed()
     limit = f" (`ulimit -v` allows {allowed // MEGABYTE:,} MB)" if allowed is not None else ""
     return f"out of memory: {texts[-1]}{limit}"
 
@@ -73,10 +117,8 @@ def _allowed() -> int | None:
     return None if soft in (resource.RLIM_INFINITY, -1) else soft
 
 
-def _left() -> int | None:
-    """Return how many addresses this process may still take [B]; None: that is not known."""
-    allowed = _allowed()
+def _used() -> int:
+    """Return how many addresses this process has taken [B], as far as it is known."""
     with contextlib.suppress(OSError, ValueError):
-        pages = int(_STATUS.read_text().split()[0])
-        return None if allowed is None else allowed - pages * os.sysconf("SC_PAGE_SIZE")
-    return None
+        return int(_STATUS.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    return 0

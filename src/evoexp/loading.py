@@ -1,15 +1,13 @@
 """The Python door: stored results as pandas frames."""
 
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 import pandas as pd
 
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
 from evoexp.store.run_context import ORIGIN, run_context
@@ -20,17 +18,14 @@ SEED = "seed"
 
 
 class Frames(NamedTuple):
-    """Results of one or several conditions.
+    """Results of one or several conditions."""
 
-    Attributes:
-        generations: One row per generation of every finished replicate, columns of
-            `evoexp.records.GenerationRow`.
-        summaries: One row per replicate, done or failed, columns of
-            `evoexp.records.ReplicateSummary`, `seed`, and the settings in which the conditions
-            differ, by the names that they have in `summary.parquet`.
-    """
-
+    # one row per generation of every finished replicate, columns of
+    # `evoexp.records.GenerationRow`
     generations: pd.DataFrame
+    # one row per replicate, done or failed, columns of `evoexp.records.ReplicateSummary`, `seed`,
+    # and the settings in which the conditions differ, by the names that they have in
+    # `summary.parquet`
     summaries: pd.DataFrame
 
 
@@ -68,7 +63,7 @@ def load(
     with searched_first(map(str, config_dir)):
         known = options("experiment")
         experiments = (
-            expansions.expand(
+            compose.expand(
                 [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
             )
             if what in known or is_file(what)
@@ -128,12 +123,3 @@ def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFram
     ]
     whole = pd.concat(parts, ignore_index=True)
     return whole[["label", *frame.columns]]
-
-
-class _CallableModule(ModuleType):
-    """`evoexp.load` names this module once it is imported: calling it calls the function."""
-
-    __call__ = staticmethod(load)
-
-
-sys.modules[__name__].__class__ = _CallableModule

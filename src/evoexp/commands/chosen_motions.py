@@ -1,0 +1,312 @@
+"""Motions that commands judge, show and write: of stored replicates, of logs, or out of a file."""
+
+import argparse
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evoexp.attachments import PREFIX, keep_all
+from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
+from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
+from evoexp.commands.stored_runs import origin_of, stored_or_shipped
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.errors import (
+    MotionFileError,
+    NothingStored,
+    RevisionMismatch,
+    SettingError,
+    printable,
+)
+from evoexp.paths.motion import Motion
+from evoexp.playback.recording import Heading, Recording, joints_of, record_motion
+from evoexp.playback.stored import stored_recording
+from evoexp.playback.timing import SpeedLimits
+from evoexp.playback.trajectory_files import Columns, JointTrajectory, fitted
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Robot
+from evoexp.store.chosen_logs import CHOICES, chosen_log
+from evoexp.store.files import write_file
+from evoexp.store.log_reader import read_log
+from evoexp.store.run_directory import RunDirectory, outputs_root
+
+FOLDER = "motions"  # of the outputs
+MANY = 4  # motions on one page
+JUDGED = "a joint trajectory: judged by its bodies, not by where it begins and ends"
+
+
+class FittingMotion(NamedTuple):
+    """A motion file in a condition whose shape of solutions it has."""
+
+    label: str  # of the condition
+    condition: Condition
+    planner: Any
+    problem: Any
+    solution: FloatArray  # flat; empty: the file holds a joint trajectory
+    motion: Motion | None  # None: the solution has none
+    remarks: tuple[str, ...] = ()  # on how a trajectory was read
+
+    @property
+    def is_trajectory(self) -> bool:
+        """Whether the file holds a joint trajectory, of which a planner knows no terms."""
+        return not self.solution.size
+
+
+# words of the command line
+
+
+def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
+    """Declare the arguments that choose motions, their speed, and the file to write."""
+    add_config_dir_argument(parser)
+    parser.add_argument(
+        "what",
+        nargs="+",
+        metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
+        help="any unique prefix of a run's hash, or a replicate's log; or a motion file, as for "
+        "evaluate, with an experiment",
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
+    texts = ("of least cost (the default)", "of greatest cost", "first refuted one")
+    for name, text in zip(CHOICES, texts, strict=True):
+        which.add_argument(
+            f"--{name}",
+            dest="choice",
+            action="store_const",
+            const=name,
+            help=f"the replicate: {text}",
+        )
+    parser.add_argument(
+        "--only", default="", metavar="LABEL", help="of an experiment's conditions, this one"
+    )
+    parser.add_argument(
+        "--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn"
+    )
+    parser.add_argument(
+        "--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/"
+    )
+
+
+def run_or_log(word: str) -> RunDirectory | Path:
+    """Return the run that a hash names, or the path of a log.
+
+    Raises:
+        EvoexpError: If the hash names none.
+    """
+    path = Path(word)
+    if path.suffix == ".mcap" or path.is_file():
+        return path
+    run = stored_or_shipped(word)
+    if isinstance(run, RunDirectory):
+        return run
+    raise NothingStored(f"condition {run.condition_id[:12]}: not run here; run it: {run.command}")
+
+
+def recordings(arguments: argparse.Namespace) -> list[Recording]:
+    """Return the motions that the arguments choose, in the order of the words.
+
+    Raises:
+        EvoexpError: One line says what is wrong.
+    """
+    limits, words = speed_limits(arguments), arguments.what
+    if any(is_override(word) or is_motion(word) for word in words):
+        return _recordings_of_file(words, arguments.only, limits)
+    if len(words) > MANY:
+        raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
+    choice = arguments.replicate if arguments.replicate is not None else arguments.choice
+    return [_stored_recording(run_or_log(word), choice, limits) for word in words]
+
+
+def single(arguments: argparse.Namespace) -> Recording:
+    """Return the single motion that the arguments choose.
+
+    Raises:
+        MotionFileError: If it is not one.
+    """
+    found = recordings(arguments)
+    if len(found) != 1:
+        raise MotionFileError(f"motion: one at a time, got {len(found)}; choose with --only LABEL")
+    return found[0]
+
+
+def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
+    """Return the joints' limits.
+
+    Raises:
+        SettingError: If one is not above 0.
+    """
+    for name in ("turn_speed", "slide_speed"):
+        value = getattr(arguments, name)
+        if value is not None and not 0.0 < value < math.inf:
+            raise SettingError(f"--{name.replace('_', '-')}", "greater than 0", value)
+    return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
+
+
+def _stored_recording(
+    run: RunDirectory | Path, choice: str | int | None, limits: SpeedLimits
+) -> Recording:
+    if isinstance(run, Path):
+        return stored_recording(run, run.name, limits)
+    log = chosen_log(run, CHOICES[0] if choice is None else choice)
+    origin = origin_of(run)
+    names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
+    try:
+        return stored_recording(log, " · ".join(dict.fromkeys(names)) or run.hash12, limits)
+    except RevisionMismatch as error:
+        raise RevisionMismatch(
+            f"run {run.hash12}: {error}; run it anew with what is installed: {run.command}"
+        ) from None
+
+
+def _recordings_of_file(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
+    """Return the motion of a file in every condition that it fits, in the first `MANY` of them."""
+    path, fitting = fitting_motions(words, only=(only,) if only else ())
+    for remark in fitting[0].remarks[1:]:
+        print(f"{path.name}: {remark}")
+    return [
+        record_motion(each.condition, each.motion, Heading(f"{path.name} · {each.label}"), limits)
+        for each in fitting[:MANY]
+    ]
+
+
+def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], ending: str) -> Path:
+    """Return the path of the file to write, which may take its name from the motions."""
+    if arguments.output is not None:
+        return Path(arguments.output)
+    names = [Path(word).stem for word in arguments.what if is_motion(word)]
+    names = names or [f"{m.condition_id[:12]}-{m.heading.replicate:04d}" for m in motions]
+    return outputs_root() / FOLDER / ("+".join(names) + ending)
+
+
+def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
+    """Write a file whole or not at all, and say where it is and how large."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, content)
+    if is_said:
+        size = len(content) / 1000
+        text = f"{size / 1000:.2f} MB" if size >= 1000 else f"{size:.0f} kB"
+        print(f"{printable(str(path))}  ({text})")
+
+
+# motions in conditions
+
+
+def fitting_motions(
+    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> tuple[Path, list[FittingMotion]]:
+    """Read the motion file among some words, and fit it into the conditions that the others choose.
+
+    Args:
+        words: One motion file, and overrides as `run` takes them.
+        multirun: Whether values with commas are swept over.
+        only: Labels of the conditions to keep.
+
+    Returns:
+        The file, and the conditions whose shape the motion has.
+
+    Raises:
+        MotionFileError: If there is not one file, if it cannot be read, or if it fits no condition.
+    """
+    files = [word for word in words if is_motion(word) or Path(word).exists()]
+    overrides = [word for word in words if word not in files]
+    if len(files) != 1:
+        found = " ".join(files) or "none"
+        raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
+    path = Path(files[0])
+    values = read_motion(path)
+    is_trajectory = isinstance(values, Columns | JointTrajectory)
+    fitting, misfits = [], dict[str, None]()
+    for experiment in compose.expand(overrides, multirun=multirun, only=only):
+        for label, condition in experiment.conditions:
+            planner, problem = condition.prepare()
+            if is_trajectory:
+                try:
+                    fitting.append(_trajectory(label, condition, values))
+                except ValueError as error:
+                    misfits[str(error)] = None
+                continue
+            shape = planner.shape(problem)
+            solution = flatten(values, shape)
+            if solution is None:
+                misfits[f"{label}: {shape_text(shape)}"] = None
+            else:
+                fitting.append(_solved(label, condition, solution))
+    if not fitting and is_trajectory:
+        raise MotionFileError(f"{path}: {'; '.join(misfits)}")
+    if not fitting:
+        plain = all("numbers" in text for text in misfits)
+        included = "" if plain else " (start and goal included)"
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(misfits)}{included}, was {shape_of(values)}"
+        )
+    return path, fitting
+
+
+def stored_motion(log: Path) -> FittingMotion:
+    """Return the best solution of a log, in the condition that is attached to it.
+
+    Raises:
+        CorruptLog: If the log cannot be trusted.
+        RevisionMismatch: If it was made by another revision of a component.
+    """
+    contents = read_log(log)
+    keep_all(data for name, data in contents.attachments.items() if name.startswith(PREFIX))
+    condition = Condition.from_json(contents.config_json)
+    label = f"{contents.condition_id[:12]} #{contents.replicate}"
+    return _solved(label, condition, contents.solutions[-1].values)
+
+
+def initial_motion(
+    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> FittingMotion:
+    """Return the best of an initial population, in the first of the conditions that words choose.
+
+    Raises:
+        MotionFileError: If their solutions have different shapes.
+    """
+    experiments = compose.expand(words, multirun=multirun, only=only)
+    conditions = [each for experiment in experiments for each in experiment.conditions]
+    prepared = [each.condition.prepare() for each in conditions]
+    shapes = dict.fromkeys(shape_text(planner.shape(problem)) for planner, problem in prepared)
+    if len(shapes) > 1:
+        raise MotionFileError(
+            f"--write: solutions differ in shape ({'; '.join(shapes)}); choose with --only "
+            + " | ".join(repr(each.label) for each in conditions)
+        )
+    (label, condition), (planner, problem) = conditions[0], prepared[0]
+    first = next(planner.evolve(problem, condition.rng(0)))
+    return _solved(label, condition, first.best)
+
+
+def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMotion:
+    planner, problem = condition.prepare()
+    motion = planner.motion(problem, solution)
+    return FittingMotion(label, condition, planner, problem, solution, motion)
+
+
+def _trajectory(
+    label: str, condition: Condition, given: Columns | JointTrajectory
+) -> FittingMotion:
+    """Return a trajectory as a motion of a condition's robot.
+
+    Raises:
+        ValueError: If it does not fit.
+    """
+    planner, problem = condition.prepare()
+    if not isinstance(condition.robot, Robot):
+        raise ValueError(f"{label}: its robot has no joints for a trajectory")
+    joints = joints_of(condition.robot.build())
+    motion, remarks = fitted(given, joints, condition.length_unit)
+    if len(planner.parts(problem, motion)) > 1:
+        raise ValueError(
+            f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
+            "tell; give the solution (evaluate HASH --write FILE.json)"
+        )
+    remarks = (JUDGED, *remarks)
+    return FittingMotion(label, condition, planner, problem, np.empty(0), motion, remarks)

@@ -1,0 +1,148 @@
+"""Reports and comparisons as they are asked for: of experiments with overrides, or stored runs."""
+
+import argparse
+import hashlib
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp.commands.arguments import folder_words, is_override
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import is_file, options
+from evoexp.errors import SettingError, UnknownOption
+from evoexp.report import build
+from evoexp.report.report_settings import ReportSettings
+from evoexp.shipped import shipped
+from evoexp.store.run_directory import outputs_root, resolve
+
+MAX_NAMED = 4  # runs whose hashes a report's name spells out
+_HASH = re.compile("[0-9a-fA-F]{4,64}")
+_SILENT = ("experiment", "budget", "runner")  # overrides that a report's command need not repeat
+
+
+class ReportRequest(NamedTuple):
+    """A report before it is drawn."""
+
+    request: build.Request
+    settings: ReportSettings
+    num_replicates: int | None  # planned for every condition; None: as many as each one has
+
+    def files(self) -> build.ReportFiles:
+        """Draw it; nothing is written."""
+        return build.derived(self.request, self.settings, outputs_root(), self.num_replicates)
+
+    def write(self) -> Path:
+        """Draw and write it; return the path of its page."""
+        return build.write_report(self.files())
+
+
+class Chosen(NamedTuple):
+    """Stored runs, or experiments with the overrides that apply to all of them."""
+
+    runs: dict[str, Condition]  # by the first digits of their hashes; empty: experiments are meant
+    experiments: list[Experiment]
+    overrides: list[str]
+    settings: ReportSettings  # of the first experiment; of runs those of the paper's report
+
+
+def chosen(arguments: argparse.Namespace) -> Chosen:
+    """Return the experiments or the stored runs that the words of a command choose.
+
+    Raises:
+        UnknownOption: If a word is neither an experiment nor a hash.
+        SettingError: If runs are given by their hashes, and overrides beside them.
+    """
+    multirun, only, known = arguments.multirun, arguments.only, options("experiment")
+    overrides = [word for word in arguments.overrides if is_override(word)]
+    names = [word for word in arguments.overrides if word not in overrides]
+    names, overrides = _with_budget(names, overrides)
+    unknown = [name for name in names if name not in known and not is_file(name)]
+    if names and len(unknown) == len(names) and all(map(_HASH.fullmatch, names)):
+        if overrides or multirun or only:
+            must = "left out where runs are given by their hashes"
+            raise SettingError("overrides", must, " ".join([*overrides, *only]) or "-m")
+        runs = [resolve(outputs_root(), name) for name in names]
+        conditions = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
+        plain = compose.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
+        return Chosen(conditions, [], [], plain.report)
+    for name in unknown:
+        if len(unknown) < len(names) or not _HASH.fullmatch(name):
+            raise UnknownOption("experiment", name, known)
+    words = [f"experiment={','.join(names)}"] if names else []
+    experiments = compose.expand(
+        [*words, *overrides], multirun=multirun or len(names) > 1, only=only
+    )
+    return Chosen({}, experiments, overrides, experiments[0].report)
+
+
+def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str], list[str]]:
+    """Read `rana_planar@smoke`, as the folder of a report is named, as its words.
+
+    Raises:
+        SettingError: If experiments are named with several budgets.
+    """
+    parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
+    budgets = {f"budget={budget}" for _, at, budget in parted if at}
+    if not budgets:
+        return list(names), overrides
+    budgets |= {word for word in overrides if word.startswith("budget=")}
+    if len(budgets) > 1 or not all(at for _, at, _ in parted):
+        raise SettingError("budget", "one for all experiments", " ".join(names))
+    return [name for name, _, _ in parted], [*overrides, *(budgets - set(overrides))]
+
+
+def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
+    """Return a report of every named experiment, or a single report of all named runs.
+
+    Raises:
+        EvoexpError: As `chosen`.
+    """
+    runs, experiments, overrides, settings = chosen(arguments)
+    if runs:
+        name = "+".join(runs)
+        if len(runs) > MAX_NAMED:
+            name = f"{len(runs)}_runs+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+        return [ReportRequest(build.Request(name, "", "", tuple(runs.items())), settings, None)]
+    return [
+        request_of(experiment, overrides, arguments.multirun, arguments.only, arguments.config_dir)
+        for experiment in experiments
+    ]
+
+
+def request_of(
+    experiment: Experiment,
+    overrides: Sequence[str],
+    multirun: bool = False,
+    only: Sequence[str] = (),
+    config_dir: Sequence[str] = (),
+) -> ReportRequest:
+    """Return the report of one experiment.
+
+    Args:
+        experiment: As `compose.expand` gives it.
+        overrides: As typed; `experiment=` among them is not looked at.
+        multirun: Whether `-m` was given.
+        only: The labels of `--only`.
+        config_dir: The folders of `--config-dir`.
+    """
+    file = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
+    words = [experiment.name] if experiment.name in options("experiment") else []
+    words = file if any(map(is_file, file)) else words
+    words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
+    words += [word for word in overrides if word.split("=")[0] not in _SILENT]
+    words += ["--only", ",".join(only)] if only else []
+    words += ["-m"] if multirun else []
+    words += folder_words(config_dir)
+    request = build.Request(
+        experiment.report_name,
+        experiment.name,
+        experiment.budget,
+        experiment.conditions,
+        shlex.join(words),
+        experiment.options,
+    )
+    return ReportRequest(request, experiment.report, experiment.num_replicates)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
-from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch

@@ -213,7 +213,7 @@ def summary_table(experiment: Experiment) -> Table:
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
         rows = stored_summaries(run)
-        planned = num_planned(run, condition.num_replicates(experiment.num_replicates))
+        planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
         columns = rows.select(["status", "solved", "best_cost", "cpu_s"]).to_pylist()
         done = [row for row in columns if row["status"] == "done"]
         table.add_row(

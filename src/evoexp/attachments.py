@@ -29,13 +29,9 @@ class MissingFile(EvoexpError):
 
 
 class File(Settings):
-    """A file, as its content.
+    """A file, as its content."""
 
-    Attributes:
-        sha256: Of the content, 64 hex digits.
-    """
-
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]  # of the content, 64 hex digits
 
     @property
     def content(self) -> bytes:

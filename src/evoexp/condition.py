@@ -110,20 +110,13 @@ class Prepared(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """All that can change a result: robot, scenario, planner with its parts, seed, and a cap.
+    """All that can change a result: robot, scenario, planner with its parts, seed, and a cap."""
 
-    Attributes:
-        robot: A component.
-        scenario: A component.
-        planner: A component that is a `planners.planner.Planner`.
-        seed: At least 0.
-        max_collision_queries: A run ends before the generation that takes it beyond; None: no cap.
-    """
-
-    robot: Component
-    scenario: Component
-    planner: Any
-    seed: int
+    robot: Component  # a component
+    scenario: Component  # a component
+    planner: Any  # a component that is a `planners.planner.Planner`
+    seed: int  # at least 0
+    # a run ends before the generation that takes it beyond; None: no cap
     max_collision_queries: int | None = None
 
     @classmethod

@@ -77,15 +77,10 @@ class TableError(ValueError):
 
 
 class TableRow(NamedTuple):
-    """A row of a table.
+    """A row of a table."""
 
-    Attributes:
-        line: Number of its line, from 1.
-        cells: Without blanks around them.
-    """
-
-    line: int
-    cells: list[str]
+    line: int  # number of its line, from 1
+    cells: list[str]  # without blanks around them
 
 
 def read_table(content: bytes) -> list[TableRow]:

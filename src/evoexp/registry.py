@@ -29,19 +29,12 @@ OWN = "evoexp"  # the distribution whose names are free
 
 
 class Registration(NamedTuple):
-    """A name that an installed distribution registers.
+    """A name that an installed distribution registers."""
 
-    Attributes:
-        name: Of a component, a page or a folder.
-        target: `module:attribute`.
-        distribution: As its metadata spell it, `my-planner`.
-        version: Of the distribution.
-    """
-
-    name: str
-    target: str
-    distribution: str
-    version: str
+    name: str  # of a component, a page or a folder
+    target: str  # `module:attribute`
+    distribution: str  # as its metadata spell it, `my-planner`
+    version: str  # of the distribution
 
     @property
     def is_own(self) -> bool:

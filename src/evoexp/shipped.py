@@ -17,20 +17,14 @@ ORIGIN = "evoexp"  # of shipped options
 
 
 class Option(NamedTuple):
-    """A file that a configuration chooses: one option of a group.
+    """A file that a configuration chooses: one option of a group."""
 
-    Attributes:
-        group: Such as `ga`.
-        name: Of the option in its group.
-        origin: The folder that it was found in, as typed; the package that brings it, as
-            `my-planner 0.3`; or `evoexp`. Of an experiment that is a file: its path, as typed.
-        path: Of the file, absolute.
-    """
-
-    group: str
-    name: str
+    group: str  # such as `ga`
+    name: str  # of the option in its group
+    # The folder that it was found in, as typed; the package that brings it, as `my-planner 0.3`; or
+    # `evoexp`. Of an experiment that is a file: its path, as typed.
     origin: str
-    path: str
+    path: str  # of the file, absolute
 
     @property
     def source(self) -> str:
@@ -48,21 +42,13 @@ def config_directory() -> Path:
 
 
 class Shipped(NamedTuple):
-    """One shipped condition at one budget.
+    """One shipped condition at one budget."""
 
-    Attributes:
-        experiment: Name of the experiment file.
-        label: Of the condition.
-        budget: `paper` or `smoke`.
-        condition_id: 64 hex digits.
-        digest: Of replicate 0; of a reference its cost, `cost 1.7…`, which is compared to 1e-9.
-    """
-
-    experiment: str
-    label: str
-    budget: str
-    condition_id: str
-    digest: str
+    experiment: str  # name of the experiment file
+    label: str  # of the condition
+    budget: str  # `paper` or `smoke`
+    condition_id: str  # 64 hex digits
+    digest: str  # of replicate 0; of a reference its cost, `cost 1.7…`, which is compared to 1e-9
 
     @property
     def command(self) -> str:

@@ -54,15 +54,10 @@ class Settings(BaseModel):
 
 
 class Component(Settings):
-    """Settings with a registered name, which `_target_` in a YAML option refers to.
+    """Settings with a registered name, which `_target_` in a YAML option refers to."""
 
-    Attributes:
-        component: The registered name.
-        revision: Raised whenever the same settings give other results than before; part of every
-            identity.
-    """
-
-    component: ClassVar[str]
+    component: ClassVar[str]  # the registered name
+    # raised whenever the same settings give other results than before; part of every identity
     revision: ClassVar[int] = 1
 
     @model_validator(mode="before")

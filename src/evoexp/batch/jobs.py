@@ -18,19 +18,12 @@ LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further repl
 
 
 class Job(NamedTuple):
-    """One replicate to run.
+    """One replicate to run."""
 
-    Attributes:
-        condition_id: 64 hex digits.
-        condition_json: Canonical form of the condition.
-        replicate: Its index.
-        files: Contents of the files that the condition refers to.
-    """
-
-    condition_id: str
-    condition_json: bytes
-    replicate: int
-    files: tuple[bytes, ...] = ()
+    condition_id: str  # 64 hex digits
+    condition_json: bytes  # canonical form of the condition
+    replicate: int  # its index
+    files: tuple[bytes, ...] = ()  # contents of the files that the condition refers to
 
     @property
     def key(self) -> tuple[str, int]:
@@ -39,27 +32,16 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """One replicate that ended.
+    """One replicate that ended."""
 
-    Attributes:
-        condition_id: 64 hex digits.
-        replicate: Its index.
-        reason: Reason of a failure, in one line; empty when done.
-        traceback: Of the failure.
-        content: The finished log; dropped once it is written.
-        wall_s: Duration [s].
-        summary: The row that the log holds; None for a failed one.
-        may_pass: Whether a failed one may be done another time: it took too long, or too much
-            memory.
-    """
-
-    condition_id: str
-    replicate: int
-    reason: str
-    traceback: str
-    content: bytes
-    wall_s: float
-    summary: ReplicateSummary | None = None
+    condition_id: str  # 64 hex digits
+    replicate: int  # its index
+    reason: str  # reason of a failure, in one line; empty when done
+    traceback: str  # of the failure
+    content: bytes  # the finished log; dropped once it is written
+    wall_s: float  # duration [s]
+    summary: ReplicateSummary | None = None  # the row that the log holds; None for a failed one
+    # whether a failed one may be done another time: it took too long, or too much memory
     may_pass: bool = False
 
     @property

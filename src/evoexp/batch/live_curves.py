@@ -16,19 +16,13 @@ _written: dict[str, float] = {}  # folder → when this process left a curve the
 
 
 class Curve(NamedTuple):
-    """Convergence of a replicate so far.
+    """Convergence of a replicate so far."""
 
-    Attributes:
-        condition_id: 64 hex digits.
-        replicate: Its index.
-        generation: The last one.
-        costs: Best cost so far at up to `NUM_POINTS` generations, from the first to the last one;
-            inf where nothing is solved.
-    """
-
-    condition_id: str
-    replicate: int
-    generation: int
+    condition_id: str  # 64 hex digits
+    replicate: int  # its index
+    generation: int  # the last one
+    # best cost so far at up to `NUM_POINTS` generations, from the first to the last one; inf where
+    # nothing is solved
     costs: list[float]
 
 

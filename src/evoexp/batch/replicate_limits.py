@@ -25,14 +25,10 @@ class TookTooLong(EvoexpError):
 
 
 class ReplicateLimits(NamedTuple):
-    """Limits of one replicate.
+    """Limits of one replicate."""
 
-    Attributes:
-        timeout_s: Wall time [s]; None: none.
-        memory_b: Memory that a worker may take for it beyond what it has [B]; None: none.
-    """
-
-    timeout_s: float | None = None
+    timeout_s: float | None = None  # wall time [s]; None: none
+    # memory that a worker may take for it beyond what it has [B]; None: none
     memory_b: int | None = None
 
     @property

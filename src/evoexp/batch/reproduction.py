@@ -43,19 +43,12 @@ _LONGEST = 60  # characters of one
 
 
 class FieldDifference(NamedTuple):
-    """A field or a record in which a log differs from its re-execution.
+    """A field or a record in which a log differs from its re-execution."""
 
-    Attributes:
-        name: Of the field, behind the record that it belongs to.
-        was: Its stored value.
-        now: The value found again.
-        size: Of the difference [-], see `difference`; inf of what is no number.
-    """
-
-    name: str
-    was: Any
-    now: Any
-    size: float
+    name: str  # of the field, behind the record that it belongs to
+    was: Any  # its stored value
+    now: Any  # the value found again
+    size: float  # of the difference [-], see `difference`; inf of what is no number
 
     @property
     def is_close(self) -> bool:
@@ -78,29 +71,19 @@ class FieldDifference(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A stored replicate beside its re-execution.
+    """A stored replicate beside its re-execution."""
 
-    Attributes:
-        condition_id: 64 hex digits.
-        replicate: Its index.
-        diverged_at: First generation whose link of the chain differs, None if none does.
-        digest_matches: Whether the ends of both chains agree (they include the last population).
-        num_generations: Generations compared, the initial one included.
-        environment: Differences between then and now, one line each.
-        fields: Differences of everything but the chain, in the order of `field_differences`.
-        inexact: Why these are compared to `TOLERANCE`; empty: to the bit.
-        farthest: Where numbers are compared instead of chains: the number that differs most, and
-            by how much [-]; None: chains are compared.
-    """
-
-    condition_id: str
-    replicate: int
-    diverged_at: int | None
-    digest_matches: bool
-    num_generations: int
-    environment: tuple[str, ...]
+    condition_id: str  # 64 hex digits
+    replicate: int  # its index
+    diverged_at: int | None  # first generation whose link of the chain differs, None if none does
+    digest_matches: bool  # whether the ends of both chains agree (they include the last population)
+    num_generations: int  # generations compared, the initial one included
+    environment: tuple[str, ...]  # differences between then and now, one line each
+    # differences of everything but the chain, in the order of `field_differences`
     fields: tuple[FieldDifference, ...] = ()
-    inexact: str = ""
+    inexact: str = ""  # why these are compared to `TOLERANCE`; empty: to the bit
+    # where numbers are compared instead of chains: the number that differs most, and by how much
+    # [-]; None: chains are compared
     farthest: tuple[str, float] | None = None
 
     @property
@@ -146,17 +129,11 @@ class Comparison(NamedTuple):
 
 
 class DamagedLog(NamedTuple):
-    """A log in the place of a replicate that cannot be compared.
+    """A log in the place of a replicate that cannot be compared."""
 
-    Attributes:
-        condition_id: Of the run, 64 hex digits.
-        replicate: The place.
-        reason: What is wrong with it, in one line.
-    """
-
-    condition_id: str
-    replicate: int
-    reason: str
+    condition_id: str  # of the run, 64 hex digits
+    replicate: int  # the place
+    reason: str  # what is wrong with it, in one line
 
 
 def reproduce_stored(path: Path, condition_id: str, replicate: int) -> Comparison | DamagedLog:

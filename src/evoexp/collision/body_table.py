@@ -34,45 +34,29 @@ class UnsupportedShape(EvoexpError):
 
 
 class BodyTable(NamedTuple):
-    """Bodies as arrays.
+    """Bodies as arrays."""
 
-    Attributes:
-        joint: (bodies,) index into the kinematic table, −1 for the world.
-        kind: (bodies,) the core.
-        exact: (bodies,) false where the arrays describe a larger body than coal's: the convex hull
-            of a mesh.
-        rotation: (bodies, 9) from the core's frame to the joint's frame in the table, row by row.
-        translation: (bodies, 3).
-        size: (bodies, 3) half a segment's length | half the edges | radius, half the height |
-            semi-axes.
-        radius: (bodies,) of the ball that sweeps the core.
-        corners: (bodies, 2) first and one-past-last corner of a hull.
-        corner_points: (corners, 3) in the frames of their hulls.
-        edges: (corners + 1,) where the neighbours of each corner begin in `neighbours`.
-        neighbours: Corners at the other ends of a corner's edges, corner by corner.
-        starts: (bodies, CELLS) the corner where a climb to the farthest one begins, by the cell of
-            the direction (`hull_graph.cell_of`); −1: all corners are looked at.
-        from_origin: (bodies,) greatest distance of a body's points from its joint's origin; inf for
-            half-spaces.
-        from_axis: (bodies,) the same from its joint's axis.
-        ball: (bodies,) radius of a ball around the core's origin that holds the body; inf for
-            half-spaces.
-    """
-
-    joint: IntArray
-    kind: IntArray
+    joint: IntArray  # (bodies,) index into the kinematic table, −1 for the world
+    kind: IntArray  # (bodies,) the core
+    # (bodies,) false where the arrays describe a larger body than coal's: the convex hull of a mesh
     exact: BoolArray
+    # (bodies, 9) from the core's frame to the joint's frame in the table, row by row
     rotation: FloatArray
-    translation: FloatArray
+    translation: FloatArray  # (bodies, 3)
+    # (bodies, 3) half a segment's length | half the edges | radius, half the height | semi-axes
     size: FloatArray
-    radius: FloatArray
-    corners: IntArray
-    corner_points: FloatArray
-    edges: IntArray
-    neighbours: IntArray
+    radius: FloatArray  # (bodies,) of the ball that sweeps the core
+    corners: IntArray  # (bodies, 2) first and one-past-last corner of a hull
+    corner_points: FloatArray  # (corners, 3) in the frames of their hulls
+    edges: IntArray  # (corners + 1,) where the neighbours of each corner begin in `neighbours`
+    neighbours: IntArray  # corners at the other ends of a corner's edges, corner by corner
+    # (bodies, CELLS) the corner where a climb to the farthest one begins, by the cell of the
+    # direction (`hull_graph.cell_of`); −1: all corners are looked at
     starts: IntArray
+    # (bodies,) greatest distance of a body's points from its joint's origin; inf for half-spaces
     from_origin: FloatArray
-    from_axis: FloatArray
+    from_axis: FloatArray  # (bodies,) the same from its joint's axis
+    # (bodies,) radius of a ball around the core's origin that holds the body; inf for half-spaces
     ball: FloatArray
 
     def tolerance(self, one: int, two: int) -> float:

@@ -25,21 +25,15 @@ NamePair = frozenset[str]
 
 
 class DerivedPairs(NamedTuple):
-    """Pairs of bodies that a search leaves out, by their names.
+    """Pairs of bodies that a search leaves out, by their names."""
 
-    Attributes:
-        neighbours: Pairs on one joint or on neighbouring ones, which are never judged.
-        disabled: Pairs that the SRDF switches off, which are never judged.
-        always: Pairs that touch in every configuration sampled, which are never judged.
-        never: Pairs that touch in none; the certifier judges them.
-        samples: How many configurations were sampled.
-    """
-
+    # pairs on one joint or on neighbouring ones, which are never judged
     neighbours: tuple[NamePair, ...]
-    disabled: tuple[NamePair, ...]
+    disabled: tuple[NamePair, ...]  # pairs that the SRDF switches off, which are never judged
+    # pairs that touch in every configuration sampled, which are never judged
     always: tuple[NamePair, ...]
-    never: tuple[NamePair, ...]
-    samples: int
+    never: tuple[NamePair, ...]  # pairs that touch in none; the certifier judges them
+    samples: int  # how many configurations were sampled
 
     def to_json(self) -> bytes:
         """Return the pairs as data that is attached to a condition."""

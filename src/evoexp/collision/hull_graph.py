@@ -18,17 +18,13 @@ CELLS = 64  # cells of directions, see `cell_of`; 48 of them exist
 
 
 class HullGraph(NamedTuple):
-    """Corners of a convex hull, and the edges between them.
+    """Corners of a convex hull, and the edges between them."""
 
-    Attributes:
-        corners: (corners, 3).
-        neighbours: (corners,) of arrays: the corners at the other ends of each one's edges.
-        starts: (CELLS,) the corner that is farthest in the middle of each cell of directions; −1 in
-            all cells if the corners are looked at one by one.
-    """
-
-    corners: FloatArray
+    corners: FloatArray  # (corners, 3)
+    # (corners,) of arrays: the corners at the other ends of each one's edges
     neighbours: tuple[IntArray, ...]
+    # (CELLS,) the corner that is farthest in the middle of each cell of directions; −1 in all cells
+    # if the corners are looked at one by one
     starts: IntArray
 
 

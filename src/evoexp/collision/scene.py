@@ -36,46 +36,31 @@ NO_HULLS: Mapping[int, FloatArray] = MappingProxyType({})
 
 
 class AllowedContact(NamedTuple):
-    """Two bodies that may touch.
+    """Two bodies that may touch."""
 
-    Attributes:
-        one: Index of a body.
-        two: Index of the other.
-        depth: How deep they may overlap [length unit].
-    """
-
-    one: int
-    two: int
-    depth: float
+    one: int  # index of a body
+    two: int  # index of the other
+    depth: float  # how deep they may overlap [length unit]
 
 
 class Scene(NamedTuple):
-    """Bodies on a Pinocchio model, and the pairs of them that are watched.
+    """Bodies on a Pinocchio model, and the pairs of them that are watched."""
 
-    Attributes:
-        model: The `pin.Model`.
-        geometry: The `pin.GeometryModel` with one object per body and one collision pair per pair.
-        table: The kinematic table of the model.
-        names: (bodies) of the geometry objects.
-        shapes: (bodies) coal's shape, index of its Pinocchio joint, placement in it.
-        pairs: (pairs, 2) indices of bodies.
-        bodies: The bodies as arrays.
-        size: Greatest distance of a body's points from the world's origin at the neutral
-            configuration [length unit].
-        tolerances: (pairs,) at or below which a distance counts as contact [length unit]: above
-            coal's own error.
-        contacts: Pairs that are none of `pairs`, since they may touch.
-    """
-
-    model: Any
+    model: Any  # the `pin.Model`
+    # the `pin.GeometryModel` with one object per body and one collision pair per pair
     geometry: Any
-    table: KinematicTable
-    names: tuple[str, ...]
+    table: KinematicTable  # the kinematic table of the model
+    names: tuple[str, ...]  # (bodies) of the geometry objects
+    # (bodies) coal's shape, index of its Pinocchio joint, placement in it
     shapes: tuple[tuple[Any, int, Any], ...]
-    pairs: np.ndarray
-    bodies: BodyTable
+    pairs: np.ndarray  # (pairs, 2) indices of bodies
+    bodies: BodyTable  # the bodies as arrays
+    # greatest distance of a body's points from the world's origin at the neutral configuration
+    # [length unit]
     size: float
+    # (pairs,) at or below which a distance counts as contact [length unit]: above coal's own error
     tolerances: FloatArray
+    # pairs that are none of `pairs`, since they may touch
     contacts: tuple[AllowedContact, ...] = ()
 
     def pair_names(self, pair: int) -> tuple[str, str]:
@@ -100,19 +85,13 @@ class Scene(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A piece of a motion that has bodies of its own: a phase in which something is held, say.
+    """A piece of a motion that has bodies of its own: a phase in which something is held, say."""
 
-    Attributes:
-        scene: The bodies.
-        first: Instant at which it begins.
-        last: At which it ends.
-        margins: (pairs,) clearance that the task requires of each pair [length unit]; None: the
-            planner's security margin of all.
-    """
-
-    scene: Scene
-    first: int
-    last: int
+    scene: Scene  # the bodies
+    first: int  # instant at which it begins
+    last: int  # at which it ends
+    # (pairs,) clearance that the task requires of each pair [length unit]; None: the planner's
+    # security margin of all
     margins: FloatArray | None = None
 
 

@@ -9,23 +9,15 @@ from evoexp.validation import Component, Count, NonNegativeCount, Rate
 
 
 class GeneticSettings(Component):
-    """Settings of a generational genetic algorithm; every planner uses the same words.
-
-    Attributes:
-        population_size: Individuals per generation.
-        num_generations: Generations after the initial one.
-        num_elites: Best individuals copied untouched into the next generation.
-        crossover_rate: Probability that a pair of parents is crossed.
-        mutation_rate: Probability of a mutation, of whatever the planner mutates.
-    """
+    """Settings of a generational genetic algorithm; every planner uses the same words."""
 
     component: ClassVar[str] = "genetic"
 
-    population_size: Count
-    num_generations: NonNegativeCount
-    num_elites: NonNegativeCount
-    crossover_rate: Rate
-    mutation_rate: Rate
+    population_size: Count  # individuals per generation
+    num_generations: NonNegativeCount  # generations after the initial one
+    num_elites: NonNegativeCount  # best individuals copied untouched into the next generation
+    crossover_rate: Rate  # probability that a pair of parents is crossed
+    mutation_rate: Rate  # probability of a mutation, of whatever the planner mutates
 
     @model_validator(mode="after")
     def _elites_fit(self) -> Self:
@@ -55,11 +47,9 @@ class ScaledGenetic(GeneticSettings):
     u + 1, u + 2, …, with one uniform number u. That is assumed: Chen & Zalzala 1995 name the
     sampling, not the scan, and Goldberg (1989) tosses a coin per remainder instead, which is biased
     (see `scaled_selection.choose_by_remainders`).
-
-    Attributes:
-        scaling_multiple: Copies that the best one expects, in units of the mean [-].
     """
 
     component: ClassVar[str] = "scaled_genetic"
 
+    # copies that the best one expects, in units of the mean [-]
     scaling_multiple: Annotated[float, Field(gt=1.0)]

@@ -15,15 +15,10 @@ from evoexp.numeric.generator_state import state_bytes, states_behind
 
 
 class Block(NamedTuple):
-    """Uniform numbers, some of them taken.
+    """Uniform numbers, some of them taken."""
 
-    Attributes:
-        uniforms: (numbers,) in [0, 1).
-        taken: (1,) how many were asked for since the block begins.
-    """
-
-    uniforms: NDArray[np.float64]
-    taken: NDArray[np.int64]
+    uniforms: NDArray[np.float64]  # (numbers,) in [0, 1)
+    taken: NDArray[np.int64]  # (1,) how many were asked for since the block begins
 
 
 class Draws:

@@ -13,20 +13,15 @@ from evoexp.validation import Component, NonNegative
 
 
 class MotionCriteria(Component):
-    """Weights of C1 … C4; the paper adds them as they are.
-
-    Attributes:
-        collision_weight: Of C1, colliding configurations summed over all collaborators [-].
-        path_weight: Of C2, the end-effector's path [1/length unit].
-        rotation_weight: Of C3, the sum of all links' turns [1/rad].
-        evenness_weight: Of C4, longest step of the end-effector less its shortest [1/length unit].
-    """
+    """Weights of C1 … C4; the paper adds them as they are."""
 
     component: ClassVar[str] = "motion_criteria"
 
+    # of C1, colliding configurations summed over all collaborators [-]
     collision_weight: NonNegative
-    path_weight: NonNegative
-    rotation_weight: NonNegative
+    path_weight: NonNegative  # of C2, the end-effector's path [1/length unit]
+    rotation_weight: NonNegative  # of C3, the sum of all links' turns [1/rad]
+    # of C4, longest step of the end-effector less its shortest [1/length unit]
     evenness_weight: NonNegative
 
     @property

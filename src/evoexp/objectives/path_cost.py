@@ -9,17 +9,12 @@ from evoexp.validation import Component, NonNegative
 
 
 class PathCost(Component):
-    """Weights of Eq. 1, C = ε D + λ S.
-
-    Attributes:
-        distance_weight: ε, of the length D (Eq. 2) [1/cell].
-        unsafeness_weight: λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-].
-    """
+    """Weights of Eq. 1, C = ε D + λ S."""
 
     component: ClassVar[str] = "path_cost"
 
-    distance_weight: NonNegative
-    unsafeness_weight: NonNegative
+    distance_weight: NonNegative  # ε, of the length D (Eq. 2) [1/cell]
+    unsafeness_weight: NonNegative  # λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-]
 
     @model_validator(mode="after")
     def _something_costs(self) -> Self:

@@ -12,41 +12,28 @@ from evoexp.validation import Component, NonNegative, NonNegativeCount, Positive
 
 
 class Avoidance(Settings):
-    """One term of Eq. 12: a point of the robot shall be far from an obstacle.
+    """One term of Eq. 12: a point of the robot shall be far from an obstacle."""
 
-    Attributes:
-        weight: γ of Eq. 14 [length unit²].
-        link: Where the point is: 0: the platform's middle, 1 to 3: a link.
-        place: On the link, from its joint to its end [-].
-        obstacle: Index of the obstacle, from 0.
-    """
-
-    weight: NonNegative
+    weight: NonNegative  # γ of Eq. 14 [length unit²]
+    # where the point is: 0: the platform's middle, 1 to 3: a link
     link: Annotated[int, Field(ge=0, le=3)]
-    place: Rate
-    obstacle: NonNegativeCount
+    place: Rate  # on the link, from its joint to its end [-]
+    obstacle: NonNegativeCount  # index of the obstacle, from 0
 
 
 class PlacementCriteria(Component):
-    """Weights of E of Eq. 14, which is at most `greatest`, the cost of an infeasible posture.
-
-    Attributes:
-        torque_norm_weight: ε, of ‖τ‖² (Eq. 10).
-        torque_max_weight: λ, of the greatest |α τ| (Eq. 11).
-        manipulability_weight: δ, of 1 / det(J Jᵀ) (Eq. 13).
-        torque_weights: α1, α2, α3 of Eq. 11: inverses of the torques' limits.
-        greatest: E_m of Eq. 15: no criterion and no cost is above it, singular postures included.
-        avoidances: Terms of Eq. 12.
-    """
+    """Weights of E of Eq. 14, which is at most `greatest`, the cost of an infeasible posture."""
 
     component: ClassVar[str] = "placement_criteria"
 
-    torque_norm_weight: NonNegative
-    torque_max_weight: NonNegative
-    manipulability_weight: NonNegative
+    torque_norm_weight: NonNegative  # ε, of ‖τ‖² (Eq. 10)
+    torque_max_weight: NonNegative  # λ, of the greatest |α τ| (Eq. 11)
+    manipulability_weight: NonNegative  # δ, of 1 / det(J Jᵀ) (Eq. 13)
+    # α1, α2, α3 of Eq. 11: inverses of the torques' limits
     torque_weights: tuple[NonNegative, NonNegative, NonNegative]
+    # E_m of Eq. 15: no criterion and no cost is above it, singular postures included
     greatest: Positive
-    avoidances: tuple[Avoidance, ...] = ()
+    avoidances: tuple[Avoidance, ...] = ()  # terms of Eq. 12
 
     @model_validator(mode="after")
     def _something_is_asked_for(self) -> Self:

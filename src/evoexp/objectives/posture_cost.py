@@ -52,27 +52,17 @@ AT = 1e-9  # [length unit] closer to the object's axis than this, every heading 
 
 
 class LengthTerm(Settings):
-    """A term that is a length.
+    """A term that is a length."""
 
-    Attributes:
-        weight: Per length unit.
-        unit: Of the term.
-    """
-
-    weight: Positive
-    unit: Literal["length"] = "length"
+    weight: Positive  # per length unit
+    unit: Literal["length"] = "length"  # of the term
 
 
 class AngleTerm(Settings):
-    """A term that is an angle.
+    """A term that is an angle."""
 
-    Attributes:
-        weight: Per rad or per deg.
-        unit: Which of them.
-    """
-
-    weight: Positive
-    unit: Literal["rad", "deg"] = "rad"
+    weight: Positive  # per rad or per deg
+    unit: Literal["rad", "deg"] = "rad"  # which of them
 
     @property
     def per_radian(self) -> float:
@@ -81,13 +71,9 @@ class AngleTerm(Settings):
 
 
 class LimitedAngle(AngleTerm):
-    """An angle with a hard limit.
+    """An angle with a hard limit."""
 
-    Attributes:
-        limit: Postures beyond it are infeasible [deg].
-    """
-
-    limit: Positive
+    limit: Positive  # postures beyond it are infeasible [deg]
 
 
 class RatioTerm(Settings):
@@ -98,22 +84,13 @@ class RatioTerm(Settings):
 
 
 class FreeSpace(RatioTerm):
-    """The preference of free regions.
+    """The preference of free regions."""
 
-    Attributes:
-        reach: Least clearance that counts as free [length unit].
-    """
-
-    reach: Positive
+    reach: Positive  # least clearance that counts as free [length unit]
 
 
 class PostureCost(Component):
-    """Terms and weights; see the module's first lines.
-
-    Attributes:
-        grasp_angles: How `axial_approach` and `heading` count: their `sum`, or the `larger` one
-            alone, each times its weight.
-    """
+    """Terms and weights; see the module's first lines."""
 
     component: ClassVar[str] = "posture_cost"
 
@@ -126,6 +103,8 @@ class PostureCost(Component):
     limit_margin: RatioTerm | None = None
     collision: RatioTerm | None = None
     free_space: FreeSpace | None = None
+    # how `axial_approach` and `heading` count: their `sum`, or the `larger` one alone, each
+    # times its weight
     grasp_angles: Literal["sum", "larger"] = "sum"
 
     @model_validator(mode="after")

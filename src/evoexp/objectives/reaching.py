@@ -13,17 +13,12 @@ from evoexp.validation import Component, NonNegative
 
 
 class Reaching(Component):
-    """Weights of Eq. 4.
-
-    Attributes:
-        position_weight: w1, of the distance between tip and target [1/length unit].
-        displacement_weight: w2, of the Euclidean distance between the postures [1/rad].
-    """
+    """Weights of Eq. 4."""
 
     component: ClassVar[str] = "reaching"
 
-    position_weight: NonNegative
-    displacement_weight: NonNegative
+    position_weight: NonNegative  # w1, of the distance between tip and target [1/length unit]
+    displacement_weight: NonNegative  # w2, of the Euclidean distance between the postures [1/rad]
 
     @property
     def weights(self) -> tuple[float, float]:

@@ -25,20 +25,14 @@ class StringFitness(Component):
     """Weights of Eq. 7, read with the sign that punishes collisions.
 
     F = C_max − (k1 ΣC + k2 ΣC + k3 C5).
-
-    Attributes:
-        length_weight: k1 [1/deg].
-        unevenness_weight: k2 [1/deg].
-        collision_weight: k3 per colliding instant.
-        fitness_offset: C_max; roulette weights are max(F, 0).
     """
 
     component: ClassVar[str] = "string_fitness"
 
-    length_weight: NonNegative
-    unevenness_weight: NonNegative
-    collision_weight: NonNegative
-    fitness_offset: NonNegative
+    length_weight: NonNegative  # k1 [1/deg]
+    unevenness_weight: NonNegative  # k2 [1/deg]
+    collision_weight: NonNegative  # k3 per colliding instant
+    fitness_offset: NonNegative  # C_max; roulette weights are max(F, 0)
 
     @property
     def weights(self) -> tuple[float, float, float]:

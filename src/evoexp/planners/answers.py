@@ -10,31 +10,19 @@ LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
 
 
 class CoverShape(NamedTuple):
-    """A sphere or capsule that a search tests in place of a body.
+    """A sphere or capsule that a search tests in place of a body."""
 
-    Attributes:
-        joint: Pinocchio's index of the joint that moves it; 0: it stands still.
-        start: (3,) one end of its segment in the joint's frame [length unit].
-        end: (3,) the other end; the same for a sphere.
-        radius: [length unit].
-    """
-
-    joint: int
-    start: FloatArray
-    end: FloatArray
-    radius: float
+    joint: int  # Pinocchio's index of the joint that moves it; 0: it stands still
+    start: FloatArray  # (3,) one end of its segment in the joint's frame [length unit]
+    end: FloatArray  # (3,) the other end; the same for a sphere
+    radius: float  # [length unit]
 
 
 class Listing(NamedTuple):
-    """A table with one row per configuration of a solution.
+    """A table with one row per configuration of a solution."""
 
-    Attributes:
-        names: Names of the columns.
-        rows: Values, row by row.
-    """
-
-    names: list[str]
-    rows: list[list[Any]]
+    names: list[str]  # names of the columns
+    rows: list[list[Any]]  # values, row by row
 
 
 def num_body_tests(problem: Any) -> float:

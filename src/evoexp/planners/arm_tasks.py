@@ -42,27 +42,17 @@ ArmTask = ArmMotion | LinkMotion | MoveitTask | GridMotion
 
 
 class ArmProblem(NamedTuple):
-    """A robot and its scenario, prepared.
+    """A robot and its scenario, prepared."""
 
-    Attributes:
-        assembly: The robot, built.
-        collision: The touching circles or spheres on it, or its covered bodies.
-        start: (nq,) [deg].
-        goal: (nq,) [deg].
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires between two arms [length unit].
-        obstacle_margin: The same between a link and an obstacle.
-        length_unit: Name of the scene's unit of length.
-    """
-
-    assembly: Assembly
+    assembly: Assembly  # the robot, built
+    # the touching circles or spheres on it, or its covered bodies
     collision: SphereCollision | CoveredCollision
-    start: FloatArray
-    goal: FloatArray
-    scene: Scene
-    security_margin: float
-    obstacle_margin: float
-    length_unit: str
+    start: FloatArray  # (nq,) [deg]
+    goal: FloatArray  # (nq,) [deg]
+    scene: Scene  # the bodies themselves, for the exact verdict on a motion
+    security_margin: float  # clearance that the task requires between two arms [length unit]
+    obstacle_margin: float  # the same between a link and an obstacle
+    length_unit: str  # name of the scene's unit of length
 
     @property
     def arm_slices(self) -> IntArray:

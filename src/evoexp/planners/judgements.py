@@ -29,19 +29,12 @@ class Judgement(Protocol):
 
 
 class JudgementArrays(NamedTuple):
-    """A `Judgement` as plain arrays.
+    """A `Judgement` as plain arrays."""
 
-    Attributes:
-        cost: (individuals,) lower is better; inf: infeasible.
-        feasible: (individuals,) whether the planner's own model accepts each.
-        collision_queries: Configurations that the algorithm asks for.
-        terms: Name → (individuals,) of the planner's own terms.
-    """
-
-    cost: FloatArray
-    feasible: BoolArray
-    collision_queries: int
-    terms: Mapping[str, NDArray[Any]]
+    cost: FloatArray  # (individuals,) lower is better; inf: infeasible
+    feasible: BoolArray  # (individuals,) whether the planner's own model accepts each
+    collision_queries: int  # configurations that the algorithm asks for
+    terms: Mapping[str, NDArray[Any]]  # name → (individuals,) of the planner's own terms
 
     def named_terms(self, individual: int) -> dict[str, float]:
         """Return the terms of one individual."""

@@ -29,20 +29,16 @@ COPIES = 5
 
 @runtime_checkable
 class Planner(Protocol):
-    """All obligations of a planner; `problem` is the value that its own `prepare` returned.
+    """All obligations of a planner; `problem` is the value that its own `prepare` returned."""
 
-    Attributes:
-        component: The registered name; a guest's begins with the name of its distribution.
-        revision: Raised whenever the same settings give other results than before.
-        reproducibility: `bits`: the same seed gives the same bits on every machine; `environment`:
-            only on machines with the same libraries and processor (`reproduce` then compares
-            numbers, to 1e-9, where the environment differs).
-        is_reference: Whether it is a truth that needs no seed, and so has one replicate.
-    """
-
+    # the registered name; a guest's begins with the name of its distribution
     component: ClassVar[str]
-    revision: ClassVar[int]
+    revision: ClassVar[int]  # raised whenever the same settings give other results than before
+    # `bits`: the same seed gives the same bits on every machine; `environment`: only on
+    # machines with the same libraries and processor (`reproduce` then compares numbers, to
+    # 1e-9, where the environment differs)
     reproducibility: ClassVar[Reproducibility]
+    # whether it is a truth that needs no seed, and so has one replicate
     is_reference: ClassVar[bool]
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
@@ -257,17 +253,11 @@ class PlannerDefaults:
 
 
 class Candidate(NamedTuple):
-    """A solution as it is recorded.
+    """A solution as it is recorded."""
 
-    Attributes:
-        solution: Flat; never changed afterwards.
-        terms: The paper's own terms of it.
-        solved: Whether the planner's own model accepts it.
-    """
-
-    solution: FloatArray
-    terms: dict[str, float]
-    solved: bool
+    solution: FloatArray  # flat; never changed afterwards
+    terms: dict[str, float]  # the paper's own terms of it
+    solved: bool  # whether the planner's own model accepts it
 
 
 class Keeper:

@@ -29,15 +29,10 @@ def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certi
 
 
 class Verdict(NamedTuple):
-    """The verdict on a motion as a search learns it: the same on every processor.
+    """The verdict on a motion as a search learns it: the same on every processor."""
 
-    Attributes:
-        proven: Whether the certifier proves it; one that it cannot decide is not proven.
-        pair: Names of the bodies that touch, " – " between them; empty if none do.
-    """
-
-    proven: bool
-    pair: str
+    proven: bool  # whether the certifier proves it; one that it cannot decide is not proven
+    pair: str  # names of the bodies that touch, " – " between them; empty if none do
 
 
 class Proofs:

@@ -15,27 +15,16 @@ ANYWHERE = np.array([-np.inf, np.inf, -np.inf, np.inf])  # the box of the first 
 
 
 class Problem(NamedTuple):
-    """Robot and scenario, prepared for the search.
+    """Robot and scenario, prepared for the search."""
 
-    Attributes:
-        assembly: The robot, built.
-        collision: The paper's collision model on it.
-        start: (joints,) [rad].
-        joint_limits: (joints, 2) [rad].
-        targets: (2, 2) via point and goal point.
-        boxes: (2, 4) where the tip must end: least and greatest x, y.
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    assembly: Assembly
-    collision: EllipseCollision
-    start: FloatArray
-    joint_limits: FloatArray
-    targets: FloatArray
-    boxes: FloatArray
-    scene: Scene
-    security_margin: float
+    assembly: Assembly  # the robot, built
+    collision: EllipseCollision  # the paper's collision model on it
+    start: FloatArray  # (joints,) [rad]
+    joint_limits: FloatArray  # (joints, 2) [rad]
+    targets: FloatArray  # (2, 2) via point and goal point
+    boxes: FloatArray  # (2, 4) where the tip must end: least and greatest x, y
+    scene: Scene  # the bodies themselves, for the exact verdict on a motion
+    security_margin: float  # clearance that the task requires [length unit]
 
 
 def reaching_problem(robot: Robot, scenario: PickAndPlace, model: LinkEllipses) -> Problem:

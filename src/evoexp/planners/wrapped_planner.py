@@ -18,13 +18,9 @@ AnyPlanner = Annotated[Planner, GetPydanticSchema(lambda _, handler: handler(Any
 
 
 class WrappedPlanner(PlannerDefaults, Component):
-    """Answers as the wrapped planner does, except in `evolve`, which a subclass writes.
+    """Answers as the wrapped planner does, except in `evolve`, which a subclass writes."""
 
-    Attributes:
-        planner: The planner that it stands beside.
-    """
-
-    planner: AnyPlanner
+    planner: AnyPlanner  # the planner that it stands beside
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem."""

@@ -12,33 +12,24 @@ Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
 class ReportSettings(Settings):
-    """Settings of `conf/report`.
+    """Settings of `conf/report`."""
 
-    Attributes:
-        formats: File formats of every figure.
-        dpi: Resolution of raster formats [1/inch].
-        confidence: Level of every interval.
-        significance: Below this adjusted p-value a difference counts in a verdict.
-        num_resamples: Of every bootstrap interval.
-        samples_per_segment: Configurations per segment of a path at which figures measure
-            distances.
-        threshold_ratio: Cost that "effort to a threshold" means, in units of the scene's lower
-            bound.
-        width: Of figures: over the whole page (7.2 inch at most), or over one of two columns (3.5).
-        style: Path of a matplotlib style file that is applied over evoexp's own style.
-        figures: Name of the page that draws the experiment; None: conditions, convergence and
-            parameters only.
-    """
-
+    # file formats of every figure
     formats: Annotated[tuple[Literal["svg", "png", "pdf"], ...], Field(min_length=1)]
-    dpi: Count
-    confidence: Share
-    significance: Share
-    num_resamples: Count
+    dpi: Count  # resolution of raster formats [1/inch]
+    confidence: Share  # level of every interval
+    significance: Share  # below this adjusted p-value a difference counts in a verdict
+    num_resamples: Count  # of every bootstrap interval
+    # configurations per segment of a path at which figures measure distances
     samples_per_segment: Count
+    # cost that "effort to a threshold" means, in units of the scene's lower bound
     threshold_ratio: Positive
+    # name of the page that draws the experiment; None: conditions, convergence and parameters
+    # only
     figures: str | None
+    # of figures: over the whole page (7.2 inch at most), or over one of two columns (3.5)
     width: Literal["page", "column"] = "page"
+    # path of a matplotlib style file that is applied over evoexp's own style
     style: str | None = None
 
     @model_validator(mode="after")

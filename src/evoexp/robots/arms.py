@@ -11,17 +11,13 @@ from evoexp.validation import TARGET
 
 
 class Arms(Robot):
-    """Arms standing in one scene; q is their configurations one after the other.
-
-    Attributes:
-        arms: The arms, each with its own base.
-        pairs: Pairs of bodies that need no test, derived when the files of arms out of a URDF are
-            read; None: none are.
-    """
+    """Arms standing in one scene; q is their configurations one after the other."""
 
     component: ClassVar[str] = "arms"
 
-    arms: Annotated[tuple[Chain, ...], Field(min_length=1)]
+    arms: Annotated[tuple[Chain, ...], Field(min_length=1)]  # the arms, each with its own base
+    # pairs of bodies that need no test, derived when the files of arms out of a URDF are
+    # read; None: none are
     pairs: File | None = None
 
     @classmethod

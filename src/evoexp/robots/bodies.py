@@ -15,14 +15,10 @@ Point3 = tuple[float, float, float]
 
 
 class Body(Settings):
-    """Base of all bodies.
+    """Base of all bodies."""
 
-    Attributes:
-        name: By which contacts and verdicts speak of it.
-        joint: The joint that moves it, counted from 1; 0: it stands still on the base.
-    """
-
-    name: str
+    name: str  # by which contacts and verdicts speak of it
+    # the joint that moves it, counted from 1; 0: it stands still on the base
     joint: Annotated[int, Field(ge=0)]
 
 

@@ -18,16 +18,13 @@ class DhJoint(Settings):
     """One row of a table in the distal (standard) form.
 
     Turn about z, shift along z, shift along x, turn about x.
-
-    Attributes:
-        dh: a, α, d, θ at q = 0 [length unit, deg, length unit, deg].
-        limits: Least and greatest value of the joint [deg], of a sliding one [length unit].
-        kind: Whether θ or d is what moves.
     """
 
+    # a, α, d, θ at q = 0 [length unit, deg, length unit, deg]
     dh: tuple[float, float, float, float]
+    # least and greatest value of the joint [deg], of a sliding one [length unit]
     limits: tuple[float, float]
-    kind: Literal["revolute", "prismatic"] = "revolute"
+    kind: Literal["revolute", "prismatic"] = "revolute"  # whether θ or d is what moves
 
     def behind(self) -> Any:
         """Return the `pin.SE3` from the joint's moved frame to the next joint's, at q = 0."""
@@ -43,24 +40,17 @@ class DhChain(Chain):
 
     Body frames: a body of joint k is given in the frame k of the table, which moves with joint k (a
     body of joint 0 in the base's).
-
-    Attributes:
-        joints: Rows of the table, from the base to the last joint.
-        bodies: What can collide.
-        base_position: Of the frame 0 in the world [length unit].
-        base_rotation: Its roll, pitch, yaw [deg].
-        tool_position: Of the tool's frame in the last one [length unit].
-        tool_rotation: Its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across
-            it.
     """
 
     component: ClassVar[str] = "dh_chain"
 
+    # rows of the table, from the base to the last joint
     joints: Annotated[tuple[DhJoint, ...], Field(min_length=1)]
-    bodies: Annotated[tuple[AnyBody, ...], Field(min_length=1)]
-    base_position: Point3
-    base_rotation: Point3 = (0.0, 0.0, 0.0)
-    tool_position: Point3 = (0.0, 0.0, 0.0)
+    bodies: Annotated[tuple[AnyBody, ...], Field(min_length=1)]  # what can collide
+    base_position: Point3  # of the frame 0 in the world [length unit]
+    base_rotation: Point3 = (0.0, 0.0, 0.0)  # its roll, pitch, yaw [deg]
+    tool_position: Point3 = (0.0, 0.0, 0.0)  # of the tool's frame in the last one [length unit]
+    # its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across it
     tool_rotation: Point3 = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")

@@ -22,20 +22,14 @@ class FloorManipulator(Robot):
 
     Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's
     first joint stands in the middle of its top.
-
-    Attributes:
-        body_radius: Of the platform [length unit of the scene].
-        body_height: Of the platform.
-        link_lengths: l1, l2, l3.
-        link_radius: Half the thickness of every link; 0: a line.
     """
 
     component: ClassVar[str] = "floor_manipulator"
 
-    body_radius: Positive
-    body_height: Positive
-    link_lengths: tuple[Positive, Positive, Positive]
-    link_radius: NonNegative = 0.0
+    body_radius: Positive  # of the platform [length unit of the scene]
+    body_height: Positive  # of the platform
+    link_lengths: tuple[Positive, Positive, Positive]  # l1, l2, l3
+    link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
 
     def build(self) -> Assembly:
         """Return the model: the platform as its first body, then the links of the arm."""

@@ -12,20 +12,15 @@ from evoexp.validation import Positive
 
 
 class FloorPlatform(Robot):
-    """An upright cylinder on prismatic joints along x and y, or along x, y and z.
-
-    Attributes:
-        body_radius: Of the cylinder [length unit of the scene].
-        body_height: Of the cylinder, which stands on the floor z = 0; in three dimensions it is
-            centred on its place.
-        dimensions: How many directions it moves along.
-    """
+    """An upright cylinder on prismatic joints along x and y, or along x, y and z."""
 
     component: ClassVar[str] = "floor_platform"
 
-    body_radius: Positive
+    body_radius: Positive  # of the cylinder [length unit of the scene]
+    # of the cylinder, which stands on the floor z = 0; in three dimensions it is centred on
+    # its place
     body_height: Positive
-    dimensions: Literal[2, 3] = 2
+    dimensions: Literal[2, 3] = 2  # how many directions it moves along
 
     def build(self) -> Assembly:
         """Return the model with q = (x, y[, z]) and its body."""

@@ -24,21 +24,17 @@ class MobileArm(Chain):
 
     The first revolute joint stands in the middle of the platform, on the line that the platform
     moves along (y = 0). Every joint angle is relative to the link before.
-
-    Attributes:
-        link_lengths: l1, l2, l3 [length unit of the scene].
-        platform_size: Length and height of the platform, a rectangle with round ends [length unit].
-        link_radius: Half the thickness of every link; 0: a line.
-        joint_limits: Least and greatest θ1, θ2, θ3 within ±180° [deg]; None: any angle (Eq. 7).
-        torque_limits: Least and greatest τ1, τ2, τ3; None: any torque (Eq. 9).
     """
 
     component: ClassVar[str] = "mobile_arm"
 
-    link_lengths: tuple[Positive, Positive, Positive]
+    link_lengths: tuple[Positive, Positive, Positive]  # l1, l2, l3 [length unit of the scene]
+    # length and height of the platform, a rectangle with round ends [length unit]
     platform_size: tuple[Positive, Positive]
-    link_radius: NonNegative = 0.0
+    link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
+    # least and greatest θ1, θ2, θ3 within ±180° [deg]; None: any angle (Eq. 7)
     joint_limits: tuple[Range, Range, Range] | None = None
+    # least and greatest τ1, τ2, τ3; None: any torque (Eq. 9)
     torque_limits: tuple[Range, Range, Range] | None = None
 
     @model_validator(mode="after")

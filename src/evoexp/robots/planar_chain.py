@@ -15,25 +15,17 @@ Point2 = tuple[float, float]
 
 
 class PlanarChain(Chain):
-    """Revolute joints about z in the x–y plane; every joint angle is relative to the link before.
-
-    Attributes:
-        link_lengths: Lengths from joint to joint, the last to the tip [length unit of the scene].
-        base_position: The first joint (x, y).
-        base_angle: Direction of the first link at q = 0, from +x [deg].
-        link_radius: Half the thickness of every link; 0: a line.
-        tool_radius: Of a ball around the tip; 0: none.
-        joint_limits: Least and greatest angle of every joint [rad], as the papers print them; None:
-            any angle.
-    """
+    """Revolute joints about z in the x–y plane; a joint angle is relative to the link before."""
 
     component: ClassVar[str] = "planar_chain"
 
+    # lengths from joint to joint, the last to the tip [length unit of the scene]
     link_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
-    base_position: Point2
-    base_angle: float = 0.0
-    link_radius: NonNegative = 0.0
-    tool_radius: NonNegative = 0.0
+    base_position: Point2  # the first joint (x, y)
+    base_angle: float = 0.0  # direction of the first link at q = 0, from +x [deg]
+    link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
+    tool_radius: NonNegative = 0.0  # of a ball around the tip; 0: none
+    # least and greatest angle of every joint [rad], as the papers print them; None: any angle
     joint_limits: tuple[tuple[float, float], ...] | None = None
 
     @model_validator(mode="after")

@@ -16,19 +16,15 @@ Point3 = tuple[float, float, float]
 
 
 class SerialJoint(Settings):
-    """One joint.
+    """One joint."""
 
-    Attributes:
-        axis: Direction that it turns about or slides along, in the frame of the joint before; any
-            length but 0.
-        offset: From the joint before (from the base for the first one), at q = 0 [length unit of
-            the scene].
-        kind: Whether it turns or slides.
-    """
-
+    # direction that it turns about or slides along, in the frame of the joint before; any
+    # length but 0
     axis: Point3
+    # from the joint before (from the base for the first one), at q = 0 [length unit of the
+    # scene]
     offset: Point3
-    kind: Literal["revolute", "prismatic"] = "revolute"
+    kind: Literal["revolute", "prismatic"] = "revolute"  # whether it turns or slides
 
     @model_validator(mode="after")
     def _points_somewhere(self) -> Self:
@@ -53,22 +49,15 @@ class SerialChain(Chain):
     A link is the straight segment from one joint to the next, the last one to the tip; joints that
     stand in the same place have none between them. The segment from the base to the first joint is
     a link that does not move.
-
-    Attributes:
-        joints: From the base to the tip.
-        tip: From the last joint [length unit of the scene].
-        base_position: In the world.
-        base_angle: Turn of the whole arm about the world's z [deg].
-        link_radius: Half the thickness of every link; 0: a line.
     """
 
     component: ClassVar[str] = "serial_chain"
 
-    joints: Annotated[tuple[SerialJoint, ...], Field(min_length=1)]
-    tip: Point3
-    base_position: Point3
-    base_angle: float = 0.0
-    link_radius: NonNegative = 0.0
+    joints: Annotated[tuple[SerialJoint, ...], Field(min_length=1)]  # from the base to the tip
+    tip: Point3  # from the last joint [length unit of the scene]
+    base_position: Point3  # in the world
+    base_angle: float = 0.0  # turn of the whole arm about the world's z [deg]
+    link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
         """Add the joints; links of no length are left out."""

@@ -47,16 +47,11 @@ SPHERES = "robot.spheres"
 
 
 class Mesh(Settings):
-    """A mesh of a collision body.
+    """A mesh of a collision body."""
 
-    Attributes:
-        name: As the URDF names it.
-        file: Its content.
-        pieces: The convex pieces in its place, see `mesh_pieces`; None: it stays as it is.
-    """
-
-    name: str
-    file: File
+    name: str  # as the URDF names it
+    file: File  # its content
+    # the convex pieces in its place, see `mesh_pieces`; None: it stays as it is
     pieces: File | None = None
 
 
@@ -82,53 +77,42 @@ class Urdf(Chain):
     """An arm out of a URDF; in a configuration `path` (and `srdf`) name the files that are read.
 
     `packages` tells the folders of packages of meshes, by their names.
-
-    Attributes:
-        urdf: The URDF.
-        meshes: Of its collision bodies.
-        srdf: Names pairs of links that are never judged; None: none are named.
-        base_frame: The link, fixed to the ground, whose frame stands at the base; empty: the root.
-        base_position: Where the base stands in the world [m].
-        base_rotation: Its roll, pitch, yaw [deg].
-        tool_frame: The link or joint whose frame is the tool's; empty: the tip of the group, or the
-            link farthest down the tree.
-        joints: Names of those that move; empty: those of the group, or all.
-        group: The SRDF's group whose joints move; empty: none.
-        groups: The SRDF's groups that are an arm each, the first with all that stands still.
-        tool_frames: The tool's frame of each of these arms; empty: the tips of the groups.
-        fixed: Values of joints that stand still [deg, m]; of others 0, or the limit nearest to it.
-        continuous_turns: How far a continuous joint turns to either side [turns].
-        turn_limit: How far a turning joint does whose limits the URDF does not give [deg].
-        slide_limit: How far a sliding joint moves to either side, then [m].
-        base: Whether planar and floating joints stand still (fixed) or move (free); or the whole
-            robot moves, as by a planar or floating joint below its root.
-        decomposition: Whether meshes are replaced by convex pieces that contain them: by CoACD, or
-            by the convex hull of each; None: they stay as they are.
-        spheres: A URDF of spheres, link by link, that cover the bodies in a search; they need not
-            contain them. None: covers are found.
-        pairs: Pairs of bodies that need no test, derived when the files are read; None: none are.
     """
 
     component: ClassVar[str] = "urdf"
 
-    urdf: File
-    meshes: tuple[Mesh, ...] = ()
-    srdf: File | None = None
+    urdf: File  # the URDF
+    meshes: tuple[Mesh, ...] = ()  # of its collision bodies
+    srdf: File | None = None  # names pairs of links that are never judged; None: none are named
+    # the link, fixed to the ground, whose frame stands at the base; empty: the root
     base_frame: str = ""
-    base_position: Point3 = (0.0, 0.0, 0.0)
-    base_rotation: Point3 = (0.0, 0.0, 0.0)
+    base_position: Point3 = (0.0, 0.0, 0.0)  # where the base stands in the world [m]
+    base_rotation: Point3 = (0.0, 0.0, 0.0)  # its roll, pitch, yaw [deg]
+    # the link or joint whose frame is the tool's; empty: the tip of the group, or the link
+    # farthest down the tree
     tool_frame: str = ""
-    joints: tuple[str, ...] = ()
-    group: str = ""
+    joints: tuple[str, ...] = ()  # names of those that move; empty: those of the group, or all
+    group: str = ""  # the SRDF's group whose joints move; empty: none
+    # the SRDF's groups that are an arm each, the first with all that stands still
     groups: tuple[str, ...] = ()
+    # the tool's frame of each of these arms; empty: the tips of the groups
     tool_frames: tuple[str, ...] = ()
+    # values of joints that stand still [deg, m]; of others 0, or the limit nearest to it
     fixed: StandingValues = ()
-    continuous_turns: Positive = 1.0
+    continuous_turns: Positive = 1.0  # how far a continuous joint turns to either side [turns]
+    # how far a turning joint does whose limits the URDF does not give [deg]
     turn_limit: Positive = 180.0
-    slide_limit: Positive = 1.0
+    slide_limit: Positive = 1.0  # how far a sliding joint moves to either side, then [m]
+    # whether planar and floating joints stand still (fixed) or move (free); or the whole
+    # robot moves, as by a planar or floating joint below its root
     base: Literal["fixed", "free", "planar", "floating"] = "fixed"
+    # whether meshes are replaced by convex pieces that contain them: by CoACD, or by the
+    # convex hull of each; None: they stay as they are
     decomposition: Decomposition | None = None
+    # A URDF of spheres, link by link, that cover the bodies in a search; they need not
+    # contain them. None: covers are found
     spheres: File | None = None
+    # pairs of bodies that need no test, derived when the files are read; None: none are
     pairs: File | None = None
 
     @classmethod

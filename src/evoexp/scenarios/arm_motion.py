@@ -12,25 +12,18 @@ from evoexp.validation import Component, NonNegative, Vector
 
 
 class ArmMotion(Component):
-    """Start and goal of every arm, and the obstacles around them.
-
-    Attributes:
-        q_start: Configuration of every arm at the start, arm by arm [deg].
-        q_goal: At the goal [deg].
-        security_margin: Clearance between bodies that the task requires [length unit].
-        length_unit: Name of the scene's unit of length.
-        obstacles: What does not move.
-        obstacle_margin: Clearance that the task requires between a link and an obstacle; None: the
-            security margin, as between two arms.
-    """
+    """Start and goal of every arm, and the obstacles around them."""
 
     component: ClassVar[str] = "arm_motion"
 
+    # configuration of every arm at the start, arm by arm [deg]
     q_start: Annotated[tuple[Vector, ...], Field(min_length=1)]
-    q_goal: Annotated[tuple[Vector, ...], Field(min_length=1)]
-    security_margin: NonNegative
-    length_unit: str
-    obstacles: tuple[Obstacle, ...] = ()
+    q_goal: Annotated[tuple[Vector, ...], Field(min_length=1)]  # at the goal [deg]
+    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
+    length_unit: str  # name of the scene's unit of length
+    obstacles: tuple[Obstacle, ...] = ()  # what does not move
+    # clearance that the task requires between a link and an obstacle; None: the security
+    # margin, as between two arms
     obstacle_margin: NonNegative | None = None
 
     def ends(self, arm_slices: np.ndarray) -> tuple[FloatArray, FloatArray]:

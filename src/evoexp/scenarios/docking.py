@@ -12,22 +12,15 @@ Point2 = tuple[float, float]
 
 
 class Docking(Component):
-    """A task of one posture (Chen & Zalzala 1995, section 4.2).
-
-    Attributes:
-        target: X_e, Y_e of the end-effector [length unit].
-        force: F that acts on it (x, y).
-        security_margin: Clearance between bodies that the task requires [length unit].
-        length_unit: Name of the scene's unit of length.
-        obstacles: What does not move; criteria measure distances to their middles.
-    """
+    """A task of one posture (Chen & Zalzala 1995, section 4.2)."""
 
     component: ClassVar[str] = "docking"
 
-    target: Point2
-    force: Point2
-    security_margin: NonNegative
-    length_unit: str
+    target: Point2  # X_e, Y_e of the end-effector [length unit]
+    force: Point2  # F that acts on it (x, y)
+    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
+    length_unit: str  # name of the scene's unit of length
+    # what does not move; criteria measure distances to their middles
     obstacles: tuple[Obstacle, ...] = ()
 
     def named_places(self, robot: Any) -> list[tuple[str, tuple[float, ...]]]:

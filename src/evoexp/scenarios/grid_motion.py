@@ -20,31 +20,21 @@ POST = 0.02  # [cell] thickness of bodies that span one node: a box has some
 
 
 class GridMotion(Component):
-    """A path over a grid whose nodes are one length unit apart (Chen & Zalzala 1995, section 2).
-
-    Attributes:
-        size: How many nodes there are along x, y[, z].
-        start: Node (x, y[, z]), counted from 0; y points up.
-        goal: Node.
-        obstacle_height: Of what stands on the floor, where the grid is two-dimensional [length
-            unit].
-        security_margin: Clearance between bodies that the task requires [length unit].
-        length_unit: Name of the unit that nodes are apart.
-        obstacles: Blocks of nodes from (x0, y0[, z0]) to (x1, y1[, z1]), both included: x0, y0, x1,
-            y1.
-        map: A file with more obstacles, see `grid_maps.read_map`.
-    """
+    """A path over a grid whose nodes are one length unit apart (Chen & Zalzala 1995, section 2)."""
 
     component: ClassVar[str] = "grid_motion"
 
+    # how many nodes there are along x, y[, z]
     size: Annotated[tuple[Count, ...], Field(min_length=2, max_length=3)]
-    start: Node
-    goal: Node
+    start: Node  # node (x, y[, z]), counted from 0; y points up
+    goal: Node  # node
+    # of what stands on the floor, where the grid is two-dimensional [length unit]
     obstacle_height: Positive
-    security_margin: NonNegative
-    length_unit: str
+    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
+    length_unit: str  # name of the unit that nodes are apart
+    # blocks of nodes from (x0, y0[, z0]) to (x1, y1[, z1]), both included: x0, y0, x1, y1
     obstacles: tuple[Corners, ...] = ()
-    map: File | None = None
+    map: File | None = None  # A file with more obstacles, see `grid_maps.read_map`
 
     @model_validator(mode="after")
     def _nodes_are_inside(self) -> Self:

@@ -21,17 +21,13 @@ ROUNDING = 2.0**-48  # [-] more than the relative errors of what `_reach` comput
 
 
 class Posture(Settings):
-    """A posture of one robot: link angles, or the end-effector's place with an elbow.
+    """A posture of one robot: link angles, or the end-effector's place with an elbow."""
 
-    Attributes:
-        angles: Of the links, absolute, from +x [deg].
-        tip: Of the end-effector (x, y) [length unit of the scene].
-        elbow: Which of the two elbows that reach `tip`: the one to its left or to its right, seen
-            from the base.
-    """
-
+    # of the links, absolute, from +x [deg]
     angles: Annotated[Vector, Field(min_length=2, max_length=2)] | None = None
-    tip: tuple[float, float] | None = None
+    tip: tuple[float, float] | None = None  # of the end-effector (x, y) [length unit of the scene]
+    # which of the two elbows that reach `tip`: the one to its left or to its right, seen from
+    # the base
     elbow: Literal["left", "right"] | None = None
 
     @model_validator(mode="after")
@@ -77,26 +73,18 @@ class Posture(Settings):
 
 
 class LinkMotion(Component):
-    """Start and goal of every robot, and the obstacles around them.
-
-    Attributes:
-        q_start: Posture of every robot at the start.
-        q_goal: At the goal.
-        stationary: Robots (counted from 0) that keep their start posture; their goal must be the
-            same.
-        security_margin: Clearance between bodies that the task requires [length unit].
-        length_unit: Name of the scene's unit of length.
-        obstacles: What does not move.
-    """
+    """Start and goal of every robot, and the obstacles around them."""
 
     component: ClassVar[str] = "link_motion"
 
+    # posture of every robot at the start
     q_start: Annotated[tuple[Posture, ...], Field(min_length=2)]
-    q_goal: Annotated[tuple[Posture, ...], Field(min_length=2)]
+    q_goal: Annotated[tuple[Posture, ...], Field(min_length=2)]  # at the goal
+    # robots (counted from 0) that keep their start posture; their goal must be the same
     stationary: tuple[int, ...] = ()
-    security_margin: NonNegative
-    length_unit: str
-    obstacles: tuple[Obstacle, ...] = ()
+    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
+    length_unit: str  # name of the scene's unit of length
+    obstacles: tuple[Obstacle, ...] = ()  # what does not move
 
     def ends(self, bases: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return link angles of all robots at start and goal, each (robots, 2) [deg].

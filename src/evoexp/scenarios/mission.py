@@ -8,22 +8,16 @@ from evoexp.validation import Component
 
 
 class Mission(Component):
-    """Both examples of Chen & Zalzala 1995 together.
-
-    Attributes:
-        grid: The floor; its goal is where the platform is expected to dock.
-        docking: The task of the arm, in a plane whose origin is at `task_origin`.
-        task_origin: Where on the floor the task's X = 0 is (x, y); X points along x, the task's Y =
-            0 is the height of the arm's first joint [length unit].
-        travel_posture: θ1, θ2, θ3 while the platform drives [deg].
-    """
+    """Both examples of Chen & Zalzala 1995 together."""
 
     component: ClassVar[str] = "mission"
 
-    grid: GridMotion
-    docking: Docking
+    grid: GridMotion  # the floor; its goal is where the platform is expected to dock
+    docking: Docking  # the task of the arm, in a plane whose origin is at `task_origin`
+    # where on the floor the task's X = 0 is (x, y); X points along x, the task's Y = 0 is the
+    # height of the arm's first joint [length unit]
     task_origin: tuple[float, float]
-    travel_posture: tuple[float, float, float]
+    travel_posture: tuple[float, float, float]  # θ1, θ2, θ3 while the platform drives [deg]
 
     @property
     def length_unit(self) -> str:

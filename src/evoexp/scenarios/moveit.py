@@ -47,15 +47,10 @@ _paths: dict[str, str] = {}  # SHA-256 of a file → its path as it was given, f
 
 
 class SceneMesh(Settings):
-    """A mesh that a scene names by its file.
+    """A mesh that a scene names by its file."""
 
-    Attributes:
-        name: As the scene names it.
-        file: Its content.
-    """
-
-    name: str
-    file: File
+    name: str  # as the scene names it
+    file: File  # its content
 
 
 class Joints(NamedTuple):
@@ -74,27 +69,20 @@ class MoveitTask(Component):
     """A planning scene and a request; in a configuration both are paths of YAML files.
 
     `packages` tells the folders of packages of meshes, by their names.
-
-    Attributes:
-        scene: A `moveit_msgs/PlanningScene`.
-        request: A `moveit_msgs/MotionPlanRequest`.
-        security_margin: Clearance between bodies that the task requires [m].
-        position_tolerance: Of the tool at a goal of joints, for planners that end at poses [m].
-        angle_tolerance: The same of its orientation [deg].
-        meshes: That the scene names by their files.
-        frame_names: The id of a fixed transform that names its frame; `header` where a scene has
-            other frames than one. Runs before November 2026 took the child's, and are refused.
     """
 
     component: ClassVar[str] = "moveit"
     length_unit: ClassVar[str] = "m"
 
-    scene: File
-    request: File
-    security_margin: NonNegative
+    scene: File  # A `moveit_msgs/PlanningScene`
+    request: File  # A `moveit_msgs/MotionPlanRequest`
+    security_margin: NonNegative  # clearance between bodies that the task requires [m]
+    # of the tool at a goal of joints, for planners that end at poses [m]
     position_tolerance: Positive
-    angle_tolerance: Positive
-    meshes: tuple[SceneMesh, ...] = ()
+    angle_tolerance: Positive  # the same of its orientation [deg]
+    meshes: tuple[SceneMesh, ...] = ()  # that the scene names by their files
+    # the id of a fixed transform that names its frame; `header` where a scene has other
+    # frames than one. Runs before November 2026 took the child's, and are refused
     frame_names: Literal["child", "header"] = "child"
 
     @classmethod

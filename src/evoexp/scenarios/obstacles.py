@@ -20,13 +20,10 @@ SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE, ELLIPSE = range(6)
 
 
 class NamedObstacle(Settings):
-    """Base of all obstacles.
+    """Base of all obstacles."""
 
-    Attributes:
-        name: By which contacts, objects and verdicts speak of it; without one it is `obstacle_1`
-            and so on.
-    """
-
+    # by which contacts, objects and verdicts speak of it; without one it is `obstacle_1` and
+    # so on
     name: str = ""
 
 
@@ -66,16 +63,11 @@ class CylinderObstacle(NamedObstacle):
 
 
 class HalfSpaceObstacle(NamedObstacle):
-    """All points on one side of a plane (in the plane: of a line): a floor, a wall.
-
-    Attributes:
-        point: Any point of the boundary.
-        normal: Points out of the solid, of any length but 0.
-    """
+    """All points on one side of a plane (in the plane: of a line): a floor, a wall."""
 
     shape: Literal["half_space"]
-    point: Point
-    normal: Point
+    point: Point  # any point of the boundary
+    normal: Point  # points out of the solid, of any length but 0
 
 
 class EllipseObstacle(NamedObstacle):
@@ -85,34 +77,25 @@ class EllipseObstacle(NamedObstacle):
 
     The third semi-axis decides nothing for links that move in the plane of the centre: in a plane
     of symmetry of a convex body, distances are those of its section.
-
-    Attributes:
-        center: Of the ellipse.
-        semi_axes: Both, of any order.
-        angle: Of the first semi-axis, from +x [deg].
     """
 
     shape: Literal["ellipse"]
-    center: Point
-    semi_axes: tuple[Positive, Positive]
-    angle: float = 0.0
+    center: Point  # of the ellipse
+    semi_axes: tuple[Positive, Positive]  # both, of any order
+    angle: float = 0.0  # of the first semi-axis, from +x [deg]
 
 
 class HullObstacle(NamedObstacle):
     """The convex hull of points, turned by roll, pitch and yaw [deg] as a box is.
 
     Searches test the box around it, along the axes of its frame; verdicts are of the hull.
-
-    Attributes:
-        points: (points, 3) in its frame [length unit], not all in one plane.
-        center: Origin of its frame.
-        rotation: Of its frame.
     """
 
     shape: Literal["hull"]
+    # (points, 3) in its frame [length unit], not all in one plane
     points: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=4)]
-    center: Point = (0.0, 0.0, 0.0)
-    rotation: Angles = (0.0, 0.0, 0.0)
+    center: Point = (0.0, 0.0, 0.0)  # origin of its frame
+    rotation: Angles = (0.0, 0.0, 0.0)  # of its frame
 
     @property
     def box(self) -> tuple[FloatArray, FloatArray]:

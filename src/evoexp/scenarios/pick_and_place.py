@@ -11,32 +11,23 @@ Point2 = tuple[float, float]
 
 
 class PickAndPlace(Component):
-    """Start posture, via point and goal point of a planar arm's tip (Lavoie & Boudreau 2001, 4).
-
-    Attributes:
-        q_start: Posture at the start, joint angles relative to the link before [rad].
-        via_point: Where the tip shall be at the end of the first sub-path (x, y) [length unit].
-        goal_point: Where it shall be at the end of the second one.
-        box_x: Least and greatest x of the box in which the tip must be at the end of the second
-            sub-path.
-        box_y: The same of y.
-        obstacle_shift: By how much obstacles and box are moved together (dx, dy).
-        security_margin: Clearance between bodies that the task requires.
-        length_unit: Name of the scene's unit of length.
-        obstacles: What does not move.
-    """
+    """Start posture, via point and goal point of a planar arm's tip (Lavoie & Boudreau 2001, 4)."""
 
     component: ClassVar[str] = "pick_and_place"
 
+    # posture at the start, joint angles relative to the link before [rad]
     q_start: Annotated[Vector, Field(min_length=1)]
+    # where the tip shall be at the end of the first sub-path (x, y) [length unit]
     via_point: Point2
-    goal_point: Point2
+    goal_point: Point2  # where it shall be at the end of the second one
+    # least and greatest x of the box in which the tip must be at the end of the second sub-
+    # path
     box_x: Point2
-    box_y: Point2
-    obstacle_shift: Point2
-    security_margin: NonNegative
-    length_unit: str
-    obstacles: tuple[Obstacle, ...] = ()
+    box_y: Point2  # the same of y
+    obstacle_shift: Point2  # by how much obstacles and box are moved together (dx, dy)
+    security_margin: NonNegative  # clearance between bodies that the task requires
+    length_unit: str  # name of the scene's unit of length
+    obstacles: tuple[Obstacle, ...] = ()  # what does not move
 
     @model_validator(mode="after")
     def _box_has_an_inside(self) -> Self:

@@ -16,16 +16,12 @@ Point3 = tuple[float, float, float]
 
 
 class PointGoal(Settings):
-    """A point that the controlled frame shall reach, or the surface of a ball around it.
-
-    Attributes:
-        point: The point.
-        radius: Of the ball, whose surface is the goal; it is no obstacle. 0: the point itself is
-            the goal [length unit].
-    """
+    """A point that the controlled frame shall reach, or the surface of a ball around it."""
 
     kind: Literal["point"]
-    point: Point3
+    point: Point3  # the point
+    # of the ball, whose surface is the goal; it is no obstacle. 0: the point itself is the
+    # goal [length unit]
     radius: NonNegative = 0.0
 
 
@@ -38,40 +34,26 @@ class PoseGoal(Settings):
 
 
 class SurfaceGoal(Settings):
-    """The surface of an obstacle.
-
-    Attributes:
-        object: Its name.
-    """
+    """The surface of an obstacle."""
 
     kind: Literal["surface"]
-    object: str
+    object: str  # its name
 
 
 class PlaceGoal(Settings):
-    """A disc across the direction up, on which the controlled frame's origin shall come to lie.
-
-    Attributes:
-        point: Its middle.
-        radius: Its radius [length unit].
-    """
+    """A disc across the direction up, on which the controlled frame's origin shall come to lie."""
 
     kind: Literal["place"]
-    point: Point3
-    radius: Positive
+    point: Point3  # its middle
+    radius: Positive  # its radius [length unit]
 
 
 class ShiftGoal(Settings):
-    """Where the controlled frame is when the phase begins, moved.
-
-    Attributes:
-        offset: By how much [length unit].
-        frame: Whether along the world's axes or the tool's.
-    """
+    """Where the controlled frame is when the phase begins, moved."""
 
     kind: Literal["shift"]
-    offset: Point3
-    frame: Literal["world", "tool"]
+    offset: Point3  # by how much [length unit]
+    frame: Literal["world", "tool"]  # whether along the world's axes or the tool's
 
 
 AnyGoal = Annotated[
@@ -84,67 +66,49 @@ class Phase(Settings):
 
     The controlled frame is the tool's or, while an object is held, the object's: its centre, its
     own axes.
-
-    Attributes:
-        name: For reports.
-        goal: Where it ends.
-        terms: Cost terms that count in it; empty: all of the objective.
-        contacts: Pairs of names (bodies, obstacles) that may touch in it, as deep as the task's
-            `allowed_penetration`.
-        then: Whether the robot takes hold of an object when the goal is met, or lets go of what it
-            holds.
-        object: What it takes hold of.
-        position_tolerance: In place of the task's.
-        upright_tolerance: The goal is met only with so small a tilt [deg]; None: within the hard
-            limit of `upright`, if that counts.
-        scope_share: Part of the planner's scope that joints may step in it [-].
     """
 
-    name: str
-    goal: AnyGoal
-    terms: tuple[str, ...] = ()
+    name: str  # for reports
+    goal: AnyGoal  # where it ends
+    terms: tuple[str, ...] = ()  # cost terms that count in it; empty: all of the objective
+    # pairs of names (bodies, obstacles) that may touch in it, as deep as the task's
+    # `allowed_penetration`
     contacts: tuple[tuple[str, str], ...] = ()
+    # whether the robot takes hold of an object when the goal is met, or lets go of what it
+    # holds
     then: Literal["go_on", "attach", "detach"] = "go_on"
-    object: str = ""
-    position_tolerance: Positive | None = None
+    object: str = ""  # what it takes hold of
+    position_tolerance: Positive | None = None  # in place of the task's
+    # the goal is met only with so small a tilt [deg]; None: within the hard limit of
+    # `upright`, if that counts
     upright_tolerance: Positive | None = None
+    # part of the planner's scope that joints may step in it [-]
     scope_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
 
 
 class PostureTask(Component):
-    """Start posture, phases and surroundings of one arm.
-
-    Attributes:
-        q_start: Posture at the start [deg], lengths for sliding joints.
-        phases: What is to be done, one after the other.
-        subgoals: Points that the tool passes before the first phase.
-        position_tolerance: A goal is met this close [length unit].
-        angle_tolerance: And with orientations this close [deg].
-        up: The direction that counts as up.
-        security_margin: Clearance between bodies that the task requires [length unit].
-        length_unit: Name of the scene's unit of length.
-        check_reach: Whether a goal that no posture can reach is refused; false: it is searched all
-            the same.
-        obstacles: What stands around, things to be grasped included.
-        allowed_penetration: How deep pairs that may touch may overlap; None where no phase has
-            such pairs [length unit].
-        empty_scene: Whether all obstacles are taken away but those that a goal or a grasp names:
-            the control by which obstacles are judged.
-    """
+    """Start posture, phases and surroundings of one arm."""
 
     component: ClassVar[str] = "posture_task"
 
+    # posture at the start [deg], lengths for sliding joints
     q_start: Annotated[Vector, Field(min_length=1)]
+    # what is to be done, one after the other
     phases: Annotated[tuple[Phase, ...], Field(min_length=1)]
-    subgoals: tuple[Point3, ...] = ()
-    position_tolerance: Positive
-    angle_tolerance: Positive
-    up: Point3 = (0.0, 0.0, 1.0)
-    security_margin: NonNegative
-    length_unit: str
+    subgoals: tuple[Point3, ...] = ()  # points that the tool passes before the first phase
+    position_tolerance: Positive  # A goal is met this close [length unit]
+    angle_tolerance: Positive  # and with orientations this close [deg]
+    up: Point3 = (0.0, 0.0, 1.0)  # the direction that counts as up
+    security_margin: NonNegative  # clearance between bodies that the task requires [length unit]
+    length_unit: str  # name of the scene's unit of length
+    # whether a goal that no posture can reach is refused; false: it is searched all the same
     check_reach: bool = True
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()  # what stands around, things to be grasped included
+    # how deep pairs that may touch may overlap; None where no phase has such pairs [length
+    # unit]
     allowed_penetration: Positive | None = None
+    # whether all obstacles are taken away but those that a goal or a grasp names: the control
+    # by which obstacles are judged
     empty_scene: bool = False
 
     @model_validator(mode="after")

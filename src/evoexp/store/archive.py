@@ -49,17 +49,11 @@ class ArchiveError(EvoexpError):
 
 
 class TakenRun(NamedTuple):
-    """A run of an archive after it was taken into a store.
+    """A run of an archive after it was taken into a store."""
 
-    Attributes:
-        run: In the store.
-        added: Replicates that were not there before.
-        kept: Replicates that were there already, and stay as they are.
-    """
-
-    run: RunDirectory
-    added: int
-    kept: int
+    run: RunDirectory  # in the store
+    added: int  # replicates that were not there before
+    kept: int  # replicates that were there already, and stay as they are
 
 
 def pack(runs: Sequence[RunDirectory], path: Path) -> int:
@@ -235,17 +229,11 @@ class _Arrival:
 
 
 class _Member(NamedTuple):
-    """A file of an archive.
+    """A file of an archive."""
 
-    Attributes:
-        name: `runs/<hash12>/…`.
-        start: Offset of its content [B].
-        size: [B] of its content.
-    """
-
-    name: str
-    start: int
-    size: int
+    name: str  # `runs/<hash12>/…`
+    start: int  # offset of its content [B]
+    size: int  # [B] of its content
 
     @property
     def is_log(self) -> bool:

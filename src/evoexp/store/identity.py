@@ -32,27 +32,17 @@ class DamagedFile(StoreError):
 
 
 class FoundLog(NamedTuple):
-    """A log that holds the truth about its run.
+    """A log that holds the truth about its run."""
 
-    Attributes:
-        name: Of its file.
-        contents: What it holds; its configuration has the hash of the condition.
-    """
-
-    name: str
-    contents: LogContents
+    name: str  # of its file
+    contents: LogContents  # what it holds; its configuration has the hash of the condition
 
 
 class Plan(NamedTuple):
-    """A number of replicates that was asked for.
+    """A number of replicates that was asked for."""
 
-    Attributes:
-        num_replicates: All of them, those stored by then included.
-        stored: Logs that were there already, whose results could be known.
-    """
-
-    num_replicates: int
-    stored: int
+    num_replicates: int  # all of them, those stored by then included
+    stored: int  # logs that were there already, whose results could be known
 
 
 def stored_id(path: Path) -> str:

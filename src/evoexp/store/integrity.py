@@ -63,19 +63,13 @@ _REPEATED = ("best_cost", "evaluations", "collision_queries", "solved")
 
 
 class LogCheck(NamedTuple):
-    """A log that was looked at.
+    """A log that was looked at."""
 
-    Attributes:
-        name: Of its file.
-        problem: What is wrong with it, in one line; empty if nothing is.
-        summary: Its own; None where it cannot be read.
-        unevaluated: Why its solutions could not be evaluated; empty if they were, or if something
-            is wrong with the log.
-    """
-
-    name: str
-    problem: str
-    summary: ReplicateSummary | None
+    name: str  # of its file
+    problem: str  # what is wrong with it, in one line; empty if nothing is
+    summary: ReplicateSummary | None  # its own; None where it cannot be read
+    # why its solutions could not be evaluated; empty if they were, or if something is wrong with
+    # the log
     unevaluated: str = ""
 
 
@@ -84,19 +78,12 @@ Evaluation = Callable[[Path, LogContents], Iterator[str]]
 
 
 class RunCheck(NamedTuple):
-    """A stored run without its logs.
+    """A stored run without its logs."""
 
-    Attributes:
-        name: Of its directory.
-        run: None where nothing in the directory knows its condition.
-        problems: File → what is wrong with it.
-        leftovers: Files that are no part of a run: temporary, set aside earlier, unknown.
-    """
-
-    name: str
-    run: RunDirectory | None
-    problems: dict[str, str]
-    leftovers: list[str]
+    name: str  # of its directory
+    run: RunDirectory | None  # none where nothing in the directory knows its condition
+    problems: dict[str, str]  # file → what is wrong with it
+    leftovers: list[str]  # files that are no part of a run: temporary, set aside earlier, unknown
 
 
 def check_run(outputs: Path, name: str) -> RunCheck:

@@ -29,16 +29,11 @@ Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
 
 class _Summary(NamedTuple):
-    """The table of a run, and what it notes of the files behind it.
+    """The table of a run, and what it notes of the files behind it."""
 
-    Attributes:
-        table: One row per file that can be used, and per failure.
-        files: Stamps of all files, in the order of the replicates.
-        damaged: Name → what is wrong with it; a damaged log has no row, a damaged failure has one.
-    """
-
-    table: pa.Table
-    files: Stamps
+    table: pa.Table  # one row per file that can be used, and per failure
+    files: Stamps  # stamps of all files, in the order of the replicates
+    # name → what is wrong with it; a damaged log has no row, a damaged failure has one
     damaged: dict[str, str]
 
     @property

@@ -19,37 +19,22 @@ class ContractBroken(AssertionError):
 
 
 class Watched(NamedTuple):
-    """One generation as a planner yielded it, and copies made before the next one was asked for.
+    """One generation as a planner yielded it, and copies made before the next one was asked for."""
 
-    Attributes:
-        generation: The record; `costs` and `population` are copies.
-        best_afterwards: The very array of the best solution; it must keep its values.
-        best: Copy of these values.
-    """
-
-    generation: Generation
-    best_afterwards: FloatArray
-    best: FloatArray
+    generation: Generation  # the record; `costs` and `population` are copies
+    best_afterwards: FloatArray  # the very array of the best solution; it must keep its values
+    best: FloatArray  # copy of these values
 
 
 class EvolutionRecord(NamedTuple):
-    """Replicate 0 of a condition.
+    """Replicate 0 of a condition."""
 
-    Attributes:
-        planner: The planner.
-        problem: Its problem.
-        watched: One entry per generation, the initial one first.
-        last_population: The last population itself, after the planner has ended.
-        has_drawn: Whether the planner drew from its generator.
-        global_randomness: Whether numpy's and Python's global generators were used.
-    """
-
-    planner: Any
-    problem: Any
-    watched: tuple[Watched, ...]
-    last_population: NDArray[Any]
-    has_drawn: bool
-    global_randomness: bool
+    planner: Any  # the planner
+    problem: Any  # its problem
+    watched: tuple[Watched, ...]  # one entry per generation, the initial one first
+    last_population: NDArray[Any]  # the last population itself, after the planner has ended
+    has_drawn: bool  # whether the planner drew from its generator
+    global_randomness: bool  # whether numpy's and Python's global generators were used
 
     @property
     def generations(self) -> list[Generation]:

@@ -36,23 +36,14 @@ STRINGS = (
 
 
 class GalleryRobot(NamedTuple):
-    """A robot, and the joints of one of its arms.
+    """A robot, and the joints of one of its arms."""
 
-    Attributes:
-        name: Of the robot.
-        path: Of its URDF in the package.
-        joints: That move; none: all.
-        tool: Frame of the tool, empty for the last one.
-        thickness: Radius of the spheres by which `via_point_ga` tests its links [m].
-        srdf: Its SRDF in the package; empty: pairs of bodies are derived from samples alone.
-    """
-
-    name: str
-    path: str
-    joints: tuple[str, ...] = ()
-    tool: str = ""
-    thickness: float = 0.06
-    srdf: str = ""
+    name: str  # of the robot
+    path: str  # of its URDF in the package
+    joints: tuple[str, ...] = ()  # that move; none: all
+    tool: str = ""  # frame of the tool, empty for the last one
+    thickness: float = 0.06  # radius of the spheres by which `via_point_ga` tests its links [m]
+    srdf: str = ""  # its SRDF in the package; empty: pairs of bodies are derived from samples alone
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -148,35 +139,21 @@ ROBOTS = (
 
 
 class Reach(NamedTuple):
-    """A reach of a robot, as a task of each planner.
+    """A reach of a robot, as a task of each planner."""
 
-    Attributes:
-        postures: For `posture_es`: to the point where the tool is at the goal.
-        strings: For `via_point_ga`: to the goal's configuration.
-        q_start: (nq,) start [deg, m].
-        q_goal: (nq,) goal.
-    """
-
-    postures: Condition
-    strings: Condition
-    q_start: FloatArray
-    q_goal: FloatArray
+    postures: Condition  # for `posture_es`: to the point where the tool is at the goal
+    strings: Condition  # for `via_point_ga`: to the goal's configuration
+    q_start: FloatArray  # (nq,) start [deg, m]
+    q_goal: FloatArray  # (nq,) goal
 
 
 class PlannedReach(NamedTuple):
-    """A reach, and the summaries of certified motions by both planners.
+    """A reach, and the summaries of certified motions by both planners."""
 
-    Attributes:
-        reach: The reach.
-        postures: Of `posture_es`; None: no motion was certified.
-        strings: Of `via_point_ga`, likewise.
-        draws: How many starts and goals were drawn.
-    """
-
-    reach: Reach
-    postures: ReplicateSummary | None
-    strings: ReplicateSummary | None
-    draws: int
+    reach: Reach  # the reach
+    postures: ReplicateSummary | None  # of `posture_es`; None: no motion was certified
+    strings: ReplicateSummary | None  # of `via_point_ga`, likewise
+    draws: int  # how many starts and goals were drawn
 
 
 def planned_reach(robot: GalleryRobot) -> PlannedReach:

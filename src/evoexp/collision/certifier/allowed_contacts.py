@@ -28,21 +28,14 @@ EPA_ERROR = 1e-6  # [-] of the scene's size: of coal's depths, by its own tolera
 
 
 class Depth(NamedTuple):
-    """The greatest depth of one pair that may touch.
+    """The greatest depth of one pair that may touch."""
 
-    Attributes:
-        contact: The pair.
-        greatest: Greatest depth found; 0 if the bodies never touch [length unit].
-        at: Where [instant].
-        too_deep_at: Where the bodies first overlap deeper than they may [instant]; None: nowhere.
-        decided: Whether the limit of queries was enough.
-    """
-
-    contact: AllowedContact
-    greatest: float
-    at: float
+    contact: AllowedContact  # the pair
+    greatest: float  # greatest depth found; 0 if the bodies never touch [length unit]
+    at: float  # where [instant]
+    # where the bodies first overlap deeper than they may [instant]; None: nowhere
     too_deep_at: float | None
-    decided: bool
+    decided: bool  # whether the limit of queries was enough
 
 
 class _DepthGoals(LeafGoals):

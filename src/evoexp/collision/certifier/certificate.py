@@ -17,34 +17,26 @@ class Certificate(NamedTuple):
     """Fields of `ReplicateSummary` that the certifier fills; without a motion they say nothing.
 
     Pairs that may touch count for `certified` and `refuted_at` alone, by their depth.
-
-    Attributes:
-        certified: Whether the bodies never touch, and those that may never overlap deeper than
-            they may; None: undecided.
-        certified_margin: Whether they never come closer than the security margin; None: undecided.
-        clearance: Least distance of the bodies over the whole motion [length unit of the scene]; 0
-            where they touch.
-        clearance_at: Where [instant].
-        clearance_pair: Which bodies.
-        refuted_at: First contact [instant]; None: there is none.
-        refuted_pair: Which bodies touch there.
-        certificate_queries: Exact distances that were computed.
-        allowed_contacts: The pairs that may touch somewhere in the motion, separated by commas.
-        penetration: Their greatest depth; 0 where they never touch, None without such pairs.
-        penetration_pair: Which pair.
     """
 
+    # whether the bodies never touch, and those that may never overlap deeper than they may; None:
+    # undecided
     certified: bool | None = None
+    # whether they never come closer than the security margin; None: undecided
     certified_margin: bool | None = None
+    # least distance of the bodies over the whole motion [length unit of the scene]; 0 where they
+    # touch
     clearance: float = math.nan
-    clearance_at: float | None = None
-    clearance_pair: str = ""
-    refuted_at: float | None = None
-    refuted_pair: str = ""
-    certificate_queries: int = 0
+    clearance_at: float | None = None  # where [instant]
+    clearance_pair: str = ""  # which bodies
+    refuted_at: float | None = None  # first contact [instant]; None: there is none
+    refuted_pair: str = ""  # which bodies touch there
+    certificate_queries: int = 0  # exact distances that were computed
+    # the pairs that may touch somewhere in the motion, separated by commas
     allowed_contacts: str = ""
+    # their greatest depth; 0 where they never touch, None without such pairs
     penetration: float | None = None
-    penetration_pair: str = ""
+    penetration_pair: str = ""  # which pair
 
 
 def certificate(parts: Sequence[Part], motion: Motion, security_margin: float) -> Certificate:

@@ -40,38 +40,24 @@ class QueryLimit(EvoexpError):
 
 
 class _Scratch(threading.local):
-    """A thread's last `pin.Data`, which takes as long to make as two distances.
+    """A thread's last `pin.Data`, which takes as long to make as two distances."""
 
-    Attributes:
-        model: The model that it belongs to.
-        data: The data.
-        owner: Mark of the `CoalDistance` whose placements it holds.
-    """
-
-    model: Any = None
-    data: Any = None
-    owner: object = None
+    model: Any = None  # the model that it belongs to
+    data: Any = None  # the data
+    owner: object = None  # mark of the `CoalDistance` whose placements it holds
 
 
 _scratch = _Scratch()
 
 
 class _Body(NamedTuple):
-    """A body: coal's shape, and its place.
+    """A body: coal's shape, and its place."""
 
-    Attributes:
-        number: Of its shape in the scene.
-        shape: Coal's.
-        joint: Index of its Pinocchio joint; 0: the world.
-        local: Its `pin.SE3` in the joint's frame.
-        num_triangles: Of a mesh; 0 for convex shapes.
-    """
-
-    number: int
-    shape: Any
-    joint: int
-    local: Any
-    num_triangles: int
+    number: int  # of its shape in the scene
+    shape: Any  # coal's
+    joint: int  # index of its Pinocchio joint; 0: the world
+    local: Any  # its `pin.SE3` in the joint's frame
+    num_triangles: int  # of a mesh; 0 for convex shapes
 
 
 class CoalDistance:
@@ -202,17 +188,12 @@ def _body(scene: Scene, index: int) -> _Body:
 
 
 class _Balls(NamedTuple):
-    """The balls around the bodies of a scene.
+    """The balls around the bodies of a scene."""
 
-    Attributes:
-        moving: Index, joint, and middle in the joint's frame, of each body that moves.
-        middles: (bodies, 3) in the world; those of moving bodies are set at every instant.
-        reach: (pairs,) sums of both radii.
-    """
-
+    # index, joint, and middle in the joint's frame, of each body that moves
     moving: list[tuple[int, int, FloatArray]]
-    middles: FloatArray
-    reach: FloatArray
+    middles: FloatArray  # (bodies, 3) in the world; those of moving bodies are set at every instant
+    reach: FloatArray  # (pairs,) sums of both radii
 
 
 def _balls(scene: Scene) -> _Balls:
@@ -293,19 +274,12 @@ def walk_down(
 
 
 class Leaf(NamedTuple):
-    """Coal's findings on an interval for one pair.
+    """Coal's findings on an interval for one pair."""
 
-    Attributes:
-        least: Least distance [length unit].
-        at: t of it.
-        first: t of the first distance at or below the level; inf if none.
-        proven: Lower bound before `first`.
-    """
-
-    least: float
-    at: float
-    first: float
-    proven: float
+    least: float  # least distance [length unit]
+    at: float  # t of it
+    first: float  # t of the first distance at or below the level; inf if none
+    proven: float  # lower bound before `first`
 
 
 def search_interval(
@@ -361,21 +335,12 @@ def search_interval(
 
 
 class LeafGoals(NamedTuple):
-    """The question that coal answers on an interval.
+    """The question that coal answers on an interval."""
 
-    Attributes:
-        goal: Distance that is to be proven at least.
-        level: The first instant is wanted at which the distance is at or below it.
-        slack: Coal's error.
-        known: An upper bound of the least distance of the scene.
-        resolution: See `Goal`.
-        floor: See `Goal`.
-    """
-
-    goal: float
-    level: float
-    slack: float
-    known: float
+    goal: float  # distance that is to be proven at least
+    level: float  # the first instant is wanted at which the distance is at or below it
+    slack: float  # coal's error
+    known: float  # an upper bound of the least distance of the scene
     resolution: float
     floor: float
 

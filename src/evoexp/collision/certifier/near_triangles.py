@@ -17,55 +17,32 @@ LARGE = 0.7  # [-] of a mesh's triangles: as many are not worth a mesh of their 
 
 
 class Surface(NamedTuple):
-    """A mesh as arrays, in its own frame.
+    """A mesh as arrays, in its own frame."""
 
-    Attributes:
-        corners: (corners, 3).
-        triangles: (triangles, 3) their corners.
-        centers: (triangles, 3) of balls that hold the triangles.
-        radii: (triangles,) of the balls.
-    """
-
-    corners: FloatArray
-    triangles: IntArray
-    centers: FloatArray
-    radii: FloatArray
+    corners: FloatArray  # (corners, 3)
+    triangles: IntArray  # (triangles, 3) their corners
+    centers: FloatArray  # (triangles, 3) of balls that hold the triangles
+    radii: FloatArray  # (triangles,) of the balls
 
 
 class _Core(NamedTuple):
-    """A box, widened about z and then swept by a ball, which holds a shape.
+    """A box, widened about z and then swept by a ball, which holds a shape."""
 
-    Attributes:
-        low: (3,) least coordinates of the box in the shape's frame.
-        high: (3,) greatest coordinates.
-        around: By how much it is widened in the plane of x and y: the radius of a cylinder.
-        swept: Radius of the ball.
-    """
-
-    low: FloatArray
-    high: FloatArray
-    around: float
-    swept: float
+    low: FloatArray  # (3,) least coordinates of the box in the shape's frame
+    high: FloatArray  # (3,) greatest coordinates
+    around: float  # by how much it is widened in the plane of x and y: the radius of a cylinder
+    swept: float  # radius of the ball
 
 
 class NearPart(NamedTuple):
-    """A mesh without the triangles that are too far from the other body in a part of a motion.
+    """A mesh without the triangles that are too far from the other body in a part of a motion."""
 
-    Attributes:
-        pair: The pair of bodies.
-        begin: Where the part begins [instant].
-        end: Where it ends.
-        way: By how much the distance can change in it [length unit].
-        mesh: Coal's, of the triangles that are left.
-        kept: Indices of these triangles.
-    """
-
-    pair: int
-    begin: float
-    end: float
-    way: float
-    mesh: Any
-    kept: IntArray
+    pair: int  # the pair of bodies
+    begin: float  # where the part begins [instant]
+    end: float  # where it ends
+    way: float  # by how much the distance can change in it [length unit]
+    mesh: Any  # coal's, of the triangles that are left
+    kept: IntArray  # indices of these triangles
 
     def holds(self, pair: int, begin: float, end: float) -> bool:
         """Return whether it answers for a pair from begin to end."""

@@ -39,96 +39,56 @@ LEAST, FIRST, FIRST_PAIR, PROVEN, NODES, LEAVES = range(6)
 
 
 class Sweep(NamedTuple):
-    """The findings of a sweep.
+    """The findings of a sweep."""
 
-    Attributes:
-        least: Least upper bound of a distance that was found; inf if none.
-        first: t of the first distance at or below a pair's `level`; inf if none.
-        first_pair: Its pair; −1 if none.
-        proven: Lower bound of all distances, outside the leaves, before `first`.
-        nodes: Intervals that were judged.
-        done: False if `max_nodes` were used up.
-        leaves: (leaves, 3) pair, begin, end [instants] of intervals left open.
-        pair_least: (pairs,) like `least`, pair by pair; where upper bounds are not believed, the
-            least lower bound at an instant.
-        pair_least_at: (pairs,) the t of it.
-    """
-
-    least: float
-    first: float
-    first_pair: int
-    proven: float
-    nodes: int
-    done: bool
-    leaves: FloatArray
+    least: float  # least upper bound of a distance that was found; inf if none
+    first: float  # t of the first distance at or below a pair's `level`; inf if none
+    first_pair: int  # its pair; −1 if none
+    proven: float  # lower bound of all distances, outside the leaves, before `first`
+    nodes: int  # intervals that were judged
+    done: bool  # false if `max_nodes` were used up
+    leaves: FloatArray  # (leaves, 3) pair, begin, end [instants] of intervals left open
+    # (pairs,) like `least`, pair by pair; where upper bounds are not believed, the least lower
+    # bound at an instant
     pair_least: FloatArray
-    pair_least_at: FloatArray
+    pair_least_at: FloatArray  # (pairs,) the t of it
 
 
 class Goal(NamedTuple):
-    """The question that a sweep answers.
+    """The question that a sweep answers."""
 
-    Attributes:
-        goal: (pairs,) distances that are to be proven at least.
-        level: (pairs,) the first instant is wanted at which a distance is at or below it.
-        slack: (pairs,) below it differences of distances do not count.
-        known: An upper bound of the least distance that is known already; inf if none.
-        resolution: The least distance is proven up to this part of it; inf: only `goal` is proven.
-        floor: Nor need it be proven closer than this [length unit].
-        rounding: Of distances [length unit].
-        instants: Whether all pairs are looked at at the instants first.
-        refine: Whether the first instant is found exactly; else the sweep ends at any.
-        max_nodes: Most intervals to judge.
-    """
-
-    goal: FloatArray
-    level: FloatArray
-    slack: FloatArray
-    known: float
+    goal: FloatArray  # (pairs,) distances that are to be proven at least
+    level: FloatArray  # (pairs,) the first instant is wanted at which a distance is at or below it
+    slack: FloatArray  # (pairs,) below it differences of distances do not count
+    known: float  # an upper bound of the least distance that is known already; inf if none
+    # the least distance is proven up to this part of it; inf: only `goal` is proven
     resolution: float
-    floor: float
-    rounding: float
-    instants: bool
-    refine: bool
-    max_nodes: int
+    floor: float  # nor need it be proven closer than this [length unit]
+    rounding: float  # of distances [length unit]
+    instants: bool  # whether all pairs are looked at at the instants first
+    refine: bool  # whether the first instant is found exactly; else the sweep ends at any
+    max_nodes: int  # most intervals to judge
 
 
 class Progress(NamedTuple):
-    """A sweep under way.
+    """A sweep under way."""
 
-    Attributes:
-        leaves: (MAX_LEAVES + pairs, 3) see `Sweep`; `state[LEAVES]` of them are there.
-        state: (6,) see the places above.
-        pair_least: See `Sweep`.
-        pair_least_at: See `Sweep`.
-    """
-
-    leaves: FloatArray
-    state: FloatArray
+    leaves: FloatArray  # (MAX_LEAVES + pairs, 3) see `Sweep`; `state[LEAVES]` of them are there
+    state: FloatArray  # (6,) see the places above
     pair_least: FloatArray
     pair_least_at: FloatArray
 
 
 class Levels(NamedTuple):
-    """The intervals that wait, and the pairs that each level of halving has left.
+    """The intervals that wait, and the pairs that each level of halving has left."""
 
-    Attributes:
-        bounds: (2, pairs) from `approach_bounds`.
-        above: (joints,) its scratch.
-        lists: (DEPTH + 2, pairs) pairs left on each level.
-        counts: (DEPTH + 2,) how many.
-        depths: (DEPTH + 2,) level of each interval that waits.
-        begins: (DEPTH + 2,) where it begins on its segment.
-        ends: (DEPTH + 2,) where it ends.
-    """
-
-    bounds: FloatArray
-    above: FloatArray
-    lists: IntArray
-    counts: IntArray
-    depths: IntArray
-    begins: FloatArray
-    ends: FloatArray
+    bounds: FloatArray  # (2, pairs) from `approach_bounds`
+    above: FloatArray  # (joints,) its scratch
+    lists: IntArray  # (DEPTH + 2, pairs) pairs left on each level
+    counts: IntArray  # (DEPTH + 2,) how many
+    depths: IntArray  # (DEPTH + 2,) level of each interval that waits
+    begins: FloatArray  # (DEPTH + 2,) where it begins on its segment
+    ends: FloatArray  # (DEPTH + 2,) where it ends
 
 
 def sweep_motion(task: Task, goal: Goal, work: Workspace) -> Sweep:

@@ -22,55 +22,34 @@ WIDER = 1.0 + 1e-9  # on all bounds of speed: more than rounding
 
 
 class Task(NamedTuple):
-    """A motion among bodies.
+    """A motion among bodies."""
 
-    Attributes:
-        chain: The joints.
-        bodies: The bodies.
-        pairs: (pairs, 2) indices of bodies.
-        exact: (pairs,) whether upper bounds of distances are believed; where they are not, every
-            interval in which contact cannot be excluded becomes a leaf.
-        coefficients: (segments, 4, nq) of the motion.
-        straight: Whether all segments are straight lines.
-        last: The last instant: the number of segments, or 0 for a motion of one instant.
-        weights: (pairs, joints) from `approach_weights`.
-        by_one: (pairs,) from `moved_by_one`.
-    """
-
-    chain: KinematicChain
-    bodies: BodyTable
-    pairs: IntArray
+    chain: KinematicChain  # the joints
+    bodies: BodyTable  # the bodies
+    pairs: IntArray  # (pairs, 2) indices of bodies
+    # (pairs,) whether upper bounds of distances are believed; where they are not, every interval in
+    # which contact cannot be excluded becomes a leaf
     exact: BoolArray
-    coefficients: FloatArray
-    straight: bool
-    last: float
-    weights: FloatArray
-    by_one: BoolArray
+    coefficients: FloatArray  # (segments, 4, nq) of the motion
+    straight: bool  # whether all segments are straight lines
+    last: float  # the last instant: the number of segments, or 0 for a motion of one instant
+    weights: FloatArray  # (pairs, joints) from `approach_weights`
+    by_one: BoolArray  # (pairs,) from `moved_by_one`
 
 
 class Workspace(NamedTuple):
-    """The configuration that is looked at, and scratch.
+    """The configuration that is looked at, and scratch."""
 
-    Attributes:
-        q: (nq,).
-        frames: (joints, FRAME) of the joints.
-        world: (bodies, FRAME) of the bodies.
-        stamps: (bodies + 2,) the configuration's number when each body was placed; the last but one
-            when the twists were computed; the last: its number now.
-        normals: (pairs, 3) direction across which each pair was last separated.
-        simplex: (4, 3) of `distance_bounds`.
-        scratch: (3, 3).
-        twists: (joints, 6) of the joints.
-    """
-
-    q: FloatArray
-    frames: FloatArray
-    world: FloatArray
+    q: FloatArray  # (nq,)
+    frames: FloatArray  # (joints, FRAME) of the joints
+    world: FloatArray  # (bodies, FRAME) of the bodies
+    # (bodies + 2,) the configuration's number when each body was placed; the last but one when the
+    # twists were computed; the last: its number now
     stamps: IntArray
-    normals: FloatArray
-    simplex: FloatArray
-    scratch: FloatArray
-    twists: FloatArray
+    normals: FloatArray  # (pairs, 3) direction across which each pair was last separated
+    simplex: FloatArray  # (4, 3) of `distance_bounds`
+    scratch: FloatArray  # (3, 3)
+    twists: FloatArray  # (joints, 6) of the joints
 
 
 def work_space(task: Task) -> Workspace:

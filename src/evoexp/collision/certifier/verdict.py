@@ -37,46 +37,28 @@ class Verdict(NamedTuple):
     """The certifier's verdict on a motion.
 
     An instant t may lie between two: 2.5 is half way from instant 2 to instant 3.
-
-    Attributes:
-        status: "certified": no two bodies ever touch; "refuted": two do; "undecided": a limit was
-            used up.
-        margin_status: The same for "the clearance is never less than the security margin".
-        clearance: Least distance over the motion [length unit]; 0 where bodies touch, inf without
-            pairs.
-        clearance_at: t of it; NaN without pairs.
-        clearance_pair: Names of its two bodies; None without pairs.
-        refuted_at: t of the first contact; NaN if there is none.
-        refuted_pair: Names of its two bodies.
-        proven: Lower bound of the clearance over the whole motion.
-        queries: Distances that coal was asked for.
-        intervals: Intervals that the sweep judged.
-        duration_s: Time taken [s]; NaN if no clock was given.
     """
 
+    # "certified": no two bodies ever touch; "refuted": two do; "undecided": a limit was used up
     status: Status
-    margin_status: Status
+    margin_status: Status  # the same for "the clearance is never less than the security margin"
+    # least distance over the motion [length unit]; 0 where bodies touch, inf without pairs
     clearance: float
-    clearance_at: float
-    clearance_pair: tuple[str, str] | None
-    refuted_at: float
-    refuted_pair: tuple[str, str] | None
-    proven: float
-    queries: int
-    intervals: int
-    duration_s: float
+    clearance_at: float  # t of it; NaN without pairs
+    clearance_pair: tuple[str, str] | None  # names of its two bodies; None without pairs
+    refuted_at: float  # t of the first contact; NaN if there is none
+    refuted_pair: tuple[str, str] | None  # names of its two bodies
+    proven: float  # lower bound of the clearance over the whole motion
+    queries: int  # distances that coal was asked for
+    intervals: int  # intervals that the sweep judged
+    duration_s: float  # time taken [s]; NaN if no clock was given
 
 
 class Limits(NamedTuple):
-    """Numbers after which the certifier gives up.
+    """Numbers after which the certifier gives up."""
 
-    Attributes:
-        queries: Distances that coal is asked for.
-        intervals: Intervals that the sweep judges.
-    """
-
-    queries: int = 100_000
-    intervals: int = 2_000_000
+    queries: int = 100_000  # distances that coal is asked for
+    intervals: int = 2_000_000  # intervals that the sweep judges
 
 
 DEFAULT_LIMITS = Limits()

@@ -24,21 +24,14 @@ WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
 
 
 class Cover(NamedTuple):
-    """Spheres or capsules around a body, in its joint's frame.
+    """Spheres or capsules around a body, in its joint's frame."""
 
-    Attributes:
-        start: (shapes, 3) centre, or one end.
-        end: (shapes, 3) the same for spheres.
-        radius: (shapes,).
-        inflation: How far the cover reaches beyond the body at most [length unit].
-        uncovered: How far the body was seen to stand out of it; 0 of covers that are found here,
-            which contain their bodies [length unit].
-    """
-
-    start: FloatArray
-    end: FloatArray
-    radius: FloatArray
-    inflation: float
+    start: FloatArray  # (shapes, 3) centre, or one end
+    end: FloatArray  # (shapes, 3) the same for spheres
+    radius: FloatArray  # (shapes,)
+    inflation: float  # how far the cover reaches beyond the body at most [length unit]
+    # how far the body was seen to stand out of it; 0 of covers that are found here, which contain
+    # their bodies [length unit]
     uncovered: float = 0.0
 
 
@@ -200,23 +193,17 @@ def around_cylinder(item: Any) -> Cover:
 
 
 class _Solid(NamedTuple):
-    """A convex body in its own frame.
+    """A convex body in its own frame."""
 
-    Attributes:
-        low: (3,) least corner of the box around it.
-        high: (3,) greatest corner.
-        near: Function (points, 3) → (points,), at most the signed distance.
-        far: The same, at least the signed distance.
-        planes: (planes, 4) of a hull: outward normals, and minus the planes' heights.
-        area: Of a hull's surface [length unit²].
-    """
-
-    low: FloatArray
-    high: FloatArray
+    low: FloatArray  # (3,) least corner of the box around it
+    high: FloatArray  # (3,) greatest corner
+    # function (points, 3) → (points,), at most the signed distance
     near: Any  # at most the distance
+    # the same, at least the signed distance
     far: Any  # at least the distance
+    # (planes, 4) of a hull: outward normals, and minus the planes' heights
     planes: FloatArray | None = None
-    area: float = 0.0
+    area: float = 0.0  # of a hull's surface [length unit²]
 
 
 def _solid(item: Any) -> _Solid:

@@ -65,14 +65,11 @@ class CollisionModel(Component):
 
 
 class SphereSets(CollisionModel):
-    """Bodies as sets of spheres that cover them.
-
-    Attributes:
-        inflation: How far spheres may reach beyond a body; less takes more spheres [length unit].
-    """
+    """Bodies as sets of spheres that cover them."""
 
     component: ClassVar[str] = "sphere_sets"
 
+    # how far spheres may reach beyond a body; less takes more spheres [length unit]
     inflation: Positive
 
     @property
@@ -90,18 +87,14 @@ class SphereSets(CollisionModel):
 
 
 class BodyCapsules(CollisionModel):
-    """Bodies as one capsule each that covers them; balls and capsules as they are.
-
-    Attributes:
-        padding: By how much every capsule is thicker than it must be [length unit].
-        around_cylinders: Whether the capsule of a cylinder is as thick as the cylinder and reaches
-            beyond its faces, or lies along its longest edge and is thicker: what moves upright over
-            a floor is covered best by the first.
-    """
+    """Bodies as one capsule each that covers them; balls and capsules as they are."""
 
     component: ClassVar[str] = "body_capsules"
 
-    padding: NonNegative
+    padding: NonNegative  # by how much every capsule is thicker than it must be [length unit]
+    # whether the capsule of a cylinder is as thick as the cylinder and reaches beyond its
+    # faces, or lies along its longest edge and is thicker: what moves upright over a floor is
+    # covered best by the first
     around_cylinders: bool = False
 
     def cover(self, item: Any) -> Cover:
@@ -114,22 +107,14 @@ class BodyCapsules(CollisionModel):
 
 
 class BodyModel(NamedTuple):
-    """A robot's bodies, covered.
+    """A robot's bodies, covered."""
 
-    Attributes:
-        assembly: The robot.
-        covers: One per body.
-        shapes: All of them; a shape's body is its index among the geometry objects.
-        sorted_pairs: Pairs of bodies, by who judges them.
-        asked: How far covers are asked to reach beyond bodies at most [length unit].
-        shrunk: Bodies whose covers were made smaller (`fitted_covers`), and by how much.
-    """
-
-    assembly: Assembly
-    covers: tuple[Cover, ...]
-    shapes: Shapes
-    sorted_pairs: BodyPairs
-    asked: float = np.inf
+    assembly: Assembly  # the robot
+    covers: tuple[Cover, ...]  # one per body
+    shapes: Shapes  # all of them; a shape's body is its index among the geometry objects
+    sorted_pairs: BodyPairs  # pairs of bodies, by who judges them
+    asked: float = np.inf  # how far covers are asked to reach beyond bodies at most [length unit]
+    # bodies whose covers were made smaller (`fitted_covers`), and by how much
     shrunk: tuple[tuple[int, float], ...] = ()
 
     @property
@@ -242,19 +227,12 @@ class BodyModel(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """An object that became part of a robot's geometry.
+    """An object that became part of a robot's geometry."""
 
-    Attributes:
-        joint: That moves it.
-        cover: In the joint's frame.
-        inner: Shapes inside it, in the joint's frame, see `inner_balls`.
-        watched: Bodies of the robot that it must not touch.
-    """
-
-    joint: int
-    cover: Cover
-    inner: Cover
-    watched: tuple[int, ...]
+    joint: int  # that moves it
+    cover: Cover  # in the joint's frame
+    inner: Cover  # shapes inside it, in the joint's frame, see `inner_balls`
+    watched: tuple[int, ...]  # bodies of the robot that it must not touch
 
 
 def cover_shapes(covers: list[Cover], joints: list[int], first: int = 0) -> Shapes:

@@ -31,26 +31,20 @@ NO_OBSTACLES = obstacle_table(())
 
 
 class BodyPairs(NamedTuple):
-    """All pairs of a robot's bodies, sorted.
+    """All pairs of a robot's bodies, sorted."""
 
-    Attributes:
-        tested: Pairs that a search tests and the certifier judges.
-        adjacent: Pairs on one joint or on neighbouring ones, or disabled: nobody judges them.
-        always: Pairs that touch in every posture sampled: nobody judges them.
-        never: Pairs that are proven never to touch: nobody judges them.
-        unseen: Pairs that touch in no posture sampled: only the certifier judges them.
-        overlapping: Pairs whose covers touch in every posture sampled although the bodies do not:
-            only the certifier judges them.
-        fitted: Pairs whose covers touch at the start or the goal although the bodies do not: only
-            the certifier judges them.
-    """
-
-    tested: tuple[Pair, ...]
+    tested: tuple[Pair, ...]  # pairs that a search tests and the certifier judges
+    # pairs on one joint or on neighbouring ones, or disabled: nobody judges them
     adjacent: tuple[Pair, ...]
-    always: tuple[Pair, ...] = ()
-    never: tuple[Pair, ...] = ()
+    always: tuple[Pair, ...] = ()  # pairs that touch in every posture sampled: nobody judges them
+    never: tuple[Pair, ...] = ()  # pairs that are proven never to touch: nobody judges them
+    # pairs that touch in no posture sampled: only the certifier judges them
     unseen: tuple[Pair, ...] = ()
+    # pairs whose covers touch in every posture sampled although the bodies do not: only the
+    # certifier judges them
     overlapping: tuple[Pair, ...] = ()
+    # pairs whose covers touch at the start or the goal although the bodies do not: only the
+    # certifier judges them
     fitted: tuple[Pair, ...] = ()
 
     @property

@@ -56,35 +56,22 @@ LARGEST_Q = 1e6
 
 
 class Memory(NamedTuple):
-    """Scratch for eight configurations.
+    """Scratch for eight configurations."""
 
-    Attributes:
-        q: (nq · LANES,) the last ones of a batch, the last of all repeated.
-        frames: (joints + 1 · SPATIAL_FRAME,), the world's at the end.
-        middles: (units · POINT,) centres of the balls.
-        centers: (spheres · POINT,).
-        known: (units,) the first of the eight for which centres of a unit's spheres were computed.
-        placed: (units,) the same of the ball's centre.
-    """
-
-    q: FloatArray
-    frames: FloatArray
-    middles: FloatArray
-    centers: FloatArray
+    q: FloatArray  # (nq · LANES,) the last ones of a batch, the last of all repeated
+    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
+    middles: FloatArray  # (units · POINT,) centres of the balls
+    centers: FloatArray  # (spheres · POINT,)
+    # (units,) the first of the eight for which centres of a unit's spheres were computed
     known: FloatArray
-    placed: FloatArray
+    placed: FloatArray  # (units,) the same of the ball's centre
 
 
 class Limits(NamedTuple):
-    """Bounds of the clearances that are in doubt, lane by lane.
+    """Bounds of the clearances that are in doubt, lane by lane."""
 
-    Attributes:
-        slack: Clearances between ± this are in doubt [length unit]; inf where q is not sound.
-        wide: The same of squares [length unit²].
-    """
-
-    slack: Vector
-    wide: Vector
+    slack: Vector  # clearances between ± this are in doubt [length unit]; inf where q is not sound
+    wide: Vector  # the same of squares [length unit²]
 
 
 @kernel

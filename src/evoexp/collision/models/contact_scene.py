@@ -26,38 +26,23 @@ from evoexp.scenarios.obstacles import ObstacleTable
 
 
 class Scene(NamedTuple):
-    """A robot made of spheres among obstacles.
+    """A robot made of spheres among obstacles."""
 
-    Attributes:
-        chain: The joints.
-        units: (units, UNIT_COLUMNS) bodies, then parts of bodies: joint, spheres, and see
-            `contact_tables`.
-        balls: (units, 4) centre in the joint's frame, radius.
-        runs: (runs, 2) first and one-past-last sphere of equal radius.
-        spheres: (spheres, 4) centre in the joint's frame, radius.
-        obstacles: The obstacles.
-        entries: (entries, 4) coefficients of a body and an obstacle; see `contact_tables`.
-        owners: (entries,) the obstacle of each.
-        pairs: (pairs, 4) two bodies, first and one-past-last pair of their parts.
-        pair_reaches: (pairs,) squared distance of the balls' centres above which they are apart.
-        parts: (part pairs, 2) two units.
-        part_reaches: (part pairs,) as `pair_reaches`.
-        scale: Bound of all coordinates [length unit].
-    """
-
-    chain: KinematicChain
+    chain: KinematicChain  # the joints
+    # (units, UNIT_COLUMNS) bodies, then parts of bodies: joint, spheres, and see `contact_tables`
     units: IntArray
-    balls: FloatArray
-    runs: IntArray
-    spheres: FloatArray
-    obstacles: ObstacleTable
-    entries: FloatArray
-    owners: IntArray
-    pairs: IntArray
+    balls: FloatArray  # (units, 4) centre in the joint's frame, radius
+    runs: IntArray  # (runs, 2) first and one-past-last sphere of equal radius
+    spheres: FloatArray  # (spheres, 4) centre in the joint's frame, radius
+    obstacles: ObstacleTable  # the obstacles
+    entries: FloatArray  # (entries, 4) coefficients of a body and an obstacle; see `contact_tables`
+    owners: IntArray  # (entries,) the obstacle of each
+    pairs: IntArray  # (pairs, 4) two bodies, first and one-past-last pair of their parts
+    # (pairs,) squared distance of the balls' centres above which they are apart
     pair_reaches: FloatArray
-    parts: IntArray
-    part_reaches: FloatArray
-    scale: float
+    parts: IntArray  # (part pairs, 2) two units
+    part_reaches: FloatArray  # (part pairs,) as `pair_reaches`
+    scale: float  # bound of all coordinates [length unit]
 
 
 @inlined

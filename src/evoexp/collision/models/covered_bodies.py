@@ -22,17 +22,12 @@ from evoexp.validation import Component, LayoutCount
 
 
 class CoveredBodies(Component):
-    """Bodies covered by spheres or capsules, tested at and between the via-points of a path.
-
-    Attributes:
-        covers: How bodies are covered.
-        collision_substeps: Configurations tested per segment of a path.
-    """
+    """Bodies covered by spheres or capsules, tested at and between the via-points of a path."""
 
     component: ClassVar[str] = "covered_bodies"
 
-    covers: CollisionModel
-    collision_substeps: LayoutCount
+    covers: CollisionModel  # how bodies are covered
+    collision_substeps: LayoutCount  # configurations tested per segment of a path
 
     def bind(
         self,
@@ -61,19 +56,12 @@ class CoveredBodies(Component):
 
 
 class CoveredCollision(NamedTuple):
-    """Covered bodies of one robot, and the obstacles around it.
+    """Covered bodies of one robot, and the obstacles around it."""
 
-    Attributes:
-        assembly: The robot.
-        bodies: Its bodies, covered.
-        collision: The kernels' tables.
-        obstacles: The obstacle table.
-    """
-
-    assembly: Assembly
-    bodies: BodyModel
-    collision: PrimitiveCollision
-    obstacles: ObstacleTable
+    assembly: Assembly  # the robot
+    bodies: BodyModel  # its bodies, covered
+    collision: PrimitiveCollision  # the kernels' tables
+    obstacles: ObstacleTable  # the obstacle table
 
     @property
     def num_tests(self) -> int:

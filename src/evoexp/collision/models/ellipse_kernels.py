@@ -46,86 +46,52 @@ WIDER = 1e-6  # [-] by which boxes are larger than ellipses: far more than CONTA
 
 
 class Ellipses(NamedTuple):
-    """Ellipses around a planar arm.
+    """Ellipses around a planar arm."""
 
-    Attributes:
-        maps: (E, 5) a … e of the maps (x, y) → (a x + b y + c, d y + e) to the unit circle.
-        first_links: (E,) the first link (1, 2, …) that reaches each ellipse.
-    """
-
+    # (E, 5) a … e of the maps (x, y) → (a x + b y + c, d y + e) to the unit circle
     maps: FloatArray
-    first_links: IntArray
+    first_links: IntArray  # (E,) the first link (1, 2, …) that reaches each ellipse
 
 
 class TestedPath(NamedTuple):
-    """The positions of a path that are tested.
+    """The positions of a path that are tested."""
 
-    Attributes:
-        num_positions: M of Eq. 3.
-        first_positions: The positions (1 … M) that are tested first.
-        chords: Whether all positions follow, with chords swept.
-    """
-
-    num_positions: int
-    first_positions: IntArray
-    chords: bool
+    num_positions: int  # m of Eq. 3.
+    first_positions: IntArray  # the positions (1 … M) that are tested first
+    chords: bool  # whether all positions follow, with chords swept
 
 
 class Boxes(NamedTuple):
-    """Boxes around ellipses, along x and y, filled up to whole vectors by boxes without a point.
+    """Boxes around ellipses, along x and y, filled up to whole vectors by boxes without a point."""
 
-    Attributes:
-        least_x: (ellipses,), as the rest.
-        greatest_x: See `least_x`.
-        least_y: See `least_x`.
-        greatest_y: See `least_x`.
-        first: The first link end that any ellipse needs.
-        reached: (vectors of ellipses, N + 1) bits of those that the link before each end, or the
-            end itself, may reach.
-    """
-
-    least_x: FloatArray
+    least_x: FloatArray  # (ellipses,), as the rest
     greatest_x: FloatArray
     least_y: FloatArray
     greatest_y: FloatArray
-    first: int
+    first: int  # the first link end that any ellipse needs
+    # (vectors of ellipses, N + 1) bits of those that the link before each end, or the end itself,
+    # may reach
     reached: IntArray
 
 
 class Memory(NamedTuple):
-    """Scratch for eight individuals.
+    """Scratch for eight individuals."""
 
-    Attributes:
-        alive: (count + LANES,) individuals that have not collided.
-        begin: (N · LANES,) angles at the start.
-        end: (N · LANES,) angles at the end.
-        gaps: (LANES,) at or below 0 where a contact was found.
-        x: (2, (N + 1) · LANES) link ends at even and odd positions.
-        y: Likewise.
-        codes: (2, vectors of ellipses, N + 1) outcodes of the link ends, see `_write_codes`.
-        turn: (N · 4 · LANES) of `begin_turning`.
-    """
-
-    alive: IntArray
-    begin: FloatArray
-    end: FloatArray
-    gaps: FloatArray
-    x: FloatArray
-    y: FloatArray
-    codes: IntArray
-    turn: FloatArray
+    alive: IntArray  # (count + LANES,) individuals that have not collided
+    begin: FloatArray  # (N · LANES,) angles at the start
+    end: FloatArray  # (N · LANES,) angles at the end
+    gaps: FloatArray  # (LANES,) at or below 0 where a contact was found
+    x: FloatArray  # (2, (N + 1) · LANES) link ends at even and odd positions
+    y: FloatArray  # likewise
+    codes: IntArray  # (2, vectors of ellipses, N + 1) outcodes of the link ends, see `_write_codes`
+    turn: FloatArray  # (N · 4 · LANES) of `begin_turning`
 
 
 class PathChecks(NamedTuple):
-    """Boxes and scratch that all checks of an arm among the same ellipses share.
+    """Boxes and scratch that all checks of an arm among the same ellipses share."""
 
-    Attributes:
-        boxes: Around the ellipses.
-        memory: Scratch.
-    """
-
-    boxes: Boxes
-    memory: Memory
+    boxes: Boxes  # around the ellipses
+    memory: Memory  # scratch
 
 
 @kernel

@@ -72,17 +72,11 @@ _lowest_bit = _trailing_zeros()
 
 
 class Encounters(NamedTuple):
-    """Lists of encounters.
+    """Lists of encounters."""
 
-    Attributes:
-        lanes: Configurations of the batch.
-        frames: Where their frames stand.
-        obstacles: Where their obstacles stand in `PackedObstacles.data`.
-    """
-
-    lanes: Places
-    frames: Places
-    obstacles: Places
+    lanes: Places  # configurations of the batch
+    frames: Places  # where their frames stand
+    obstacles: Places  # where their obstacles stand in `PackedObstacles.data`
 
 
 @inlined

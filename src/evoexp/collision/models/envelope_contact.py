@@ -9,19 +9,12 @@ from evoexp.records import FloatArray
 
 
 class Envelope(NamedTuple):
-    """An arm of two links with its envelope [length unit of the scene].
+    """An arm of two links with its envelope [length unit of the scene]."""
 
-    Attributes:
-        base: x, y of its first joint.
-        lengths: Of its links.
-        half_width: Distance of the boundary lines from their link.
-        tcp_radius: Of the circle around the tip.
-    """
-
-    base: Point
-    lengths: Point
-    half_width: float
-    tcp_radius: float
+    base: Point  # x, y of its first joint
+    lengths: Point  # of its links
+    half_width: float  # distance of the boundary lines from their link
+    tcp_radius: float  # of the circle around the tip
 
 
 @kernel

@@ -28,21 +28,16 @@ from evoexp.validation import Component, LayoutCount, NonNegative
 
 
 class LinkCrossings(Component):
-    """Robots of two links in the plane, which collide where lines of them meet (Eqs. 4, 5, 11, 12).
-
-    Attributes:
-        collision_substeps: Configurations tested per segment of a path; 1: the encoded ones only,
-            as in the paper.
-        half_width: Of the envelope: distance of a link's two boundary lines from it [length unit];
-            0: the link itself.
-        tcp_radius: Of a circle around the tool centre point [length unit]; 0: none.
-    """
+    """Planar robots of two links, which collide where their lines meet (Eqs. 4, 5, 11, 12)."""
 
     component: ClassVar[str] = "link_crossings"
 
+    # configurations tested per segment of a path; 1: the encoded ones only, as in the paper
     collision_substeps: LayoutCount
+    # of the envelope: distance of a link's two boundary lines from it [length unit]; 0: the
+    # link itself
     half_width: NonNegative
-    tcp_radius: NonNegative
+    tcp_radius: NonNegative  # of a circle around the tool centre point [length unit]; 0: none
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "LinkCollision":
         """Return the model of some robots among obstacles.
@@ -62,21 +57,13 @@ class LinkCrossings(Component):
 
 
 class LinkCollision(NamedTuple):
-    """Planar robots of two links, and the obstacles around them.
+    """Planar robots of two links, and the obstacles around them."""
 
-    Attributes:
-        arms: Base and link lengths of every robot.
-        obstacles: What stands still.
-        substeps: Configurations tested per segment.
-        half_width: Of the envelopes.
-        tcp_radius: Of the circles around the tool centre points.
-    """
-
-    arms: tuple[Arm, ...]
-    obstacles: PlanarObstacles
-    substeps: int
-    half_width: float
-    tcp_radius: float
+    arms: tuple[Arm, ...]  # base and link lengths of every robot
+    obstacles: PlanarObstacles  # what stands still
+    substeps: int  # configurations tested per segment
+    half_width: float  # of the envelopes
+    tcp_radius: float  # of the circles around the tool centre points
 
     @property
     def num_tests(self) -> int:

@@ -27,15 +27,10 @@ PARALLEL = 1e-12
 
 
 class Arm(NamedTuple):
-    """A planar arm of two links.
+    """A planar arm of two links."""
 
-    Attributes:
-        base: Its first joint (x, y) [length unit of the scene].
-        lengths: Of its links [length unit of the scene]; 0 is allowed.
-    """
-
-    base: tuple[float, float]
-    lengths: tuple[float, float]
+    base: tuple[float, float]  # its first joint (x, y) [length unit of the scene]
+    lengths: tuple[float, float]  # of its links [length unit of the scene]; 0 is allowed
 
     def points(self, q: FloatArray) -> FloatArray:
         """Return elbows and tips (K, 4, N): elbow x, y, tip x, y [length unit of the scene].
@@ -54,17 +49,12 @@ class Arm(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """Numbers of configurations in which individuals collide.
+    """Numbers of configurations in which individuals collide."""
 
-    Attributes:
-        counts: (N1, N2) of each pair.
-        sums_1: (N1,) of each individual of population 1 over all of population 2: C1 of Eq. 4.
-        sums_2: (N2,) the other way round.
-    """
-
-    counts: NDArray[np.int16]
+    counts: NDArray[np.int16]  # (N1, N2) of each pair
+    # (N1,) of each individual of population 1 over all of population 2: C1 of Eq. 4.
     sums_1: IntArray
-    sums_2: IntArray
+    sums_2: IntArray  # (N2,) the other way round
 
 
 def count_crossings(one: Arm, points_1: FloatArray, two: Arm, points_2: FloatArray) -> Crossings:
@@ -151,18 +141,13 @@ def path_configurations(
 
 
 class ClosedForm(NamedTuple):
-    """Intersections of the four pairs of links: (1, 1), (1, 2), (2, 1), (2, 2) of arm 1 and arm 2.
+    """Intersections of the link pairs (1, 1), (1, 2), (2, 1), (2, 2) of arm 1 and arm 2."""
 
-    Attributes:
-        mu: (4, n) where the lines meet on the link of arm 1: 0 at its beginning, 1 at its end; NaN
-            where parallel.
-        nu: (4, n) the same on the link of arm 2.
-        crossing: (4, n) whether the links have a point in common.
-    """
-
+    # (4, n) where the lines meet on the link of arm 1: 0 at its beginning, 1 at its end; NaN
+    # where parallel
     mu: FloatArray
-    nu: FloatArray
-    crossing: BoolArray
+    nu: FloatArray  # (4, n) the same on the link of arm 2
+    crossing: BoolArray  # (4, n) whether the links have a point in common
 
     @property
     def colliding(self) -> BoolArray:

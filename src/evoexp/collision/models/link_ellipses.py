@@ -18,20 +18,15 @@ NUM_FIRST = 1  # positions tested before chords are swept, so that few blocks go
 
 
 class LinkEllipses(Component):
-    """Positions and chords along a straight joint-space path, tested exactly; contact is collision.
-
-    Attributes:
-        num_positions: M of Eq. 3: equally spaced positions that are tested, the end included, the
-            start not.
-        swept: Whether the chord of every link end from one position to the next must be free, too.
-        blind: Whether obstacles are ignored (a control: its solutions must collide).
-    """
+    """Exact tests of positions and chords along a joint-space line; contact is collision."""
 
     component: ClassVar[str] = "link_ellipses"
 
+    # M of Eq. 3: equally spaced positions that are tested, the end included, the start not
     num_positions: LayoutCount
+    # whether the chord of every link end from one position to the next must be free, too
     swept: Literal["none", "chords"]
-    blind: bool = False
+    blind: bool = False  # whether obstacles are ignored (a control: its solutions must collide)
 
     def bind(self, assembly: Assembly, obstacles: ObstacleTable) -> "EllipseCollision":
         """Return the model of an arm among obstacles.
@@ -60,37 +55,22 @@ class LinkEllipses(Component):
 
 
 class Contact(NamedTuple):
-    """The first contact of a path.
+    """The first contact of a path."""
 
-    Attributes:
-        position: j of Eq. 3.
-        obstacle: Counted from 1.
-        link: Link, or link end if it was swept, counted from 1.
-        swept: Whether the chord of a link end, between positions j − 1 and j, touches.
-    """
-
-    position: int
-    obstacle: int
-    link: int
-    swept: bool
+    position: int  # j of Eq. 3.
+    obstacle: int  # counted from 1
+    link: int  # link, or link end if it was swept, counted from 1
+    swept: bool  # whether the chord of a link end, between positions j − 1 and j, touches
 
 
 class EllipseCollision(NamedTuple):
-    """An arm among ellipses.
+    """An arm among ellipses."""
 
-    Attributes:
-        arm: Link lengths and base.
-        ellipses: The ellipses as the kernels read them.
-        num_positions: M.
-        chords: Whether chords are swept.
-        obstacles: The obstacle table.
-    """
-
-    arm: PlanarArm
-    ellipses: Ellipses
-    num_positions: int
-    chords: bool
-    obstacles: ObstacleTable
+    arm: PlanarArm  # link lengths and base
+    ellipses: Ellipses  # the ellipses as the kernels read them
+    num_positions: int  # m
+    chords: bool  # whether chords are swept
+    obstacles: ObstacleTable  # the obstacle table
 
     @property
     def num_tests(self) -> int:

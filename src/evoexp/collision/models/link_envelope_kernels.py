@@ -34,29 +34,17 @@ _FLOOR = 2.0**-100
 
 
 class Sizes(NamedTuple):
-    """Sizes of two arms in the scale of tables, single precision.
+    """Sizes of two arms in the scale of tables, single precision."""
 
-    Attributes:
-        l1: Length of arm 1's first link.
-        l2: Of its second.
-        half: Its half width.
-        squared: Square of its circle's radius.
-        m1: Length of arm 2's first link.
-        m2: Of its second.
-        wide: Its half width.
-        other_squared: Square of its circle's radius.
-        both_squared: Square of the sum of the radii.
-    """
-
-    l1: np.float32
-    l2: np.float32
-    half: np.float32
-    squared: np.float32
-    m1: np.float32
-    m2: np.float32
-    wide: np.float32
-    other_squared: np.float32
-    both_squared: np.float32
+    l1: np.float32  # length of arm 1's first link
+    l2: np.float32  # of its second
+    half: np.float32  # its half width
+    squared: np.float32  # square of its circle's radius
+    m1: np.float32  # length of arm 2's first link
+    m2: np.float32  # of its second
+    wide: np.float32  # its half width
+    other_squared: np.float32  # square of its circle's radius
+    both_squared: np.float32  # square of the sum of the radii
 
 
 @kernel

@@ -28,17 +28,11 @@ from evoexp.records import BoolArray, FloatArray, IntArray
 
 
 class EnvelopedArm(NamedTuple):
-    """A planar arm of two links with its envelope.
+    """A planar arm of two links with its envelope."""
 
-    Attributes:
-        arm: The arm.
-        half_width: Distance of both boundary lines from their link [length unit of the scene].
-        tcp_radius: Of the circle around the tip [length unit of the scene]; 0: no circle.
-    """
-
-    arm: Arm
-    half_width: float
-    tcp_radius: float
+    arm: Arm  # the arm
+    half_width: float  # distance of both boundary lines from their link [length unit of the scene]
+    tcp_radius: float  # of the circle around the tip [length unit of the scene]; 0: no circle
 
     def outlines(self, q: FloatArray) -> FloatArray:
         """Return the outlines of a population.

@@ -19,20 +19,13 @@ from evoexp.scenarios.obstacles import BOX, CAPSULE, HALF_SPACE, SPHERE, Obstacl
 
 
 class PlanarObstacles(NamedTuple):
-    """Obstacles as seen in the plane z = 0.
+    """Obstacles as seen in the plane z = 0."""
 
-    Attributes:
-        kind: (obstacles,) SPHERE, BOX, CAPSULE or HALF_SPACE.
-        center: (obstacles, 2); of a half-plane a point of its boundary.
-        direction: (obstacles, 2) unit vector: x axis of a box, axis of a capsule, outward normal of
-            a half-plane.
-        size: (obstacles, 2): radius, 0 | half the edges | radius, half the length of the axis |
-            unused.
-    """
-
-    kind: IntArray
-    center: FloatArray
+    kind: IntArray  # (obstacles,) SPHERE, BOX, CAPSULE or HALF_SPACE
+    center: FloatArray  # (obstacles, 2); of a half-plane a point of its boundary
+    # (obstacles, 2) unit vector: x axis of a box, axis of a capsule, outward normal of a half-plane
     direction: FloatArray
+    # (obstacles, 2): radius, 0 | half the edges | radius, half the length of the axis | unused
     size: FloatArray
 
 

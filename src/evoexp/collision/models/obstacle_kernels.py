@@ -33,21 +33,13 @@ MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no conta
 
 
 class LinkBalls(NamedTuple):
-    """A ball around the centres of every link's spheres.
+    """A ball around the centres of every link's spheres."""
 
-    Attributes:
-        joint: (links,) index into the kinematic table.
-        local: (links, 3) in the table's frames [length unit].
-        radius: (links,) greatest distance of a centre.
-        spheres: (links, 2) first and one-past-last sphere of each link.
-        arm_links: (arms, 2) first and one-past-last link of each arm.
-    """
-
-    joint: IntArray
-    local: FloatArray
-    radius: FloatArray
-    spheres: IntArray
-    arm_links: IntArray
+    joint: IntArray  # (links,) index into the kinematic table
+    local: FloatArray  # (links, 3) in the table's frames [length unit]
+    radius: FloatArray  # (links,) greatest distance of a centre
+    spheres: IntArray  # (links, 2) first and one-past-last sphere of each link
+    arm_links: IntArray  # (arms, 2) first and one-past-last link of each arm
 
 
 @inlined

@@ -19,60 +19,44 @@ TURN, CORE_SIZE, AROUND, BOX, BOX_THICKNESS = 3, 12, 16, 17, 20
 
 
 class Units(NamedTuple):
-    """Bodies and then parts of bodies, each with a ball around it.
+    """Bodies and then parts of bodies, each with a ball around it."""
 
-    Attributes:
-        whole: (units, 7) frame (a joint of the kinematic table, one past its end: the world); first
-            and one-past-last run of spheres; the same of capsules; the same of entries in the list
-            of obstacles that a body is checked against.
-        ball: (units, 5) centre in the frame, radius, and the slack: the least distance of any
-            shape's end from this centre, less its own radius.
-    """
-
+    # (units, 7) frame (a joint of the kinematic table, one past its end: the world); first and
+    # one-past-last run of spheres; the same of capsules; the same of entries in the list of
+    # obstacles that a body is checked against
     whole: IntArray
+    # (units, 5) centre in the frame, radius, and the slack: the least distance of any shape's end
+    # from this centre, less its own radius
     ball: FloatArray
 
 
 class PackedShapes(NamedTuple):
-    """Spheres and capsules in the frames of the kinematic table, in the order of the units.
+    """Spheres and capsules in the frames of the kinematic table, in the order of the units."""
 
-    Attributes:
-        runs: (runs, 2) first and one-past-last sphere of equal radius.
-        spheres: (spheres, 4) centre, radius.
-        capsules: (capsules, 8) one end, from there to the other, radius, 1 / squared length.
-        most: Greatest number of spheres of a unit.
-    """
-
-    runs: IntArray
-    spheres: FloatArray
+    runs: IntArray  # (runs, 2) first and one-past-last sphere of equal radius
+    spheres: FloatArray  # (spheres, 4) centre, radius
+    # (capsules, 8) one end, from there to the other, radius, 1 / squared length
     capsules: FloatArray
-    most: int
+    most: int  # greatest number of spheres of a unit
 
 
 class PackedObstacles(NamedTuple):
-    """Obstacles, and the lists of those that each body is checked against.
+    """Obstacles, and the lists of those that each body is checked against."""
 
-    Attributes:
-        data: (obstacles, 21) centre; rotation, row by row; half the edges and thickness of a box,
-            or radius and half the length of a cylinder; radius of a ball around; half the edges and
-            thickness of a box around.
-        listed: (entries, 2) obstacle, and its class: BOXES, CYLINDERS or HALF_SPACES; body by body.
-    """
-
+    # (obstacles, 21) centre; rotation, row by row; half the edges and thickness of a box, or radius
+    # and half the length of a cylinder; radius of a ball around; half the edges and thickness of a
+    # box around
     data: FloatArray
+    # (entries, 2) obstacle, and its class: BOXES, CYLINDERS or HALF_SPACES; body by body
     listed: IntArray
 
 
 class ContactTables(NamedTuple):
-    """A robot made of spheres among obstacles, as two arrays: see `contact_tables`.
+    """A robot made of spheres among obstacles, as two arrays: see `contact_tables`."""
 
-    Attributes:
-        numbers: All numbers, block by block.
-        indices: For each block its place and its rows, then all integers; of no length for robots
-            that are not made of spheres alone.
-    """
-
-    numbers: FloatArray
+    numbers: FloatArray  # all numbers, block by block
+    # for each block its place and its rows, then all integers; of no length for robots that are not
+    # made of spheres alone
     indices: IntArray
 
     @property
@@ -82,20 +66,11 @@ class ContactTables(NamedTuple):
 
 
 class PrimitiveTables(NamedTuple):
-    """All tables of a robot among obstacles.
+    """All tables of a robot among obstacles."""
 
-    Attributes:
-        chain: The joints.
-        units: Bodies, then their parts.
-        shapes: Of the units.
-        obstacles: The obstacles, and which body is checked against which.
-        pairs: (pairs, 3) two units, and the row of the result that they count for.
-        contacts: The same once more, for `find_contacts`.
-    """
-
-    chain: KinematicChain
-    units: Units
-    shapes: PackedShapes
-    obstacles: PackedObstacles
-    pairs: IntArray
-    contacts: ContactTables
+    chain: KinematicChain  # the joints
+    units: Units  # bodies, then their parts
+    shapes: PackedShapes  # of the units
+    obstacles: PackedObstacles  # the obstacles, and which body is checked against which
+    pairs: IntArray  # (pairs, 3) two units, and the row of the result that they count for
+    contacts: ContactTables  # the same once more, for `find_contacts`

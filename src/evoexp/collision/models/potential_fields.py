@@ -17,19 +17,13 @@ from evoexp.validation import Component, Count, Positive, Vector
 
 
 class Fields(NamedTuple):
-    """The potential fields of an occupancy grid.
+    """The potential fields of an occupancy grid."""
 
-    Attributes:
-        grid: Its free nodes and permitted moves; nodes that are too unsafe are not free.
-        unsafeness: (nodes,) S_i of every node: potential of the nearest obstacle or boundary.
-        potentials: (nodes,) potential toward a goal after so many steps of its front.
-        neighbourhood: p of the fronts.
-    """
-
-    grid: Grid
+    grid: Grid  # its free nodes and permitted moves; nodes that are too unsafe are not free
+    # (nodes,) S_i of every node: potential of the nearest obstacle or boundary
     unsafeness: FloatArray
-    potentials: FloatArray
-    neighbourhood: int
+    potentials: FloatArray  # (nodes,) potential toward a goal after so many steps of its front
+    neighbourhood: int  # p of the fronts
 
     @property
     def num_moves(self) -> int:
@@ -47,22 +41,18 @@ class Fields(NamedTuple):
 
 
 class PotentialFields(Component):
-    """Potentials after so many steps of the wave fronts.
-
-    Attributes:
-        neighbourhood: p: a step of a front changes at most so many coordinates.
-        goal_potentials: d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with
-            the last difference.
-        obstacle_potentials: o_0, o_1, … after 0, 1, … steps from obstacles and from the ring of
-            nodes around the grid; all further steps have the last of these potentials.
-        max_unsafeness: S_* of Eq. 3: no path may pass a node of a greater one; None: any.
-    """
+    """Potentials after so many steps of the wave fronts."""
 
     component: ClassVar[str] = "potential_fields"
 
-    neighbourhood: Count
+    neighbourhood: Count  # p: a step of a front changes at most so many coordinates
+    # d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with the last
+    # difference
     goal_potentials: Annotated[tuple[Positive, ...], Field(min_length=2)]
+    # o_0, o_1, … after 0, 1, … steps from obstacles and from the ring of nodes around the
+    # grid; all further steps have the last of these potentials
     obstacle_potentials: Annotated[Vector, Field(min_length=1)]
+    # S_* of Eq. 3: no path may pass a node of a greater one; None: any
     max_unsafeness: float | None = None
 
     @model_validator(mode="after")

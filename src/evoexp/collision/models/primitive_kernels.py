@@ -60,24 +60,16 @@ OBSTACLES, BETWEEN, SELF = range(3)
 
 
 class Memory(NamedTuple):
-    """Scratch for a batch of `BATCH` configurations.
+    """Scratch for a batch of `BATCH` configurations."""
 
-    Attributes:
-        q: (nq · 8,) the last ones of a batch, padded.
-        frames: (BATCH / 8 · (joints + 1) · SPATIAL_FRAME,): eight configurations behind eight; the
-            last frame is the world's.
-        middles: (units · 3 · BATCH,) centres of the balls.
-        best: (3 · BATCH,) least clearances so far.
-        near: (CLASSES · ROOM,) encounters, listed.
-        centers: (most + 1 · POINT,) moved spheres, and clearances to be handed out.
-    """
-
-    q: FloatArray
+    q: FloatArray  # (nq · 8,) the last ones of a batch, padded
+    # (BATCH / 8 · (joints + 1) · SPATIAL_FRAME,): eight configurations behind eight; the last frame
+    # is the world's
     frames: FloatArray
-    middles: FloatArray
-    best: FloatArray
-    near: Encounters
-    centers: FloatArray
+    middles: FloatArray  # (units · 3 · BATCH,) centres of the balls
+    best: FloatArray  # (3 · BATCH,) least clearances so far
+    near: Encounters  # (CLASSES · ROOM,) encounters, listed
+    centers: FloatArray  # (most + 1 · POINT,) moved spheres, and clearances to be handed out
 
 
 @kernel

@@ -32,21 +32,14 @@ Pairs = Iterable[tuple[int, int]]
 
 
 class Shapes(NamedTuple):
-    """Capsules fixed to the joints of a model; those whose ends coincide are spheres.
+    """Capsules fixed to the joints of a model; those whose ends coincide are spheres."""
 
-    Attributes:
-        joint: (shapes,) index of the Pinocchio joint that moves each; 0 for the world.
-        start: (shapes, 3) one end, or the centre, in the joint's frame [length unit].
-        end: (shapes, 3) the other end.
-        radius: (shapes,) at least 0.
-        body: (shapes,) number of the body that each belongs to; None: all shapes of one joint are
-            one body, whose number is the joint's.
-    """
-
-    joint: IntArray
-    start: FloatArray
-    end: FloatArray
-    radius: FloatArray
+    joint: IntArray  # (shapes,) index of the Pinocchio joint that moves each; 0 for the world
+    start: FloatArray  # (shapes, 3) one end, or the centre, in the joint's frame [length unit]
+    end: FloatArray  # (shapes, 3) the other end
+    radius: FloatArray  # (shapes,) at least 0
+    # (shapes,) number of the body that each belongs to; None: all shapes of one joint are one body,
+    # whose number is the joint's
     body: IntArray | None = None
 
     @property
@@ -148,22 +141,15 @@ def _before(counts: list[int]) -> IntArray:
 
 
 class _Body(NamedTuple):
-    """One body's shapes, packed; indices count from its own first run and first capsule.
+    """One body's shapes, packed; indices count from its own first run and first capsule."""
 
-    Attributes:
-        rows: (1 + parts, 7) columns of `Units.whole`, the frame 0: of the body, then of its parts,
-            which are none where it has only one.
-        balls: (1 + parts, 5) rows of `Units.ball`.
-        runs: (runs, 2) first and one-past-last sphere of equal radius.
-        centers: (spheres, 4) with their radii.
-        capsules: (capsules, 8) start, axis, radius, 1 / length².
-    """
-
+    # (1 + parts, 7) columns of `Units.whole`, the frame 0: of the body, then of its parts, which
+    # are none where it has only one
     rows: IntArray
-    balls: FloatArray
-    runs: IntArray
-    centers: FloatArray
-    capsules: FloatArray
+    balls: FloatArray  # (1 + parts, 5) rows of `Units.ball`
+    runs: IntArray  # (runs, 2) first and one-past-last sphere of equal radius
+    centers: FloatArray  # (spheres, 4) with their radii
+    capsules: FloatArray  # (capsules, 8) start, axis, radius, 1 / length²
 
 
 @functools.lru_cache(maxsize=512)

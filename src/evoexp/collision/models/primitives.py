@@ -35,18 +35,12 @@ from evoexp.scenarios.obstacles import ObstacleTable
 
 
 class Clearances(NamedTuple):
-    """Least clearances of a batch: negative where shapes overlap, +inf where nothing is met.
+    """Least clearances of a batch: negative where shapes overlap, +inf where nothing is met."""
 
-    Attributes:
-        to_obstacles: (configurations,) least distance of the robot's shapes to obstacles [length
-            unit].
-        between_arms: (configurations,) least distance of shapes of two arms.
-        to_self: (configurations,) least distance of shapes of one arm.
-    """
-
+    # (configurations,) least distance of the robot's shapes to obstacles [length unit]
     to_obstacles: FloatArray
-    between_arms: FloatArray
-    to_self: FloatArray
+    between_arms: FloatArray  # (configurations,) least distance of shapes of two arms
+    to_self: FloatArray  # (configurations,) least distance of shapes of one arm
 
     @property
     def least(self) -> FloatArray:
@@ -95,19 +89,12 @@ def arms_of_joints(model: Any) -> tuple[int, ...]:
 
 
 class PrimitiveCollision(NamedTuple):
-    """Spheres and capsules on one robot, the obstacles around it, and the pairs to be checked.
+    """Spheres and capsules on one robot, the obstacles around it, and the pairs to be checked."""
 
-    Attributes:
-        table: The kinematic table of the model.
-        joints: (bodies,) the Pinocchio joint of each body.
-        packed: Bodies, obstacles and pairs as arrays.
-        tables: `packed` in flat arrays, for the kernel `primitive_clearances`.
-    """
-
-    table: KinematicTable
-    joints: IntArray
-    packed: PrimitiveTables
-    tables: tuple[Any, ...]
+    table: KinematicTable  # the kinematic table of the model
+    joints: IntArray  # (bodies,) the Pinocchio joint of each body
+    packed: PrimitiveTables  # bodies, obstacles and pairs as arrays
+    tables: tuple[Any, ...]  # `packed` in flat arrays, for the kernel `primitive_clearances`
 
     @property
     def units(self) -> Units:

@@ -32,15 +32,10 @@ TINY = 1e-150  # [length unit] components of axes below it count as 0: their squ
 
 
 class Segments(NamedTuple):
-    """Eight moved axes of capsules: point t of [0, 1] is start + t · axis [length unit].
+    """Eight moved axes of capsules: point t of [0, 1] is start + t · axis [length unit]."""
 
-    Attributes:
-        start: One end.
-        axis: From there to the other.
-    """
-
-    start: Place
-    axis: Place
+    start: Place  # one end
+    axis: Place  # from there to the other
 
 
 class Bracket(NamedTuple):

@@ -48,71 +48,43 @@ Space = Literal[True] | None
 
 
 class Spheres(NamedTuple):
-    """Spheres of one size, fixed to joints.
+    """Spheres of one size, fixed to joints."""
 
-    Attributes:
-        joint: (spheres,) index into the kinematic table, arm by arm.
-        local: (spheres, 3) centres in the table's frames [length unit].
-        radius: Of every sphere [length unit].
-    """
-
-    joint: IntArray
-    local: FloatArray
-    radius: float
+    joint: IntArray  # (spheres,) index into the kinematic table, arm by arm
+    local: FloatArray  # (spheres, 3) centres in the table's frames [length unit]
+    radius: float  # of every sphere [length unit]
 
 
 class LinkLines(NamedTuple):
-    """Spheres of every link of a planar robot as equal steps along a line.
+    """Spheres of every link of a planar robot as equal steps along a line."""
 
-    Attributes:
-        line: (links, LINE_COLUMNS) x and y of the middle; x and y of the step from one centre to
-            the next, (1, 0) where there is none; number of steps; length of a step; half the length
-            of all, a little more.
-        turn: (joints,) angle of the placement of each joint [quarter turns].
-        scale: Bound of all coordinates [length unit]; inf where steps are not equal.
-    """
-
+    # (links, LINE_COLUMNS) x and y of the middle; x and y of the step from one centre to the next,
+    # (1, 0) where there is none; number of steps; length of a step; half the length of all, a
+    # little more
     line: FloatArray
-    turn: FloatArray
-    scale: float
+    turn: FloatArray  # (joints,) angle of the placement of each joint [quarter turns]
+    scale: float  # bound of all coordinates [length unit]; inf where steps are not equal
 
 
 class SphereTables(NamedTuple):
-    """The tables that `clearances` reads.
+    """The tables that `clearances` reads."""
 
-    Attributes:
-        chain: The joints.
-        space: Whether the robot moves in a plane; see `Space`.
-        spheres: The spheres.
-        bounds: Balls around the spheres of each link.
-        obstacles: The obstacles.
-        lines: For `planar_contacts`.
-    """
-
-    chain: KinematicChain
-    space: Space
-    spheres: Spheres
-    bounds: LinkBalls
-    obstacles: ObstacleTable
-    lines: LinkLines
+    chain: KinematicChain  # the joints
+    space: Space  # whether the robot moves in a plane; see `Space`
+    spheres: Spheres  # the spheres
+    bounds: LinkBalls  # balls around the spheres of each link
+    obstacles: ObstacleTable  # the obstacles
+    lines: LinkLines  # for `planar_contacts`
 
 
 class Memory(NamedTuple):
-    """Scratch for eight configurations.
+    """Scratch for eight configurations."""
 
-    Attributes:
-        q: (nq · LANES,) the last ones of a batch, padded.
-        frames: (joints · SPATIAL_FRAME,).
-        centers: (spheres · POINT,) of the spheres.
-        middles: (links · POINT,) of the balls around links.
-        out: (2 · LANES,) results of the last ones.
-    """
-
-    q: FloatArray
-    frames: FloatArray
-    centers: FloatArray
-    middles: FloatArray
-    out: FloatArray
+    q: FloatArray  # (nq · LANES,) the last ones of a batch, padded
+    frames: FloatArray  # (joints · SPATIAL_FRAME,)
+    centers: FloatArray  # (spheres · POINT,) of the spheres
+    middles: FloatArray  # (links · POINT,) of the balls around links
+    out: FloatArray  # (2 · LANES,) results of the last ones
 
 
 LINE_COLUMNS = 7

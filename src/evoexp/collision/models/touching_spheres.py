@@ -38,19 +38,16 @@ class TouchingSpheres(Component):
     """The collision model of Rana & Zalzala: spheres on every link that moves.
 
     Section 4.1 leaves out the columns.
-
-    Attributes:
-        spheres_per_link: Centres at equal distances from joint to joint, both ends included.
-        sphere_radius: Of every sphere [length unit]; two arms collide when centres are closer than
-            the sum of radii.
-        collision_substeps: Configurations tested per segment of a path; 1: the via-points only, as
-            in the paper.
     """
 
     component: ClassVar[str] = "touching_spheres"
 
+    # centres at equal distances from joint to joint, both ends included
     spheres_per_link: Annotated[int, Field(ge=1, le=MOST_PER_LINK)]
+    # of every sphere [length unit]; two arms collide when centres are closer than the sum of
+    # radii
     sphere_radius: Positive
+    # configurations tested per segment of a path; 1: the via-points only, as in the paper
     collision_substeps: LayoutCount
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
@@ -166,16 +163,11 @@ def _ranges(owners: np.ndarray, count: int) -> np.ndarray:
 
 
 class Clearance(NamedTuple):
-    """Least clearances of a batch: negative where spheres overlap, +inf where nothing is met.
+    """Least clearances of a batch: negative where spheres overlap, +inf where nothing is met."""
 
-    Attributes:
-        between_arms: (configurations,) least centre distance of spheres of two arms, less both
-            radii.
-        to_obstacles: (configurations,) least distance of a centre to an obstacle's surface, less
-            the radius.
-    """
-
+    # (configurations,) least centre distance of spheres of two arms, less both radii
     between_arms: FloatArray
+    # (configurations,) least distance of a centre to an obstacle's surface, less the radius
     to_obstacles: FloatArray
 
     @property
@@ -185,23 +177,14 @@ class Clearance(NamedTuple):
 
 
 class SphereCollision(NamedTuple):
-    """Touching spheres on one robot, and the obstacles around it.
+    """Touching spheres on one robot, and the obstacles around it."""
 
-    Attributes:
-        assembly: The robot.
-        spheres: The spheres.
-        arm_spheres: (arms, 2) first and one-past-last sphere of each arm.
-        obstacles: The obstacle table.
-        tables: `SphereTables` in two arrays, for kernels; see `flat_spheres`.
-        geometry: The same spheres as a `pin.GeometryModel` of coal spheres.
-    """
-
-    assembly: Assembly
-    spheres: Spheres
-    arm_spheres: IntArray
-    obstacles: ObstacleTable
-    tables: tuple[Any, ...]
-    geometry: Any
+    assembly: Assembly  # the robot
+    spheres: Spheres  # the spheres
+    arm_spheres: IntArray  # (arms, 2) first and one-past-last sphere of each arm
+    obstacles: ObstacleTable  # the obstacle table
+    tables: tuple[Any, ...]  # `SphereTables` in two arrays, for kernels; see `flat_spheres`
+    geometry: Any  # the same spheres as a `pin.GeometryModel` of coal spheres
 
     @property
     def num_tests(self) -> int:

@@ -26,21 +26,13 @@ LESS = 1.0 - 1e-9  # of a ball's radius: more than rounding
 
 
 class Solid(NamedTuple):
-    """A convex body in its own frame.
+    """A convex body in its own frame."""
 
-    Attributes:
-        low: (3,) least corner of the box around it.
-        high: (3,) greatest corner.
-        planes: (planes, 4) outward normals of unit length, and minus the planes' heights.
-        far: Function (points, 3) → (points,), at least the signed distance.
-        area: Of its surface [length unit²].
-    """
-
-    low: FloatArray
-    high: FloatArray
-    planes: FloatArray
-    far: Any
-    area: float
+    low: FloatArray  # (3,) least corner of the box around it
+    high: FloatArray  # (3,) greatest corner
+    planes: FloatArray  # (planes, 4) outward normals of unit length, and minus the planes' heights
+    far: Any  # function (points, 3) → (points,), at least the signed distance
+    area: float  # of its surface [length unit²]
 
     def heights(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the greatest height of points above a plane, and the normal of that plane."""
@@ -55,29 +47,18 @@ class Solid(NamedTuple):
 
 
 class Balls(NamedTuple):
-    """Balls around a body.
+    """Balls around a body."""
 
-    Attributes:
-        centers: (balls, 3).
-        radii: (balls,) [length unit].
-        reach: How far they reach beyond the body at most [length unit].
-    """
-
-    centers: FloatArray
-    radii: FloatArray
-    reach: float
+    centers: FloatArray  # (balls, 3)
+    radii: FloatArray  # (balls,) [length unit]
+    reach: float  # how far they reach beyond the body at most [length unit]
 
 
 class _Cells(NamedTuple):
-    """Balls that hold a body together, each around the part of it in one cube.
+    """Balls that hold a body together, each around the part of it in one cube."""
 
-    Attributes:
-        middles: (cells, 3).
-        sizes: (cells,) radii.
-    """
-
-    middles: FloatArray
-    sizes: FloatArray
+    middles: FloatArray  # (cells, 3)
+    sizes: FloatArray  # (cells,) radii
 
 
 def varied_spheres(solid: Solid, inflation: float, most: int, farthest: float) -> Balls | None:

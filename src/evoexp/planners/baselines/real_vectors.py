@@ -14,22 +14,15 @@ LEAST = 1e-6  # [-] of the mean variance: directions in which drawn individuals 
 
 
 class RealVectors(NamedTuple):
-    """The numbers of an individual that a search may change.
+    """The numbers of an individual that a search may change."""
 
-    Attributes:
-        template: An individual, individuals' axis left out; what is the same in all of them stays.
-        changes: Of the same shape: which of its numbers are searched.
-        mean: (variables,) of the drawn individuals.
-        covariance: (variables, variables) of them, of mean variance 1.
-        deviation: Root of the mean variance of the drawn individuals.
-        bounds: Least and greatest values of an individual's numbers, each of the template's shape.
-    """
-
+    # an individual, individuals' axis left out; what is the same in all of them stays
     template: FloatArray
-    changes: BoolArray
-    mean: FloatArray
-    covariance: FloatArray
-    deviation: float
+    changes: BoolArray  # of the same shape: which of its numbers are searched
+    mean: FloatArray  # (variables,) of the drawn individuals
+    covariance: FloatArray  # (variables, variables) of them, of mean variance 1
+    deviation: float  # root of the mean variance of the drawn individuals
+    # least and greatest values of an individual's numbers, each of the template's shape
     bounds: tuple[FloatArray, FloatArray]
 
     def population(self, vectors: FloatArray) -> FloatArray:

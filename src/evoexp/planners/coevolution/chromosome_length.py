@@ -15,15 +15,10 @@ HALF_TURN = 180.0  # [deg]
 
 
 class SpeedLimit(Settings):
-    """How fast the end-effector may be, and how often it is told where to go.
+    """How fast the end-effector may be, and how often it is told where to go."""
 
-    Attributes:
-        tcp_speed: V_max, greatest speed of the tool centre point [length unit/s].
-        sampling_time: T, between two configurations [s].
-    """
-
-    tcp_speed: Positive
-    sampling_time: Positive
+    tcp_speed: Positive  # V_max, greatest speed of the tool centre point [length unit/s]
+    sampling_time: Positive  # T, between two configurations [s]
 
     def greatest_steps(self, lengths: Sequence[float]) -> tuple[float, float]:
         """Return the largest turn of either link alone between two configurations (Eq. 2) [deg].

@@ -25,25 +25,16 @@ CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
 
 
 class Table(NamedTuple):
-    """Some generations; number g is at place g modulo the number of places.
+    """Some generations; number g is at place g modulo the number of places."""
 
-    Attributes:
-        populations: (places, robots, 2 K, individuals).
-        criteria: (places, robots, 4, individuals) see `Evaluated`, and so are the next three.
-        own: (places, robots, individuals).
-        costs: (places, robots, individuals).
-        collisions: (places, pairs of robots, individuals, individuals).
-        teams: (places, robots) the best team of each.
-        team_costs: (places,).
-    """
-
-    populations: FloatArray
+    populations: FloatArray  # (places, robots, 2 K, individuals)
+    # (places, robots, 4, individuals) see `Evaluated`, and so are the next three
     criteria: FloatArray
-    own: FloatArray
-    costs: FloatArray
-    collisions: CollisionCounts
-    teams: IntArray
-    team_costs: FloatArray
+    own: FloatArray  # (places, robots, individuals)
+    costs: FloatArray  # (places, robots, individuals)
+    collisions: CollisionCounts  # (places, pairs of robots, individuals, individuals)
+    teams: IntArray  # (places, robots) the best team of each
+    team_costs: FloatArray  # (places,)
 
     @classmethod
     def room(cls, places: int, robots: int, genes: int, count: int) -> Self:
@@ -61,41 +52,24 @@ class Table(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Ends, arms and weights, by which individuals are judged; see `evaluate_lines`.
+    """Ends, arms and weights, by which individuals are judged; see `evaluate_lines`."""
 
-    Attributes:
-        starts: (robots, 2) [rad].
-        goals: (robots, 2) [rad].
-        arms: (robots, 4) base x, base y, lengths of both links [length unit].
-        weights: Of C2, C3, C4.
-        collision_weight: Of C1.
-    """
-
-    starts: FloatArray
-    goals: FloatArray
-    arms: FloatArray
-    weights: tuple[float, float, float]
-    collision_weight: float
+    starts: FloatArray  # (robots, 2) [rad]
+    goals: FloatArray  # (robots, 2) [rad]
+    arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
+    weights: tuple[float, float, float]  # of C2, C3, C4
+    collision_weight: float  # of C1
 
 
 class Heredity(NamedTuple):
-    """The rules by which one generation follows another.
+    """The rules by which one generation follows another."""
 
-    Attributes:
-        breeding: Of any generation; its mutation rate is that of none.
-        moving: (robots,) false for robots that stand still.
-        hall: With room for as many teams as it may hold.
-        rules: Which teams it takes.
-        by_genome: See `renew`; then the best team is offered, too.
-        numbers: (individuals + 1,) that breeding takes for so many offspring of a robot.
-    """
-
-    breeding: Breeding
-    moving: BoolArray
-    hall: Hall
-    rules: HallRules
-    by_genome: bool
-    numbers: IntArray
+    breeding: Breeding  # of any generation; its mutation rate is that of none
+    moving: BoolArray  # (robots,) false for robots that stand still
+    hall: Hall  # with room for as many teams as it may hold
+    rules: HallRules  # which teams it takes
+    by_genome: bool  # see `renew`; then the best team is offered, too
+    numbers: IntArray  # (individuals + 1,) that breeding takes for so many offspring of a robot
 
 
 @kernel

@@ -24,25 +24,15 @@ NOT_FINITE = "points and bases must be finite and below 1e150"
 
 
 class Breeding(NamedTuple):
-    """Settings of selection, cross-over and mutation, as a generation has them.
+    """Settings of selection, cross-over and mutation, as a generation has them."""
 
-    Attributes:
-        num_elites: Individuals copied untouched.
-        inverse: Whether weights on the wheel are inverse costs; else differences to the highest.
-        crossover_rate: Probability that a pair is crossed.
-        mutation_rate: Probability that an allele of an individual is mutated (Eq. 10).
-        mutation_step: Largest change of an allele (Eq. 9) [rad].
-        limit: What a mutated allele stays below [rad].
-        symmetric: Whether alleles may decrease, too.
-    """
-
-    num_elites: int
-    inverse: bool
-    crossover_rate: float
-    mutation_rate: float
-    mutation_step: float
-    limit: float
-    symmetric: bool
+    num_elites: int  # individuals copied untouched
+    inverse: bool  # whether weights on the wheel are inverse costs; else differences to the highest
+    crossover_rate: float  # probability that a pair is crossed
+    mutation_rate: float  # probability that an allele of an individual is mutated (Eq. 10).
+    mutation_step: float  # largest change of an allele (Eq. 9) [rad].
+    limit: float  # what a mutated allele stays below [rad]
+    symmetric: bool  # whether alleles may decrease, too
 
 
 @kernel

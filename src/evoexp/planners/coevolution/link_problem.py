@@ -13,27 +13,16 @@ from evoexp.robots.assembly import Assembly
 
 
 class Problem(NamedTuple):
-    """Robots and their scenario, prepared.
+    """Robots and their scenario, prepared."""
 
-    Attributes:
-        assembly: The robots, built.
-        collision: The paper's collision model on them.
-        arms: (robots, 4) base x, base y, lengths of both links [length unit].
-        start: (robots, 2) absolute link angles [rad].
-        goal: (robots, 2) [rad].
-        moving: (robots,) false for robots that stand still.
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    assembly: Assembly
-    collision: LinkCollision
-    arms: FloatArray
-    start: FloatArray
-    goal: FloatArray
-    moving: BoolArray
-    scene: Scene
-    security_margin: float
+    assembly: Assembly  # the robots, built
+    collision: LinkCollision  # the paper's collision model on them
+    arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
+    start: FloatArray  # (robots, 2) absolute link angles [rad]
+    goal: FloatArray  # (robots, 2) [rad]
+    moving: BoolArray  # (robots,) false for robots that stand still
+    scene: Scene  # the bodies themselves, for the exact verdict on a motion
+    security_margin: float  # clearance that the task requires [length unit]
 
 
 def check_ends(problem: Problem) -> None:

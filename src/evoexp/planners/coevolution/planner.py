@@ -47,31 +47,24 @@ class Coevolution(PlannerDefaults, Component):
     """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
 
     Methods I–VIII are settings of it.
-
-    Attributes:
-        chromosome_length: L, even: two link angles for each of K = L/2 configurations between start
-            and goal [-].
-        interpolation: The curve that is executed between configurations: straight lines in the
-            joint angles, or a cubic spline that starts and ends at rest (Fig. 9). The verdict
-            judges that curve, the search only the configurations.
-        speed_limit: Of the end-effector (Eqs. 2, 3); no part of the search.
-        ga: Populations, generations, rates, hall of fame.
-        objective: Weights of C1 … C4.
-        collision: Links as lines, or their envelopes.
-        acceptance: Which teams are an answer: those that the model accepts at the configurations
-            it tests, or those of them whose motion the exact certifier proves; robots of one that
-            is refuted count as colliding once more.
     """
 
     component: ClassVar[str] = "coevolution"
     revision: ClassVar[int] = 2
 
+    # L, even: two link angles for each of K = L/2 configurations between start and goal [-]
     chromosome_length: LayoutCount
+    # the curve that is executed between configurations: straight lines in the joint angles,
+    # or a cubic spline that starts and ends at rest (Fig. 9). The verdict judges that curve,
+    # the search only the configurations
     interpolation: Literal["linear", "cubic"]
-    speed_limit: SpeedLimit
-    ga: CoevolutionSettings
-    objective: MotionCriteria
-    collision: LinkCrossings
+    speed_limit: SpeedLimit  # of the end-effector (Eqs. 2, 3); no part of the search
+    ga: CoevolutionSettings  # populations, generations, rates, hall of fame
+    objective: MotionCriteria  # weights of C1 … C4
+    collision: LinkCrossings  # links as lines, or their envelopes
+    # which teams are an answer: those that the model accepts at the configurations it tests,
+    # or those of them whose motion the exact certifier proves; robots of one that is refuted
+    # count as colliding once more
     acceptance: Acceptance = "model"
 
     @model_validator(mode="after")

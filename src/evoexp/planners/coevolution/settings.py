@@ -13,50 +13,37 @@ _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
 class CoevolutionSettings(Component):
-    """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3).
-
-    Attributes:
-        population_size: Individuals per population and generation [-].
-        num_generations: Generations after the initial one [-].
-        crossover_rate: Probability that a pair of parents is crossed [-].
-        mutation_rate: Probability that one allele of an individual is mutated, at the first
-            generation [-].
-        mutation_decay: Difference of `mutation_rate` between the first and the last generation
-            (Eq. 10) [-]; 0: it is constant.
-        mutation_step: Largest change of an allele (Eq. 9) [deg].
-        mutation_direction: `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`.
-        selection: Weight on the roulette wheel: the `inverse` of the cost, or its `difference` to
-            the highest.
-        num_elites: Best individuals of each population copied untouched into the next generation
-            [-].
-        hall_depth: Share of a population that the hall of fame may hold [-]; 0: no hall.
-        hall_memory: Generations after which a team of the hall gives way to any new one [-]; None:
-            never.
-        hall_frozen: Whether a full hall stays as it is (an ablation).
-        hall_distinct: Nobody is in two teams of the hall. `genome`: copies count as one, and
-            members of the hall are offered again, so that one may find a better partner. `index`:
-            copies count as others, so the hall may fill with copies of one team; members of the
-            hall are not offered again. Runs by index are bit for bit those of revision 1 of
-            `coevolution`, unless a link's angle is exactly a multiple of 90°.
-        restart_after: Generations without a feasible team before fresh populations are drawn [-];
-            None: never.
-    """
+    """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3)."""
 
     component: ClassVar[str] = "coevolutionary"
 
-    population_size: Count
-    num_generations: NonNegativeCount
-    crossover_rate: Rate
+    population_size: Count  # individuals per population and generation [-]
+    num_generations: NonNegativeCount  # generations after the initial one [-]
+    crossover_rate: Rate  # probability that a pair of parents is crossed [-]
+    # probability that one allele of an individual is mutated, at the first generation [-]
     mutation_rate: Rate
+    # difference of `mutation_rate` between the first and the last generation (Eq. 10) [-]; 0:
+    # it is constant
     mutation_decay: Rate
-    mutation_step: Positive
+    mutation_step: Positive  # largest change of an allele (Eq. 9) [deg]
+    # `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`
     mutation_direction: Literal["one_sided", "symmetric"]
+    # weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the
+    # highest
     selection: Literal["inverse", "difference"]
+    # best individuals of each population copied untouched into the next generation [-]
     num_elites: NonNegativeCount
-    hall_depth: Rate
+    hall_depth: Rate  # share of a population that the hall of fame may hold [-]; 0: no hall
+    # generations after which a team of the hall gives way to any new one [-]; None: never
     hall_memory: Count | None
-    hall_frozen: bool
+    hall_frozen: bool  # whether a full hall stays as it is (an ablation)
+    # generations without a feasible team before fresh populations are drawn [-]; None: never
     restart_after: Count | None
+    # nobody is in two teams of the hall. `genome`: copies count as one, and members of the
+    # hall are offered again, so that one may find a better partner. `index`: copies count as
+    # others, so the hall may fill with copies of one team; members of the hall are not
+    # offered again. Runs by index are bit for bit those of revision 1 of `coevolution`,
+    # unless a link's angle is exactly a multiple of 90°
     hall_distinct: Literal["genome", "index"] = "genome"
 
     @model_validator(mode="after")

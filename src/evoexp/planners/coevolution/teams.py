@@ -22,21 +22,14 @@ from evoexp.records import BoolArray, FloatArray, IntArray
 
 
 class Evaluated(NamedTuple):
-    """Populations evaluated all against all.
+    """Populations evaluated all against all."""
 
-    Attributes:
-        costs: (robots, individuals) C1 + C2 + C3 + C4, weighted.
-        criteria: (robots, 4, individuals) C1 … C4.
-        own: (robots, individuals) C2 + C3 + C4, weighted.
-        collisions: (pairs of robots, individuals, individuals) colliding configurations.
-        blocked: (robots, individuals) configurations that collide with obstacles.
-    """
-
-    costs: FloatArray
-    criteria: FloatArray
-    own: FloatArray
+    costs: FloatArray  # (robots, individuals) C1 + C2 + C3 + C4, weighted
+    criteria: FloatArray  # (robots, 4, individuals) C1 … C4
+    own: FloatArray  # (robots, individuals) C2 + C3 + C4, weighted
+    # (pairs of robots, individuals, individuals) colliding configurations
     collisions: CollisionCounts
-    blocked: IntArray
+    blocked: IntArray  # (robots, individuals) configurations that collide with obstacles
 
     @property
     def teamable(self) -> FloatArray:
@@ -107,32 +100,20 @@ class Evaluated(NamedTuple):
 
 
 class Standing(NamedTuple):
-    """How populations stand.
+    """How populations stand."""
 
-    Attributes:
-        best: The cheapest team without a collision.
-        statistics: Of the costs of all individuals.
-        num_feasible: Individuals of the first robot with a collision-free partner in every
-            population.
-    """
-
-    best: BestTeam
-    statistics: CostStatistics
+    best: BestTeam  # the cheapest team without a collision
+    statistics: CostStatistics  # of the costs of all individuals
+    # individuals of the first robot with a collision-free partner in every population
     num_feasible: int
 
 
 class Judgement(NamedTuple):
-    """Individuals of the first robot, each with its cheapest collision-free team.
+    """Individuals of the first robot, each with its cheapest collision-free team."""
 
-    Attributes:
-        cost: (individuals,) own costs of that team summed; inf if there is none.
-        evaluated: The populations.
-        collision_queries: Configurations judged for it.
-    """
-
-    cost: FloatArray
-    evaluated: Evaluated
-    collision_queries: int
+    cost: FloatArray  # (individuals,) own costs of that team summed; inf if there is none
+    evaluated: Evaluated  # the populations
+    collision_queries: int  # configurations judged for it
 
     @property
     def feasible(self) -> BoolArray:

@@ -28,23 +28,15 @@ from evoexp.records import FloatArray, IntArray
 
 
 class Ledger(NamedTuple):
-    """Sums along climbing paths, and where they pass.
+    """Sums along climbing paths, and where they pass."""
 
-    Attributes:
-        place: (paths, nodes) place of every node in each path; 0: the path does not pass it.
-        moves: (paths, nodes + 1) tolls of the moves up to each place.
-        levels: (paths, nodes + 1) tolls of the nodes up to each place.
-        tolls: Of moves and nodes.
-        exits: (nodes,) scratch of walks.
-        walked: (nodes + 1,) scratch: nodes of a walk without loops, from index 1 on.
-    """
-
+    # (paths, nodes) place of every node in each path; 0: the path does not pass it
     place: NodeArray
-    moves: IntArray
-    levels: IntArray
-    tolls: Tolls
-    exits: NodeArray
-    walked: NodeArray
+    moves: IntArray  # (paths, nodes + 1) tolls of the moves up to each place
+    levels: IntArray  # (paths, nodes + 1) tolls of the nodes up to each place
+    tolls: Tolls  # of moves and nodes
+    exits: NodeArray  # (nodes,) scratch of walks
+    walked: NodeArray  # (nodes + 1,) scratch: nodes of a walk without loops, from index 1 on
 
     @staticmethod
     def is_fit(world: World) -> bool:
@@ -69,23 +61,14 @@ class Ledger(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A path whose piece is regenerated: its head, some nodes of a walk, its tail.
+    """A path whose piece is regenerated: its head, some nodes of a walk, its tail."""
 
-    Attributes:
-        head: Place of the last node of the head.
-        begin: Place in the walk of the same node.
-        end: Place in the walk of the first node of the tail.
-        tail: Place of the same node in the path.
-        moves: Tolls of all its moves.
-        level: Tolls of all its nodes.
-    """
-
-    head: int
-    begin: int
-    end: int
-    tail: int
-    moves: int
-    level: int
+    head: int  # place of the last node of the head
+    begin: int  # place in the walk of the same node
+    end: int  # place in the walk of the first node of the tail
+    tail: int  # place of the same node in the path
+    moves: int  # tolls of all its moves
+    level: int  # tolls of all its nodes
 
 
 @kernel

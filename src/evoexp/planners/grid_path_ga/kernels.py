@@ -29,15 +29,10 @@ DISTANCE, UNSAFENESS, COST = range(RESULTS)
 
 
 class Population(NamedTuple):
-    """One generation; or all of several, with a first axis of places.
+    """One generation; or all of several, with a first axis of places."""
 
-    Attributes:
-        paths: (individuals, nodes + 1).
-        results: (3, individuals) lengths, mean unsafenesses, costs.
-    """
-
-    paths: NodeArray
-    results: FloatArray
+    paths: NodeArray  # (individuals, nodes + 1)
+    results: FloatArray  # (3, individuals) lengths, mean unsafenesses, costs
 
 
 def solution_of(path: NodeArray, world: World) -> FloatArray:

@@ -21,70 +21,42 @@ ONE = np.uint64(1)
 
 
 class World(NamedTuple):
-    """A grid and its fields.
+    """A grid and its fields."""
 
-    Attributes:
-        neighbours: (nodes, moves), see `grids.Grid`.
-        num_moves: Moves that a front makes; they come first.
-        coordinates: (nodes, dimensions).
-        kinds: See `grids.Grid`.
-        unsafeness: (nodes,).
-        tolls: The same two in whole numbers, whose sums are exact in any order.
-        potentials: (≥ greatest number of steps + 1,) toward a target after so many steps.
-        fronts: (nodes, nodes) steps to every node from every other; (0, nodes) on large grids.
-        choices: Of walks to all nodes; without rows where they do not fit.
-    """
-
-    neighbours: NodeArray
-    num_moves: int
-    coordinates: NodeArray
+    neighbours: NodeArray  # (nodes, moves), see `grids.Grid`
+    num_moves: int  # moves that a front makes; they come first
+    coordinates: NodeArray  # (nodes, dimensions)
     kinds: NodeArray
-    unsafeness: FloatArray
-    tolls: Tolls
-    potentials: FloatArray
+    unsafeness: FloatArray  # (nodes,)
+    tolls: Tolls  # the same two in whole numbers, whose sums are exact in any order
+    potentials: FloatArray  # (≥ greatest number of steps + 1,) toward a target after so many steps
+    # (nodes, nodes) steps to every node from every other; (0, nodes) on large grids
     fronts: StepArray
-    choices: Choices
+    choices: Choices  # of walks to all nodes; without rows where they do not fit
 
 
 class Breeding(NamedTuple):
-    """Settings of the operators.
+    """Settings of the operators."""
 
-    Attributes:
-        erase: Whether loops are erased.
-        multiple: Copies that the best one expects, in units of the mean.
-        crossover_rate: Probability per pair.
-        reach: How far apart two nodes may be, in every coordinate, to cross paths there [cell].
-        mutation_rate: Probability per path.
-    """
-
-    erase: bool
-    multiple: float
-    crossover_rate: float
-    reach: int
-    mutation_rate: float
+    erase: bool  # whether loops are erased
+    multiple: float  # copies that the best one expects, in units of the mean
+    crossover_rate: float  # probability per pair
+    reach: int  # how far apart two nodes may be, in every coordinate, to cross paths there [cell]
+    mutation_rate: float  # probability per path
 
 
 class Scratch(NamedTuple):
-    """Scratch of the operators.
+    """Scratch of the operators."""
 
-    Attributes:
-        place: (nodes,) places in a path.
-        joined: (3 nodes + 3,) a path of several pieces.
-        seen: (nodes + 1,) of `coincident_sites`: the search in which a node was last seen, and its
-            place then, as one number; the last entry is that of the last search, place 0.
-        sites: (nodes + 1,) places where two paths meet, see there.
-        steps: (nodes,) of a front.
-        queue: (nodes,) of a front.
-        walked: (nodes + 1,) a walk.
-    """
-
-    place: NodeArray
-    joined: NodeArray
+    place: NodeArray  # (nodes,) places in a path
+    joined: NodeArray  # (3 nodes + 3,) a path of several pieces
+    # (nodes + 1,) of `coincident_sites`: the search in which a node was last seen, and its place
+    # then, as one number; the last entry is that of the last search, place 0
     seen: IntArray
-    sites: IntArray
-    steps: NodeArray
-    queue: NodeArray
-    walked: NodeArray
+    sites: IntArray  # (nodes + 1,) places where two paths meet, see there
+    steps: NodeArray  # (nodes,) of a front
+    queue: NodeArray  # (nodes,) of a front
+    walked: NodeArray  # (nodes + 1,) a walk
 
     @classmethod
     def of(cls, nodes: int) -> "Scratch":

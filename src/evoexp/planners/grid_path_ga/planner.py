@@ -61,39 +61,23 @@ BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
 class Problem(NamedTuple):
-    """Robot and scenario, prepared for the search.
+    """Robot and scenario, prepared for the search."""
 
-    Attributes:
-        fields: Grid, unsafeness, potentials.
-        moves: The moves of walks to the goal, and their weights.
-        choices: The same as a table, see `grid_choices.choice_table`.
-        ends: Indices of start and goal.
-        world: Grid and fields, as the kernels take them.
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    fields: Fields
-    moves: Moves
-    choices: Choices
-    ends: tuple[int, int]
-    world: World
-    scene: Scene
-    security_margin: float
+    fields: Fields  # grid, unsafeness, potentials
+    moves: Moves  # the moves of walks to the goal, and their weights
+    choices: Choices  # the same as a table, see `grid_choices.choice_table`
+    ends: tuple[int, int]  # indices of start and goal
+    world: World  # grid and fields, as the kernels take them
+    scene: Scene  # the bodies themselves, for the exact verdict on a motion
+    security_margin: float  # clearance that the task requires [length unit]
 
 
 class Judgement(NamedTuple):
-    """Judged paths.
+    """Judged paths."""
 
-    Attributes:
-        results: (3, individuals) length, mean unsafeness, cost.
-        num_nodes: (individuals,).
-        collision_queries: 0: free nodes and moves are known before.
-    """
-
-    results: FloatArray
-    num_nodes: NodeArray
-    collision_queries: int = 0
+    results: FloatArray  # (3, individuals) length, mean unsafeness, cost
+    num_nodes: NodeArray  # (individuals,)
+    collision_queries: int = 0  # 0: free nodes and moves are known before
 
     @property
     def cost(self) -> FloatArray:
@@ -111,27 +95,20 @@ class Judgement(NamedTuple):
 
 
 class GridPathGa(PlannerDefaults, Component):
-    """The algorithm of Chen & Zalzala, section 2.3.
-
-    Attributes:
-        revisits: Whether a path may pass a node again; if not, all loops are erased.
-        crossover_reach: Greatest difference of two nodes, in every coordinate, at which paths
-            without a common node may be crossed [cell].
-        ga: Population, generations, rates; `mutation_rate` is per path.
-        objective: Weights of Eq. 1.
-        collision: The potential fields.
-        acceptance: Which moves a path may make: those between free nodes, or those of them that the
-            exact certifier proves.
-    """
+    """The algorithm of Chen & Zalzala, section 2.3."""
 
     component: ClassVar[str] = "grid_path_ga"
     revision: ClassVar[int] = 3
 
-    revisits: bool
+    revisits: bool  # whether a path may pass a node again; if not, all loops are erased
+    # greatest difference of two nodes, in every coordinate, at which paths without a common
+    # node may be crossed [cell]
     crossover_reach: NonNegativeCount
-    ga: ScaledGenetic
-    objective: PathCost
-    collision: PotentialFields
+    ga: ScaledGenetic  # population, generations, rates; `mutation_rate` is per path
+    objective: PathCost  # weights of Eq. 1
+    collision: PotentialFields  # the potential fields
+    # which moves a path may make: those between free nodes, or those of them that the exact
+    # certifier proves
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorPlatform, scenario: GridMotion) -> Problem:

@@ -18,43 +18,26 @@ ROWS = GENES + CRITERIA + 1  # angles [deg], criteria, branch of θ3
 
 
 class Breeding(NamedTuple):
-    """Settings of the operators.
+    """Settings of the operators."""
 
-    Attributes:
-        multiple: Copies that the best one expects, in units of the mean.
-        crossover_rate: Probability per pair.
-        mutation_rate: Probability per bit.
-    """
-
-    multiple: float
-    crossover_rate: float
-    mutation_rate: float
+    multiple: float  # copies that the best one expects, in units of the mean
+    crossover_rate: float  # probability per pair
+    mutation_rate: float  # probability per bit
 
 
 class Coding(NamedTuple):
-    """The meaning of strings.
+    """The meaning of strings."""
 
-    Attributes:
-        bits: Bits per gene.
-        gray: Whether they are Gray codes.
-        limits: (2, 2) of the angles [deg].
-    """
-
-    bits: int
-    gray: bool
-    limits: FloatArray
+    bits: int  # bits per gene
+    gray: bool  # whether they are Gray codes
+    limits: FloatArray  # (2, 2) of the angles [deg]
 
 
 class Population(NamedTuple):
-    """One generation; or all of several, with a first axis of places.
+    """One generation; or all of several, with a first axis of places."""
 
-    Attributes:
-        strings: (2, individuals).
-        rows: (ROWS, individuals).
-    """
-
-    strings: IntArray
-    rows: FloatArray
+    strings: IntArray  # (2, individuals)
+    rows: FloatArray  # (ROWS, individuals)
 
 
 @kernel

@@ -45,35 +45,23 @@ BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
 class Problem(NamedTuple):
-    """Robot and scenario, prepared for the search.
+    """Robot and scenario, prepared for the search."""
 
-    Attributes:
-        assembly: The robot, built.
-        model: Task, weights and limits of the criteria.
-        angle_limits: (2, 2) of the genes θ1, θ2 [deg].
-        scene: The bodies themselves, links against links too, for the exact verdict on a posture.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    assembly: Assembly
-    model: Model
-    angle_limits: FloatArray
+    assembly: Assembly  # the robot, built
+    model: Model  # task, weights and limits of the criteria
+    angle_limits: FloatArray  # (2, 2) of the genes θ1, θ2 [deg]
+    # the bodies themselves, links against links too, for the exact verdict on a posture
     scene: Scene
-    security_margin: float
+    security_margin: float  # clearance that the task requires [length unit]
 
 
 class Judgement(NamedTuple):
-    """A judged population.
+    """A judged population."""
 
-    Attributes:
-        cost: (individuals,) E of Eq. 14; E_m where infeasible.
-        feasible: (individuals,) whether the end-effector reaches its target within all limits.
-        terms: (4, individuals) the criteria, see NAMES.
-    """
-
-    cost: FloatArray
+    cost: FloatArray  # (individuals,) E of Eq. 14; E_m where infeasible.
+    # (individuals,) whether the end-effector reaches its target within all limits
     feasible: BoolArray
-    terms: FloatArray
+    terms: FloatArray  # (4, individuals) the criteria, see NAMES
     collision_queries: int = 0
 
     def named_terms(self, individual: int) -> dict[str, float]:
@@ -82,25 +70,18 @@ class Judgement(NamedTuple):
 
 
 class PlacementGa(PlannerDefaults, Component):
-    """The algorithm of Chen & Zalzala, section 3.2.
-
-    Attributes:
-        angle_range: Least and greatest θ1 and θ2 that genes stand for [deg].
-        bits_per_gene: Of either angle; both ends of the range are values [-].
-        coding: Plain binary numbers, or Gray codes.
-        ga: Population, generations, rates, scaling.
-        objective: Weights of Eq. 14.
-        acceptance: `model`: other planners may prove motions, here there are none.
-    """
+    """The algorithm of Chen & Zalzala, section 3.2."""
 
     component: ClassVar[str] = "placement_ga"
     revision: ClassVar[int] = 2
 
-    angle_range: tuple[float, float]
+    angle_range: tuple[float, float]  # least and greatest θ1 and θ2 that genes stand for [deg]
+    # of either angle; both ends of the range are values [-]
     bits_per_gene: Annotated[int, Field(ge=1, le=52)]
-    coding: Literal["binary", "gray"]
-    ga: ScaledGenetic
-    objective: PlacementCriteria
+    coding: Literal["binary", "gray"]  # plain binary numbers, or Gray codes
+    ga: ScaledGenetic  # population, generations, rates, scaling
+    objective: PlacementCriteria  # weights of Eq. 14
+    # `model`: other planners may prove motions, here there are none
     acceptance: Acceptance = "model"
 
     @model_validator(mode="after")

@@ -35,38 +35,26 @@ TOOL_UP, OBJECT_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 class Situation(NamedTuple):
-    """The places of all objects.
+    """The places of all objects."""
 
-    Attributes:
-        poses: (obstacles, 12) in the world; a held object stands where it was taken.
-        held: Index of the held object; −1: none.
-        grasp: (12,) of the held object, in the table's frame of the joint that moves the tool.
-    """
-
-    poses: FloatArray
-    held: int
+    poses: FloatArray  # (obstacles, 12) in the world; a held object stands where it was taken
+    held: int  # index of the held object; −1: none
+    # (12,) of the held object, in the table's frame of the joint that moves the tool
     grasp: FloatArray
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Robot and objects.
+    """Robot and objects."""
 
-    Attributes:
-        assembly: The robot, built.
-        bodies: Its bodies, covered.
-        task: The scenario.
-        obstacles: The obstacles at the start.
-        covers: Covers of the objects that are grasped, by index, in their own frames, and shapes
-            inside them.
-        tool: Index into the kinematic table of the joint that moves the tool; its local pose (12,).
-    """
-
-    assembly: Assembly
-    bodies: BodyModel
-    task: PostureTask
-    obstacles: ObstacleTable
+    assembly: Assembly  # the robot, built
+    bodies: BodyModel  # its bodies, covered
+    task: PostureTask  # the scenario
+    obstacles: ObstacleTable  # the obstacles at the start
+    # covers of the objects that are grasped, by index, in their own frames, and shapes inside
+    # them
     covers: dict[int, tuple[Cover, Cover]]
+    # index into the kinematic table of the joint that moves the tool; its local pose (12,)
     tool: tuple[int, FloatArray]
 
     @property

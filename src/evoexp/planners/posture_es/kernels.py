@@ -36,96 +36,55 @@ TURNS = (ANGLE, AXIAL, HEADING)  # terms that must be small, too, where a goal i
 
 
 class Judging(NamedTuple):
-    """Terms and limits by which postures are judged.
+    """Terms and limits by which postures are judged."""
 
-    Attributes:
-        chain: The robot's joints.
-        joint: Index into the table of the joint that moves the controlled frame.
-        local: (12,) local pose of the controlled frame.
-        aim: The goal.
-        weights: (terms,) of the cost; 0: the term does not count.
-        tilts: (2,) hard limits of `upright` and `keep_parallel` [rad].
-        limits: (nq, 2) of the joints.
-        tables: Tables of the collision model.
-        reach: Of the preference for free space [length unit].
-        tolerances: (3,) of the goal's distance [length unit], of its angles and of the tilt of the
-            up axis [rad].
-        larger_angle: Whether only the larger one of the two grasping angles counts.
-        touching: Tables of the collision model of pairs that may touch; read only if there are any.
-        may_touch: Whether there are any.
-    """
-
-    chain: KinematicChain
-    joint: int
-    local: FloatArray
-    aim: Aim
-    weights: FloatArray
-    tilts: FloatArray
-    limits: FloatArray
-    tables: tuple[Any, ...]
-    reach: float
+    chain: KinematicChain  # the robot's joints
+    joint: int  # index into the table of the joint that moves the controlled frame
+    local: FloatArray  # (12,) local pose of the controlled frame
+    aim: Aim  # the goal
+    weights: FloatArray  # (terms,) of the cost; 0: the term does not count
+    tilts: FloatArray  # (2,) hard limits of `upright` and `keep_parallel` [rad]
+    limits: FloatArray  # (nq, 2) of the joints
+    tables: tuple[Any, ...]  # tables of the collision model
+    reach: float  # of the preference for free space [length unit]
+    # (3,) of the goal's distance [length unit], of its angles and of the tilt of the up axis [rad]
     tolerances: FloatArray
-    larger_angle: bool
+    larger_angle: bool  # whether only the larger one of the two grasping angles counts
+    # tables of the collision model of pairs that may touch; read only if there are any
     touching: tuple[Any, ...]
-    may_touch: bool
+    may_touch: bool  # whether there are any
 
 
 class Strategy(NamedTuple):
-    """Settings of the operators.
+    """Settings of the operators."""
 
-    Attributes:
-        scope: (nq,) greatest step of each joint [rad].
-        limits: (nq, 2) of the joints.
-        mutation: UNIFORM or GAUSSIAN.
-        mutation_std: In units of the scope [-].
-        parent_choice: EQUAL or NORMAL.
-        parent_std: In units of μ [-].
-        crossover_rate: Probability per child.
-        plus: Whether parents may stay.
-        edge_check: Configurations tested between a parent and its child; 0: none.
-    """
-
-    scope: FloatArray
-    limits: FloatArray
-    mutation: int
-    mutation_std: float
-    parent_choice: int
-    parent_std: float
-    crossover_rate: float
-    plus: bool
-    edge_check: int
+    scope: FloatArray  # (nq,) greatest step of each joint [rad]
+    limits: FloatArray  # (nq, 2) of the joints
+    mutation: int  # UNIFORM or GAUSSIAN
+    mutation_std: float  # in units of the scope [-]
+    parent_choice: int  # EQUAL or NORMAL
+    parent_std: float  # in units of μ [-]
+    crossover_rate: float  # probability per child
+    plus: bool  # whether parents may stay
+    edge_check: int  # configurations tested between a parent and its child; 0: none
 
 
 class Members(NamedTuple):
-    """The parents of a cycle, the best first.
+    """The parents of a cycle, the best first."""
 
-    Attributes:
-        postures: (nq, ≥ size) [rad].
-        costs: (≥ size,).
-        size: Number of parents.
-    """
-
-    postures: FloatArray
-    costs: FloatArray
-    size: int
+    postures: FloatArray  # (nq, ≥ size) [rad]
+    costs: FloatArray  # (≥ size,)
+    size: int  # number of parents
 
 
 class Memory(NamedTuple):
-    """Arrays that a cycle writes.
+    """Arrays that a cycle writes."""
 
-    Attributes:
-        offspring: (nq, offspring) [rad].
-        origin: (offspring,) index of each child's parent.
-        rows: (ROWS, offspring) terms and cost.
-        feasible: (offspring,).
-        met: (offspring,) whether each meets the goal.
-    """
-
-    offspring: FloatArray
-    origin: IntArray
-    rows: FloatArray
-    feasible: BoolArray
-    met: BoolArray
+    offspring: FloatArray  # (nq, offspring) [rad]
+    origin: IntArray  # (offspring,) index of each child's parent
+    rows: FloatArray  # (ROWS, offspring) terms and cost
+    feasible: BoolArray  # (offspring,)
+    met: BoolArray  # (offspring,) whether each meets the goal
 
     @classmethod
     def of(cls, nq: int, count: int) -> "Memory":

@@ -27,57 +27,36 @@ LEAST, LOWEST, MEAN, STD = range(4)  # columns of `Cycles.costs`
 
 
 class Parents(NamedTuple):
-    """The parents of the next cycle, the best first.
+    """The parents of the next cycle, the best first."""
 
-    Attributes:
-        postures: (nq, μ) [rad].
-        costs: (μ,).
-        nodes: (μ,) of the ancestry.
-        size: (1,) how many there are.
-    """
-
-    postures: FloatArray
-    costs: FloatArray
-    nodes: IntArray
-    size: IntArray
+    postures: FloatArray  # (nq, μ) [rad]
+    costs: FloatArray  # (μ,)
+    nodes: IntArray  # (μ,) of the ancestry
+    size: IntArray  # (1,) how many there are
 
 
 class Nodes(NamedTuple):
-    """The ancestry as kernels write it; there must be room for the nodes of all cycles.
+    """The ancestry as kernels write it; there must be room for the nodes of all cycles."""
 
-    Attributes:
-        postures: (≥ nodes, nq) [rad].
-        parents: (≥ nodes,) node of each one's parent; −1: none.
-        num: (1,) number of nodes.
-    """
-
-    postures: FloatArray
-    parents: IntArray
-    num: IntArray
+    postures: FloatArray  # (≥ nodes, nq) [rad]
+    parents: IntArray  # (≥ nodes,) node of each one's parent; −1: none
+    num: IntArray  # (1,) number of nodes
 
 
 class Cycles(NamedTuple):
-    """Some cycles; number c is at place c modulo the number of places.
+    """Some cycles; number c is at place c modulo the number of places."""
 
-    Attributes:
-        offspring: (places, nq, offspring) [rad].
-        rows: (places, ROWS, offspring) terms and cost.
-        feasible: (places, offspring).
-        counts: (places, 4) node of the best so far, cycles since the last improvement, whether
-            somebody meets the goal, number of feasible offspring.
-        costs: (places, 4) least cost of any so far; lowest of the cycle, feasible or not; mean and
-            deviation of the feasible.
-        best_rows: (places, ROWS) terms and cost of the best so far.
-        states: (places, 2) of the random generator behind each: high and low half.
-    """
-
-    offspring: FloatArray
-    rows: FloatArray
-    feasible: BoolArray
+    offspring: FloatArray  # (places, nq, offspring) [rad]
+    rows: FloatArray  # (places, ROWS, offspring) terms and cost
+    feasible: BoolArray  # (places, offspring)
+    # (places, 4) node of the best so far, cycles since the last improvement, whether somebody meets
+    # the goal, number of feasible offspring
     counts: IntArray
+    # (places, 4) least cost of any so far; lowest of the cycle, feasible or not; mean and deviation
+    # of the feasible
     costs: FloatArray
-    best_rows: FloatArray
-    states: Words
+    best_rows: FloatArray  # (places, ROWS) terms and cost of the best so far
+    states: Words  # (places, 2) of the random generator behind each: high and low half
 
     @classmethod
     def of(cls, nq: int, count: int, num_places: int) -> "Cycles":
@@ -94,19 +73,12 @@ class Cycles(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Arrays that a cycle writes on its way.
+    """Arrays that a cycle writes on its way."""
 
-    Attributes:
-        uniforms: Uniform numbers of a cycle.
-        normals: Normal deviates of a cycle.
-        origin: (offspring,) index of each child's parent.
-        met: (offspring,) whether each meets the goal.
-    """
-
-    uniforms: FloatArray
-    normals: FloatArray
-    origin: IntArray
-    met: BoolArray
+    uniforms: FloatArray  # uniform numbers of a cycle
+    normals: FloatArray  # normal deviates of a cycle
+    origin: IntArray  # (offspring,) index of each child's parent
+    met: BoolArray  # (offspring,) whether each meets the goal
 
 
 @kernel

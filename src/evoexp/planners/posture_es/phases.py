@@ -33,17 +33,11 @@ KEPT = 64  # stages and scenes that a problem keeps
 
 
 class Judged(NamedTuple):
-    """Judged postures.
+    """Judged postures."""
 
-    Attributes:
-        rows: (ROWS, postures) terms, cost.
-        feasible: (postures,).
-        met: (postures,) whether they meet the goal.
-    """
-
-    rows: FloatArray
-    feasible: BoolArray
-    met: BoolArray
+    rows: FloatArray  # (ROWS, postures) terms, cost
+    feasible: BoolArray  # (postures,)
+    met: BoolArray  # (postures,) whether they meet the goal
 
     @property
     def cost(self) -> FloatArray:
@@ -57,22 +51,14 @@ class Judged(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """One phase, begun.
+    """One phase, begun."""
 
-    Attributes:
-        number: Of the phase, from 0.
-        phase: The phase.
-        situation: The places of all objects in it.
-        controlled: Index into the kinematic table, and local pose (12,), of the frame that is
-            controlled.
-        judging: Terms and limits for `kernels.judge`.
-    """
-
-    number: int
-    phase: Phase
-    situation: Situation
+    number: int  # of the phase, from 0
+    phase: Phase  # the phase
+    situation: Situation  # the places of all objects in it
+    # index into the kinematic table, and local pose (12,), of the frame that is controlled
     controlled: tuple[int, FloatArray]
-    judging: Judging
+    judging: Judging  # terms and limits for `kernels.judge`
 
     @property
     def target_position(self) -> FloatArray:
@@ -94,48 +80,28 @@ class Stage(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A phase in a list of postures.
+    """A phase in a list of postures."""
 
-    Attributes:
-        stage: The phase, begun.
-        first: Index of its first posture.
-        last: Index of its last posture, where the next phase begins.
-        judged: Its postures, judged by it.
-        reached: Whether the last one meets its goal.
-    """
-
-    stage: Stage
-    first: int
-    last: int
-    judged: Judged
-    reached: bool
+    stage: Stage  # the phase, begun
+    first: int  # index of its first posture
+    last: int  # index of its last posture, where the next phase begins
+    judged: Judged  # its postures, judged by it
+    reached: bool  # whether the last one meets its goal
 
 
 @dataclass(frozen=True)
 class Problem(Cell):
-    """Robot and scenario, prepared for the search.
+    """Robot and scenario, prepared for the search."""
 
-    Attributes:
-        phases: The phases of the task, subgoals included.
-        weights: (phases, terms) of the cost.
-        objective: The cost.
-        start: (nq,) [rad].
-        limits: (nq, 2) [rad].
-        scope: (nq,) of a step [rad].
-        scene: The bodies themselves in the first phase.
-        security_margin: Clearance that the task requires [length unit].
-        memory: Stages that begin with nothing moved, made once.
-    """
-
-    phases: tuple[Phase, ...]
-    weights: FloatArray
-    objective: PostureCost
-    start: FloatArray
-    limits: FloatArray
-    scope: FloatArray
-    scene: Scene | None
-    security_margin: float
-    memory: dict[Any, Any]
+    phases: tuple[Phase, ...]  # the phases of the task, subgoals included
+    weights: FloatArray  # (phases, terms) of the cost
+    objective: PostureCost  # the cost
+    start: FloatArray  # (nq,) [rad]
+    limits: FloatArray  # (nq, 2) [rad]
+    scope: FloatArray  # (nq,) of a step [rad]
+    scene: Scene | None  # the bodies themselves in the first phase
+    security_margin: float  # clearance that the task requires [length unit]
+    memory: dict[Any, Any]  # stages that begin with nothing moved, made once
 
     @property
     def last_stage(self) -> Stage:

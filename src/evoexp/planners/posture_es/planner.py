@@ -74,27 +74,21 @@ def _one_or_several(value: Any) -> Any:
 
 
 class PostureEs(PlannerDefaults, Component):
-    """The evolution strategy of Corsépius, section 4.
-
-    Attributes:
-        scope: How far a joint may step at most: one number for all joints, or one per joint [rad],
-            lengths for sliding joints.
-        edge_check: Configurations tested between a parent and its child; 0: none, as in the paper.
-        ga: Parents, offspring, selection, mutation, when to stop.
-        objective: Terms of the cost.
-        collision: Covers of the bodies.
-        acceptance: Who may be a parent or the winner: everybody whom the model accepts, or those of
-            them to whom the exact certifier proves the way from their parent.
-    """
+    """The evolution strategy of Corsépius, section 4."""
 
     component: ClassVar[str] = "posture_es"
     goal_is_region: ClassVar[bool] = True
 
+    # how far a joint may step at most: one number for all joints, or one per joint [rad],
+    # lengths for sliding joints
     scope: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_one_or_several)]
+    # configurations tested between a parent and its child; 0: none, as in the paper
     edge_check: NonNegativeCount
-    ga: StrategySettings
-    objective: PostureCost
-    collision: CollisionModel
+    ga: StrategySettings  # parents, offspring, selection, mutation, when to stop
+    objective: PostureCost  # terms of the cost
+    collision: CollisionModel  # covers of the bodies
+    # who may be a parent or the winner: everybody whom the model accepts, or those of them to
+    # whom the exact certifier proves the way from their parent
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PostureTask | MoveitTask) -> Problem:

@@ -19,57 +19,32 @@ TOURNAMENT, ROULETTE, RANK = range(3)
 
 
 class Draws(NamedTuple):
-    """Random numbers of one generation.
+    """Random numbers of one generation."""
 
-    Attributes:
-        choosing: Uniform numbers for the choice of parents.
-        crossing: Uniform numbers for crossover.
-        mutating: Uniform numbers for mutation.
-        normals: (genes, ≥ offspring) normal deviates, for Gaussian mutation only.
-    """
-
-    choosing: FloatArray
-    crossing: FloatArray
-    mutating: FloatArray
-    normals: FloatArray
+    choosing: FloatArray  # uniform numbers for the choice of parents
+    crossing: FloatArray  # uniform numbers for crossover
+    mutating: FloatArray  # uniform numbers for mutation
+    normals: FloatArray  # (genes, ≥ offspring) normal deviates, for Gaussian mutation only
 
 
 class Breeding(NamedTuple):
-    """Settings of the operators.
+    """Settings of the operators."""
 
-    Attributes:
-        num_genes: Number of genes.
-        binary: Whether they are bits.
-        selection: TOURNAMENT, ROULETTE or RANK.
-        tournament_size: Contestants per tournament.
-        rank_pressure: See `rank_weights`.
-        crossover: See `cross_genes`, and so are its rate and α.
-        crossover_rate: Probability per pair.
-        blend_alpha: α of BLX-α.
-        mutation: See `mutate_genes`, and so are its scope and rate.
-        mutation_scope: See there.
-        mutation_rate: See there.
-        mutation_std: Of Gaussian mutation, in units of a gene's range.
-        mutation_power: b of non-uniform mutation.
-        num_generations: T of non-uniform mutation.
-        limits: (joints, 2) of the joint angles [rad].
-    """
-
-    num_genes: int
-    binary: bool
-    selection: int
-    tournament_size: int
+    num_genes: int  # number of genes
+    binary: bool  # whether they are bits
+    selection: int  # TOURNAMENT, ROULETTE or RANK
+    tournament_size: int  # contestants per tournament
     rank_pressure: float
-    crossover: int
-    crossover_rate: float
-    blend_alpha: float
-    mutation: int
+    crossover: int  # see `cross_genes`, and so are its rate and α
+    crossover_rate: float  # probability per pair
+    blend_alpha: float  # α of BLX-α
+    mutation: int  # see `mutate_genes`, and so are its scope and rate
     mutation_scope: int
     mutation_rate: float
-    mutation_std: float
-    mutation_power: int
-    num_generations: int
-    limits: FloatArray
+    mutation_std: float  # of Gaussian mutation, in units of a gene's range
+    mutation_power: int  # b of non-uniform mutation
+    num_generations: int  # t of non-uniform mutation
+    limits: FloatArray  # (joints, 2) of the joint angles [rad]
 
 
 @kernel

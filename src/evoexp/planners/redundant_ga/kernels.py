@@ -29,41 +29,24 @@ SUMMARY = 4  # of a population: see `summarise_costs`
 
 
 class Generations(NamedTuple):
-    """Some generations; number g is at place g modulo the number of places.
+    """Some generations; number g is at place g modulo the number of places."""
 
-    Attributes:
-        tables: (places, rows, individuals, filled up to whole vectors).
-        states: (places, 2) of the random generator behind each: high and low half.
-        summaries: (places, SUMMARY).
-    """
-
-    tables: FloatArray
-    states: Words
-    summaries: FloatArray
+    tables: FloatArray  # (places, rows, individuals, filled up to whole vectors)
+    states: Words  # (places, 2) of the random generator behind each: high and low half
+    summaries: FloatArray  # (places, SUMMARY)
 
 
 class Memory(NamedTuple):
-    """Arrays that a generation writes on its way.
+    """Arrays that a generation writes on its way."""
 
-    Attributes:
-        uniforms: (choosing + crossing + mutating,) uniform numbers.
-        normals: Normal deviates; see `Draws`.
-        parents: (offspring,) indices of individuals.
-        elites: (elites,) likewise.
-        lanes: (individuals + LANES,) scratch.
-        hit: (individuals,) scratch.
-        num_choosing: Uniform numbers for the choice of parents.
-        num_crossing: The same for crossover.
-    """
-
-    uniforms: FloatArray
-    normals: FloatArray
-    parents: IntArray
-    elites: IntArray
-    lanes: IntArray
-    hit: BoolArray
-    num_choosing: int
-    num_crossing: int
+    uniforms: FloatArray  # (choosing + crossing + mutating,) uniform numbers
+    normals: FloatArray  # normal deviates; see `Draws`
+    parents: IntArray  # (offspring,) indices of individuals
+    elites: IntArray  # (elites,) likewise
+    lanes: IntArray  # (individuals + LANES,) scratch
+    hit: BoolArray  # (individuals,) scratch
+    num_choosing: int  # uniform numbers for the choice of parents
+    num_crossing: int  # the same for crossover
 
 
 @kernel

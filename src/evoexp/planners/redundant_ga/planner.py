@@ -46,19 +46,13 @@ CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellip
 
 
 class Judgement(NamedTuple):
-    """Judged plans.
+    """Judged plans."""
 
-    Attributes:
-        cost: (individuals,) objective of SP2; inf where SP1 is not successful.
-        accepted: (individuals,) whether both sub-paths are successful.
-        terms: Of every sub-path cost, position error and joint displacement, (2, 3, individuals).
-        collision_queries: Configurations judged.
-    """
-
-    cost: FloatArray
-    accepted: BoolArray
+    cost: FloatArray  # (individuals,) objective of SP2; inf where SP1 is not successful
+    accepted: BoolArray  # (individuals,) whether both sub-paths are successful
+    # of every sub-path cost, position error and joint displacement, (2, 3, individuals)
     terms: FloatArray
-    collision_queries: int
+    collision_queries: int  # configurations judged
 
     @property
     def feasible(self) -> BoolArray:
@@ -75,30 +69,22 @@ class RedundantGa(PlannerDefaults, Component):
 
     Random search takes the generations and evaluations of one search, those of `ga`; sequential
     search goes through the same attempts and searches as the algorithm.
-
-    Attributes:
-        num_attempts: How often SP1 and SP2 are searched at most.
-        stop_cost_sp1: The search of SP1 ends where the objective is smaller.
-        stop_cost_sp2: The same of SP2.
-        success: A sub-path is successful below its stopping cost (`threshold`), or if its cost is
-            `finite`.
-        ga: Population, generations, operators.
-        objective: Weights of Eq. 4.
-        collision: Positions and chords that are tested.
-        acceptance: Which ends of sub-paths may be the best one: those that the model accepts, or
-            those of them whose sub-path the exact certifier proves; one that is refuted costs inf.
     """
 
     component: ClassVar[str] = "redundant_ga"
     goal_is_region: ClassVar[bool] = True
 
-    num_attempts: Count
-    stop_cost_sp1: Positive
-    stop_cost_sp2: Positive
+    num_attempts: Count  # how often SP1 and SP2 are searched at most
+    stop_cost_sp1: Positive  # the search of SP1 ends where the objective is smaller
+    stop_cost_sp2: Positive  # the same of SP2
+    # A sub-path is successful below its stopping cost (`threshold`), or if its cost is
+    # `finite`
     success: Literal["threshold", "finite"]
-    ga: SelectiveSettings
-    objective: Reaching
-    collision: LinkEllipses
+    ga: SelectiveSettings  # population, generations, operators
+    objective: Reaching  # weights of Eq. 4
+    collision: LinkEllipses  # positions and chords that are tested
+    # which ends of sub-paths may be the best one: those that the model accepts, or those of
+    # them whose sub-path the exact certifier proves; one that is refuted costs inf
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:

@@ -22,14 +22,11 @@ class SequentialSearch(WrappedPlanner):
     Selection, crossover and mutation are left out: every generation is drawn anew, and the best
     individual drawn so far ends the sub-path. What the planner does better is due to evolution.
     (Random search draws both sub-paths at once and must succeed in both with one draw.)
-
-    Attributes:
-        planner: The planner whose loop, sampling and budget are used.
     """
 
     component: ClassVar[str] = "sequential_search"
 
-    planner: RedundantGa
+    planner: RedundantGa  # the planner whose loop, sampling and budget are used
 
     @field_validator("planner", mode="before")
     @classmethod

@@ -35,17 +35,11 @@ MEMORY = 2**20  # [B] whose tables should not take more than this
 
 
 class BestEnd(NamedTuple):
-    """The best individual of a population.
+    """The best individual of a population."""
 
-    Attributes:
-        cost: Eq. 4.
-        posture: (joints,) [rad].
-        terms: (3,) cost, position error, joint displacement.
-    """
-
-    cost: float
-    posture: FloatArray
-    terms: FloatArray
+    cost: float  # eq. 4.
+    posture: FloatArray  # (joints,) [rad]
+    terms: FloatArray  # (3,) cost, position error, joint displacement
 
 
 class RunMemory:
@@ -104,21 +98,15 @@ class Search:
     """One run of the genetic algorithm over the ends of one sub-path.
 
     Several generations are computed per call of a kernel, and shown one after the other.
-
-    Attributes:
-        genomes: (genes, individuals) of the population, a copy: one array for all generations.
-        costs: (individuals,) a view.
-        lowest: The best individual's cost; elites keep it the best so far.
-        statistics: Mean and deviation of the costs.
-        num_finite: Number of finite costs.
     """
 
     evolving = True
+    # (genes, individuals) of the population, a copy: one array for all generations
     genomes: FloatArray
-    costs: FloatArray
-    lowest: float
-    statistics: CostStatistics
-    num_finite: int
+    costs: FloatArray  # (individuals,) a view
+    lowest: float  # the best individual's cost; elites keep it the best so far
+    statistics: CostStatistics  # mean and deviation of the costs
+    num_finite: int  # number of finite costs
 
     def __init__(
         self,

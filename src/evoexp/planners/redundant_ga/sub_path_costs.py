@@ -21,23 +21,14 @@ RESULTS = 3  # last rows of a table of individuals: cost, position error, joint 
 
 
 class Judging(NamedTuple):
-    """The collision model and the objective of a sub-path.
+    """The collision model and the objective of a sub-path."""
 
-    Attributes:
-        arm: The arm.
-        ellipses: The ellipses.
-        path: The positions that are tested.
-        target: (2,) desired place of the tip [length unit].
-        box: (4,) least and greatest x, least and greatest y of the tip [length unit].
-        weights: w1, w2 of Eq. 4.
-    """
-
-    arm: PlanarArm
-    ellipses: Ellipses
-    path: TestedPath
-    target: FloatArray
-    box: FloatArray
-    weights: tuple[float, float]
+    arm: PlanarArm  # the arm
+    ellipses: Ellipses  # the ellipses
+    path: TestedPath  # the positions that are tested
+    target: FloatArray  # (2,) desired place of the tip [length unit]
+    box: FloatArray  # (4,) least and greatest x, least and greatest y of the tip [length unit]
+    weights: tuple[float, float]  # w1, w2 of Eq. 4.
 
 
 @kernel

@@ -129,17 +129,11 @@ class Tree:
 
 
 class Growth(NamedTuple):
-    """The end of an attempt to grow toward a configuration.
+    """The end of an attempt to grow toward a configuration."""
 
-    Attributes:
-        node: The last node that is new or, where none is, the nearest one.
-        grew: Whether there is a new node, or a node at the configuration itself.
-        reached: Whether that node is the configuration itself.
-    """
-
-    node: int
-    grew: bool
-    reached: bool
+    node: int  # the last node that is new or, where none is, the nearest one
+    grew: bool  # whether there is a new node, or a node at the configuration itself
+    reached: bool  # whether that node is the configuration itself
 
 
 class TreePair:

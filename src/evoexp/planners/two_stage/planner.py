@@ -35,40 +35,26 @@ PATH = ("distance", "unsafeness", "num_nodes")
 
 
 class Problem(NamedTuple):
-    """Robot and scenario, prepared for both stages.
+    """Robot and scenario, prepared for both stages."""
 
-    Attributes:
-        robot: The description; parts of it solve the stages.
-        scenario: The mission.
-        placement: Problem of the first stage.
-        path: Problem of the second one, with the goal of the grid.
-        scene: All bodies, for the exact verdict on the motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    robot: FloorManipulator
-    scenario: Mission
-    placement: PlacementProblem
-    path: PathProblem
-    scene: Scene
-    security_margin: float
+    robot: FloorManipulator  # the description; parts of it solve the stages
+    scenario: Mission  # the mission
+    placement: PlacementProblem  # problem of the first stage
+    path: PathProblem  # problem of the second one, with the goal of the grid
+    scene: Scene  # all bodies, for the exact verdict on the motion
+    security_margin: float  # clearance that the task requires [length unit]
 
 
 class TwoStage(PlannerDefaults, Component):
-    """The placement search, then the path search.
-
-    Attributes:
-        placement: The planner of the first stage.
-        path: The planner of the second one.
-        acceptance: Which missions are an answer: those that both stages accept (`model`), or those
-            of them whose whole motion, driving and docking, the exact certifier proves
-            (`certified`, `margin`). Moves over the grid that it refutes are forbidden then.
-    """
+    """The placement search, then the path search."""
 
     component: ClassVar[str] = "two_stage"
 
-    placement: PlacementGa
-    path: GridPathGa
+    placement: PlacementGa  # the planner of the first stage
+    path: GridPathGa  # the planner of the second one
+    # which missions are an answer: those that both stages accept (`model`), or those of them
+    # whose whole motion, driving and docking, the exact certifier proves (`certified`,
+    # `margin`). Moves over the grid that it refutes are forbidden then
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:

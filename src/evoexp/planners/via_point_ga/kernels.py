@@ -24,121 +24,69 @@ from evoexp.records import FloatArray, IntArray
 
 
 class Counts(NamedTuple):
-    """Sizes of a generation.
+    """Sizes of a generation."""
 
-    Attributes:
-        offspring: Individuals that are new.
-        pair_uniforms: Uniform numbers that cross-over takes.
-        new: Offspring that may be replaced by new trajectories.
-    """
-
-    offspring: int
-    pair_uniforms: int
-    new: int
+    offspring: int  # individuals that are new
+    pair_uniforms: int  # uniform numbers that cross-over takes
+    new: int  # offspring that may be replaced by new trajectories
 
 
 class Breeding(NamedTuple):
-    """Settings of section 3.4 (a), (b) and (d).
+    """Settings of section 3.4 (a), (b) and (d)."""
 
-    Attributes:
-        fitness_offset: C_max of Eq. 7.
-        crossover_rate: Probability that a pair is crossed.
-        crossover_distance: Parents are crossed only where they are closer than this [deg].
-        exchanges_segment: Whether cross-over exchanges the segment between its sites.
-        mutation_rate: Probability that a slot gets a new trajectory.
-        walk_step: Step of a new trajectory, in units of its straight distance over N.
-        max_turn: Its largest turn away from the goal [rad].
-        start: (nq,) [deg].
-        goal: (nq,) [deg].
-    """
-
-    fitness_offset: float
-    crossover_rate: float
-    crossover_distance: float
-    exchanges_segment: bool
-    mutation_rate: float
-    walk_step: float
-    max_turn: float
-    start: FloatArray
-    goal: FloatArray
+    fitness_offset: float  # C_max of Eq. 7.
+    crossover_rate: float  # probability that a pair is crossed
+    crossover_distance: float  # parents are crossed only where they are closer than this [deg]
+    exchanges_segment: bool  # whether cross-over exchanges the segment between its sites
+    mutation_rate: float  # probability that a slot gets a new trajectory
+    walk_step: float  # step of a new trajectory, in units of its straight distance over N
+    max_turn: float  # its largest turn away from the goal [rad]
+    start: FloatArray  # (nq,) [deg]
+    goal: FloatArray  # (nq,) [deg]
 
 
 class Smoothing(NamedTuple):
-    """Settings and scratch of section 3.4 (c).
+    """Settings and scratch of section 3.4 (c)."""
 
-    Attributes:
-        redistribution: Whether to redistribute.
-        samples: Of the arc length per segment.
-        pivots: Factor of the spline's system; see `Redistribution`.
-        floats: Scratch.
-        integers: Scratch.
-        relaxation_step: delta of Eqs. 8, 9.
-    """
-
-    redistribution: bool
-    samples: int
-    pivots: FloatArray
-    floats: FloatArray
-    integers: np.ndarray
-    relaxation_step: float
+    redistribution: bool  # whether to redistribute
+    samples: int  # of the arc length per segment
+    pivots: FloatArray  # factor of the spline's system; see `Redistribution`
+    floats: FloatArray  # scratch
+    integers: np.ndarray  # scratch
+    relaxation_step: float  # delta of Eqs. 8, 9.
 
 
 class Judging(NamedTuple):
-    """Settings of Eqs. 2–7.
+    """Settings of Eqs. 2–7."""
 
-    Attributes:
-        substeps: Configurations tested per segment.
-        weights: k1, k2, k3 of Eq. 7.
-        tables: Of the collision model; see `contacts`.
-    """
-
-    substeps: int
-    weights: tuple[float, float, float]
-    tables: tuple[Any, ...]
+    substeps: int  # configurations tested per segment
+    weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7.
+    tables: tuple[Any, ...]  # of the collision model; see `contacts`
 
 
 class Settings(NamedTuple):
-    """Settings of a whole generation.
+    """Settings of a whole generation."""
 
-    Attributes:
-        counts: Sizes.
-        breeding: Of section 3.4 (a), (b), (d).
-        smoothing: Of section 3.4 (c).
-        judging: Of Eqs. 2–7.
-    """
-
-    counts: Counts
-    breeding: Breeding
-    smoothing: Smoothing
-    judging: Judging
+    counts: Counts  # sizes
+    breeding: Breeding  # of section 3.4 (a), (b), (d)
+    smoothing: Smoothing  # of section 3.4 (c)
+    judging: Judging  # of Eqs. 2–7.
 
 
 class Population(NamedTuple):
-    """One generation; or all of several, with a first axis of places.
+    """One generation; or all of several, with a first axis of places."""
 
-    Attributes:
-        strings: (nq, N + 1, individuals, padded); offspring first, then the elites.
-        costs: (individuals,).
-        collisions: (individuals,) colliding instants.
-    """
-
-    strings: FloatArray
-    costs: FloatArray
-    collisions: FloatArray
+    strings: FloatArray  # (nq, N + 1, individuals, padded); offspring first, then the elites
+    costs: FloatArray  # (individuals,)
+    collisions: FloatArray  # (individuals,) colliding instants
 
 
 class Scratch(NamedTuple):
-    """Arrays that a generation writes on its way.
+    """Arrays that a generation writes on its way."""
 
-    Attributes:
-        offspring: Strings.
-        terms: Of the offspring.
-        elites: Places of the elites, best first.
-    """
-
-    offspring: FloatArray
-    terms: StringTerms
-    elites: IntArray
+    offspring: FloatArray  # strings
+    terms: StringTerms  # of the offspring
+    elites: IntArray  # places of the elites, best first
 
 
 @kernel

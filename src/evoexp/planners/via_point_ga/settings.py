@@ -16,44 +16,31 @@ SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribut
 
 
 class ViaPointSettings(Settings):
-    """Hyperparameters of Rana & Zalzala, Tables 1 and 3.
+    """Hyperparameters of Rana & Zalzala, Tables 1 and 3."""
 
-    Attributes:
-        num_via_points: N; instants 1 … N are judged, 0 is the start, N the goal.
-        walk_step: Step length of a new trajectory, in units of its straight distance over N.
-        max_turn: Largest random turn of a step away from the direction of the goal [deg].
-        num_new_trajectories: Offspring replaced by new trajectories per generation.
-        crossover_distance: Strings are crossed only where they are closer than this [deg].
-        relaxation_step: delta of Eqs. 8, 9.
-        redistribution: Whether via-points are redistributed evenly along a spline (off: an
-            ablation).
-        spline_end: End condition of that spline.
-        samples_per_segment: Samples of its arc length between two via-points.
-        ga: Population, generations, elites, rates.
-        objective: Weights of Eq. 7.
-        collision: The touching circles or spheres, or covers of the bodies.
-        crossover_reading: How the double cross-over of section 3.4b is read: `tails` exchanges what
-            follows the site in every arm's path; `segment` exchanges what lies between the two
-            sites of the whole string: the end of the first path and the beginning of the second.
-        acceptance: Which motions are an answer: those that the collision model accepts at the
-            instants it tests (`model`), those of them that the exact certifier proves free of
-            contact between all instants (`certified`), or also free by the task's margins
-            (`margin`). A string that is refuted counts as colliding at one instant more.
-    """
-
-    num_via_points: LayoutCount
-    walk_step: Positive
+    num_via_points: LayoutCount  # N; instants 1 … N are judged, 0 is the start, N the goal
+    walk_step: Positive  # step length of a new trajectory, in units of its straight distance over N
+    # largest random turn of a step away from the direction of the goal [deg]
     max_turn: Annotated[float, Field(ge=0.0, le=180.0)]
-    num_new_trajectories: NonNegativeCount
-    crossover_distance: Positive
-    relaxation_step: Rate
+    num_new_trajectories: NonNegativeCount  # offspring replaced by new trajectories per generation
+    crossover_distance: Positive  # strings are crossed only where they are closer than this [deg]
+    relaxation_step: Rate  # delta of Eqs. 8, 9
+    # whether via-points are redistributed evenly along a spline (off: an ablation)
     redistribution: bool
-    spline_end: Literal["natural", "clamped"]
-    samples_per_segment: Count
-    ga: GeneticSettings
-    objective: StringFitness
+    spline_end: Literal["natural", "clamped"]  # end condition of that spline
+    samples_per_segment: Count  # samples of its arc length between two via-points
+    ga: GeneticSettings  # population, generations, elites, rates
+    objective: StringFitness  # weights of Eq. 7
+    # the touching circles or spheres, or covers of the bodies
     collision: TouchingSpheres | CoveredBodies
+    # how the double cross-over of section 3.4b is read: `tails` exchanges what follows the
+    # site in every arm's path; `segment` exchanges what lies between the two sites of the
+    # whole string: the end of the first path and the beginning of the second
     crossover_reading: Literal["tails", "segment"] = "tails"
+    # which motions are an answer: those that the collision model accepts at the instants it
+    # tests (`model`), those of them that the exact certifier proves free of contact between
+    # all instants (`certified`), or also free by the task's margins (`margin`). A string that
+    # is refuted counts as colliding at one instant more
     acceptance: Acceptance = "model"
 
     @model_validator(mode="after")

@@ -27,29 +27,18 @@ CACHED = 1 << 19  # [B] and as many as take so much memory
 
 
 class Problem(NamedTuple):
-    """A robot and its scenario, prepared.
+    """A robot and its scenario, prepared."""
 
-    Attributes:
-        assembly: The robot, built.
-        collision: The paper's collision model on it, or its covered bodies.
-        start: (nq,) [deg].
-        goal: (nq,) [deg].
-        spline: Factor and memory of the redistribution; for one thread at a time.
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires between two arms [length unit].
-        obstacle_margin: The same between a link and an obstacle.
-        length_unit: Name of the scene's unit of length.
-    """
-
-    assembly: Assembly
+    assembly: Assembly  # the robot, built
+    # the paper's collision model on it, or its covered bodies
     collision: SphereCollision | CoveredCollision
-    start: FloatArray
-    goal: FloatArray
-    spline: Redistribution
-    scene: Scene
-    security_margin: float
-    obstacle_margin: float
-    length_unit: str
+    start: FloatArray  # (nq,) [deg]
+    goal: FloatArray  # (nq,) [deg]
+    spline: Redistribution  # factor and memory of the redistribution; for one thread at a time
+    scene: Scene  # the bodies themselves, for the exact verdict on a motion
+    security_margin: float  # clearance that the task requires between two arms [length unit]
+    obstacle_margin: float  # the same between a link and an obstacle
+    length_unit: str  # name of the scene's unit of length
 
     @property
     def arm_slices(self) -> IntArray:
@@ -111,17 +100,11 @@ class Problem(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """A judged population.
+    """A judged population."""
 
-    Attributes:
-        cost: (individuals,) lower is better.
-        terms: Terms of Eq. 7.
-        collision_queries: Configurations judged for it.
-    """
-
-    cost: FloatArray
-    terms: StringTerms
-    collision_queries: int
+    cost: FloatArray  # (individuals,) lower is better
+    terms: StringTerms  # terms of Eq. 7.
+    collision_queries: int  # configurations judged for it
 
     @property
     def feasible(self) -> BoolArray:

@@ -26,38 +26,26 @@ from evoexp.validation import Component, Count, NonNegative, Positive
 
 
 class SearchSettings(Component):
-    """How much is searched.
-
-    Attributes:
-        population_size: Paths drawn for the initial population; the best of them is kept.
-        num_offspring: λ, the displaced paths of every generation.
-        num_generations: Generations after the initial one.
-    """
+    """How much is searched."""
 
     component: ClassVar[str] = "my_planner_settings"
 
-    population_size: Count
-    num_offspring: Count
-    num_generations: Count
+    population_size: Count  # paths drawn for the initial population; the best of them is kept
+    num_offspring: Count  # λ, the displaced paths of every generation
+    num_generations: Count  # generations after the initial one
 
 
 class MyPlanner(PlannerDefaults, Component):
-    """The search.
-
-    Attributes:
-        num_via_points: Via-points between start and goal.
-        max_displacement: Largest random displacement of a joint at a via-point [deg].
-        collision_weight: Cost of every colliding configuration [deg], like the length of a path.
-        ga: How much is searched.
-        collision: Collision model, and configurations tested per segment.
-    """
+    """The search."""
 
     component: ClassVar[str] = "my_planner"
 
-    num_via_points: Count
-    max_displacement: Positive
+    num_via_points: Count  # via-points between start and goal
+    max_displacement: Positive  # largest random displacement of a joint at a via-point [deg]
+    # cost of every colliding configuration [deg], like the length of a path
     collision_weight: NonNegative
-    ga: SearchSettings
+    ga: SearchSettings  # how much is searched
+    # collision model, and configurations tested per segment
     collision: TouchingSpheres | CoveredBodies
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:

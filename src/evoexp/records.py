@@ -172,13 +172,13 @@ class Block(NamedTuple):
 
 
 def blocks(evolution: Iterable[Block | Generation]) -> Iterator[Block]:
-    """Yield what a planner yields as blocks; a guest may yield single generations."""
+    """Yield the blocks of an evolution; a guest's single generation is a block of one."""
     for each in evolution:
         yield each if isinstance(each, Block) else Block.of(each)
 
 
 def generations(evolution: Iterable[Block | Generation]) -> Iterator[Generation]:
-    """Yield what a planner yields as single generations."""
+    """Yield the generations of an evolution one by one."""
     for block in blocks(evolution):
         yield from block.generations()
 

@@ -3,7 +3,7 @@
 import hashlib
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any
 
 from evoexp.attachments import SHA256
 from evoexp.collision.box_support import EXACT
@@ -41,7 +41,8 @@ def run_replicate(
     """
     config_json = config_json or condition.to_json()
     planner, problem = condition.prepare()  # kept: no part of a replicate's time
-    begun, rng = _Clocks.now(), condition.rng(index)
+    begun_cpu_s, begun_s = time.process_time(), time.perf_counter()
+    rng = condition.rng(index)
     files = condition.files() if HASHED in config_json else None
     around = environment(guests(config_json)) | {EXACT_BOXES: {"coal": EXACT}}
     condition_id = hashlib.sha256(config_json).hexdigest()
@@ -51,7 +52,7 @@ def run_replicate(
     for block in blocks(planner.evolve(problem, rng)):
         within = _within(block, condition.max_collision_queries)
         if within.num_generations > 0:
-            log.write(within, time.process_time() - begun.cpu_s)
+            log.write(within, time.process_time() - begun_cpu_s)
             last = within
             if hear is not None:
                 hear(within)
@@ -67,32 +68,42 @@ def run_replicate(
             condition.max_collision_queries,
         )
 
-    judging = _Clocks.now()
-    motion = planner.motion(problem, last.best)
-    verdict = judge_motion(planner, problem, motion)
-    certificate_s = time.process_time() - judging.cpu_s
-    best, terms = last.bests[-1], planner.evaluate(problem, last.best)
-    ended = _Clocks.now()
+    summary = _judged(condition, planner, problem, last)
     return log.finish(
-        ReplicateSummary(
+        summary._replace(
             condition=condition_id,
             replicate=index,
-            status="done",
             stop_reason=last.stop_reason or stop_reason or GENERATIONS,
-            num_generations=last.first + last.num_generations - 1,
-            best_cost=best.cost,
             first_feasible_generation=first_feasible,
-            evaluations=last.evaluations[-1],
-            collision_queries=last.collision_queries[-1],
-            solved=best.solved,
-            **verdict._asdict(),
-            length_unit=condition.length_unit,
-            terms=best.terms | terms,
-            digest="",
-            certificate_s=certificate_s,
-            cpu_s=ended.cpu_s - begun.cpu_s,
-            wall_s=ended.wall_s - begun.wall_s,
+            cpu_s=time.process_time() - begun_cpu_s,
+            wall_s=time.perf_counter() - begun_s,
         )
+    )
+
+
+def _judged(condition: Condition, planner: Any, problem: Any, last: Block) -> ReplicateSummary:
+    """Judge the best motion on exact geometry; return the summary, identity and times left out."""
+    begun_s, best = time.process_time(), last.bests[-1]
+    verdict = judge_motion(planner, problem, planner.motion(problem, best.solution))
+    certificate_s = time.process_time() - begun_s
+    return ReplicateSummary(
+        condition="",
+        replicate=0,
+        status="done",
+        stop_reason="",
+        num_generations=last.first + last.num_generations - 1,
+        best_cost=best.cost,
+        first_feasible_generation=None,
+        evaluations=last.evaluations[-1],
+        collision_queries=last.collision_queries[-1],
+        solved=best.solved,
+        **verdict._asdict(),
+        length_unit=condition.length_unit,
+        terms=best.terms | planner.evaluate(problem, best.solution),
+        digest="",
+        certificate_s=certificate_s,
+        cpu_s=0.0,
+        wall_s=0.0,
     )
 
 
@@ -108,14 +119,3 @@ def _first_feasible(block: Block) -> int | None:
     """Return the index of the first generation with a feasible individual."""
     feasible = (k for k, count in enumerate(block.num_feasible, block.first) if count > 0)
     return next(feasible, None)
-
-
-class _Clocks(NamedTuple):
-    """Readings of two clocks [s]."""
-
-    cpu_s: float
-    wall_s: float
-
-    @classmethod
-    def now(cls) -> "_Clocks":
-        return cls(time.process_time(), time.perf_counter())

@@ -158,16 +158,6 @@ class _Budgeted(Protocol):
         """Has `population_size`, `num_offspring` and `num_generations`."""
 
 
-class _Sampling(Protocol):
-    """A planner, as far as random search needs it."""
-
-    def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw individuals."""
-
-    def cost(self, problem: Any, population: FloatArray) -> Judgement:
-        """Judge them."""
-
-
 class PlannerDefaults:
     """The usual answers of a planner, to be inherited before `Component`.
 
@@ -271,12 +261,11 @@ class Keeper:
         collision_queries: Configurations asked for so far.
     """
 
-    __slots__ = ("_standing", "_tried", "best", "collision_queries", "cost", "evaluations", "index")
+    __slots__ = ("_tried", "best", "collision_queries", "cost", "evaluations", "index")
 
     def __init__(self) -> None:
         self.index, self.cost, self._tried = -1, np.inf, np.inf
         self.best = Candidate(np.empty(0), {}, False)
-        self._standing: Best | None = None  # the best so far as it is recorded
         self.evaluations = self.collision_queries = 0
 
     def improves(self, cost: float) -> bool:
@@ -285,15 +274,13 @@ class Keeper:
 
     def keep(self, cost: float, best: Candidate) -> None:
         """Keep a solution and its cost as the best so far."""
-        self.cost, self.best, self._standing = cost, best, None
+        self.cost, self.best = cost, best
 
     @property
     def standing(self) -> Best:
         """The best so far, as a block begins with it."""
-        if self._standing is None:
-            solution, terms, solved = self.best
-            self._standing = Best(0, solution, self.cost, terms, solved)
-        return self._standing
+        solution, terms, solved = self.best
+        return Best(0, solution, self.cost, terms, solved)
 
     def keep_proven(
         self, costs: FloatArray, proven: BoolArray, candidate: Callable[[int, bool], Candidate]

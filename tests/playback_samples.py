@@ -5,7 +5,7 @@ import functools
 import numpy as np
 
 from evoexp.condition import Condition
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.shapes import Outline
 from evoexp.records import generations
@@ -30,7 +30,7 @@ REPLICATE = {"pick and place": 2}  # one that puts the bottle down, hence holds 
 def condition(name: str) -> Condition:
     """Return a sample's condition."""
     overrides, label, _ = SAMPLES[name]
-    found = expansions.expand(overrides, only=(label,) if label else ())[0].conditions
+    found = compose.expand(overrides, only=(label,) if label else ())[0].conditions
     return found[0].condition
 
 

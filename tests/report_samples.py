@@ -4,7 +4,7 @@ import functools
 from pathlib import Path
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.report import build
 from evoexp.report.report_settings import ReportSettings
@@ -27,7 +27,7 @@ REPORT = {
 def expand(name: str, *overrides: str) -> Experiment:
     """Return an experiment, small."""
     words = {word.split("=")[0]: word for word in (*SMALL, *overrides)}
-    return expansions.expand([f"experiment={name}", *words.values()])[0]
+    return compose.expand([f"experiment={name}", *words.values()])[0]
 
 
 def store(outputs: Path, experiment: Experiment) -> None:
@@ -47,7 +47,7 @@ def smoke_experiment(name: str, *overrides: str) -> Experiment:
 
     Composing it is most of the work.
     """
-    return expansions.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
+    return compose.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
 
 
 @functools.cache

@@ -12,7 +12,7 @@ from collections import Counter
 import pytest
 
 from evoexp.condition import Condition
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from matrix import examples
@@ -63,7 +63,7 @@ def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
 @functools.cache
 def expanded(name: str, budget: str) -> Experiment:
     """Return a shipped experiment at a budget; it is kept on disk."""
-    return expansions.expand([f"experiment={name}", f"budget={budget}"])[0]
+    return compose.expand([f"experiment={name}", f"budget={budget}"])[0]
 
 
 @functools.cache

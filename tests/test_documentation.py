@@ -18,7 +18,7 @@ import yaml
 
 from evoexp.cli import main
 from evoexp.commands.command_parser import COMMANDS, command_parser
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.version import __version__
 
@@ -163,7 +163,7 @@ def test_commands_are_commands(page: Path) -> None:
         command_parser(words[0]).parse_intermixed_args(words[1:])
         if words[0] in ("run", "plan") and not is_elsewhere(words):
             given = [word for word in words[1:] if "=" in word]
-            assert expansions.expand(given, multirun="-m" in words)
+            assert compose.expand(given, multirun="-m" in words)
         named = [w for w in words[1:] if re.fullmatch(r"[a-z]+(_[a-z0-9]+)+", w)]
         assert not named or set(named) <= experiments() or is_elsewhere(words), words
 

@@ -67,7 +67,7 @@ def site(tmp_path: Path) -> Path:
 def installed(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[..., int]]:
-    """Install the package, with outputs and kept expansions of this test's own."""
+    """Install the package, with outputs of this test's own."""
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
     monkeypatch.setenv("COLUMNS", "200")
     with on_path(site):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from confinement import confined, no_longer
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.option_files import check_file
 from evoexp.configuration.search_path import searched_first
 from evoexp.errors import EvoexpError
@@ -44,7 +44,7 @@ def refusal(folder: Path) -> str:
     """Return the refusal of the option `ga=mine` of a folder."""
     try:
         with no_longer(), searched_first([str(folder)]):
-            expansions.expand([BASE, "budget=smoke", "ga=mine"])
+            compose.expand([BASE, "budget=smoke", "ga=mine"])
     except EvoexpError as error:
         text = str(error)
         assert "\n" not in text and len(text) < 1500
@@ -82,5 +82,5 @@ def test_an_alias_counts_as_what_it_names_alone(tmp_path: Path) -> None:
 def test_nothing_of_the_environment_enters_by_an_override(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SECRET", "hush")
     with pytest.raises(EvoexpError, match="no function, as oc.env is") as caught:
-        expansions.expand([BASE, "budget=smoke", "scenario.length_unit=${oc.env:SECRET}"])
+        compose.expand([BASE, "budget=smoke", "scenario.length_unit=${oc.env:SECRET}"])
     assert "hush" not in str(caught.value)

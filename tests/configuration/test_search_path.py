@@ -8,7 +8,7 @@ import pytest
 
 from evoexp import registry
 from evoexp.cli import main
-from evoexp.configuration import compose, expansions
+from evoexp.configuration import compose
 from evoexp.configuration.compose import expand
 from evoexp.configuration.search_path import (
     description,
@@ -210,7 +210,7 @@ def test_a_kept_expansion_of_a_file_follows_its_content(
     found = []
     for size in (21, 22):
         path = write(f"{HEAD}defaults:{DEFAULTS}\nga:\n  population_size: {size}\n")
-        (experiment,) = expansions.expand([f"experiment={path}"])
+        (experiment,) = compose.expand([f"experiment={path}"])
         found.append(experiment.conditions[0].condition.planner.ga.population_size)
     assert found == [21, 22]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import (
@@ -50,7 +50,7 @@ def solved(outputs: Path, name: str) -> Results:
 
     Whose cycles the smoke budget would cut.
     """
-    experiment = expansions.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
+    experiment = compose.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
     store(outputs, experiment)
     return gather(outputs, experiment.conditions, FEW, name, experiment.budget, "")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.lavoie import claims, control_claims, measures, sweep_claims
 from evoexp.papers.lavoie.measures import RefutedMotions
@@ -34,7 +34,7 @@ SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]
 
 @functools.cache
 def conditions_of(*words: str) -> Experiment:
-    return expansions.expand([f"experiment={words[0]}", *words[1:]])[0]
+    return compose.expand([f"experiment={words[0]}", *words[1:]])[0]
 
 
 def made_up(errors: dict[str, np.ndarray], *words: str) -> Results:

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from evoexp.condition import Condition
-from evoexp.configuration import compose, expansions
+from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
@@ -27,7 +27,7 @@ def of(
     *overrides: str, name: str = "rana_planar", budget: str = "paper", label: int = 0
 ) -> dict[str, Parameter]:
     """Return the parameters of a condition that nobody ran, by name."""
-    experiment = expansions.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
+    experiment = compose.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
     text, condition = experiment.conditions[label]
     found = nobodys(text, condition, experiment.options[text], experiment.num_replicates)
     rows = parameters.parameters(Results(name, budget, (found,)), found)
@@ -99,7 +99,7 @@ def test_options_that_nothing_records_are_those_that_settings_are_most_like() ->
 
 
 def test_the_option_that_was_taken_is_named_though_another_one_is_alike(tmp_path: Path) -> None:
-    experiment = expansions.expand(["experiment=rana_planar"])[0]
+    experiment = compose.expand(["experiment=rana_planar"])[0]
     label, condition = experiment.conditions[0]
     (tmp_path / "ga").mkdir()
     shipped = next(each for each in experiment.options[label] if each.group == "ga")

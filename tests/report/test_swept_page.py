@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.cli import main
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.report import style
 from evoexp.report.figures import end_labels, sweep_curves, sweep_grids
@@ -77,7 +77,7 @@ def test_other_labels_are_no_sweep(labels: list[str]) -> None:
 
 def test_no_shipped_experiment_is_taken_for_a_sweep() -> None:
     for name in options("experiment"):
-        (experiment,) = expansions.expand([f"experiment={name}", "budget=smoke"])
+        (experiment,) = compose.expand([f"experiment={name}", "budget=smoke"])
         labels = [each.label for each in experiment.conditions]
         assert sweep_of(fake(*(condition(label, [1.0]) for label in labels))) is None, name
 
@@ -162,7 +162,7 @@ def test_convergence_has_a_panel_for_each_value_of_the_first_setting(swept: Resu
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Results:
     words = "experiment=rana_planar", *SMALL, "ga.num_elites=0,2"
-    experiment = expansions.expand(list(words), multirun=True)[0]
+    experiment = compose.expand(list(words), multirun=True)[0]
     outputs = tmp_path_factory.mktemp("outputs")
     store(outputs, experiment)
     planned = experiment.num_replicates

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.store.archive import ArchiveError, pack, take_in
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import manifest
@@ -31,7 +31,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[RunDirectory]:
     ]
     found = []
     for overrides in words:
-        condition = expansions.expand(overrides)[0].conditions[0].condition
+        condition = compose.expand(overrides)[0].conditions[0].condition
         run = RunDirectory(outputs, condition.id)
         run.create(condition.to_json(), manifest(condition.id), condition.files())
         run.note_plan(2)

@@ -12,7 +12,7 @@ import evoexp
 SCRIPT = """
 import sys
 from evoexp.report.proven_answers import NO_PART
-from evoexp.store.kept_facts import installed_code
+from evoexp.store.installed_code import installed_code
 print(installed_code().hex(), installed_code(NO_PART).hex())
 """
 

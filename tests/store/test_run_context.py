@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 
 from evoexp import load
 from evoexp.batch.replicate import run_replicate
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 from evoexp.shipped import shipped
 from evoexp.store.manifest import manifest
 from evoexp.store.run_context import origin, run_context
@@ -22,7 +22,7 @@ SWEEP = ["ga.population_size=8,10", "ga.num_generations=2", "planner.num_new_tra
 def stored(outputs: Path) -> list[RunDirectory]:
     words = ["experiment=rana_planar", "budget=smoke", *SWEEP]
     found = []
-    for experiment in expansions.expand(words, multirun=True, only=["via-point GA"]):
+    for experiment in compose.expand(words, multirun=True, only=["via-point GA"]):
         for label, condition in experiment.conditions:
             run = RunDirectory(outputs, condition.id)
             notes = {"experiment": experiment.name, "label": label}

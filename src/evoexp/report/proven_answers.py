@@ -23,7 +23,7 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray
 from evoexp.report.results import ConditionResults
-from evoexp.store.kept_facts import installed_code
+from evoexp.store.installed_code import installed_code
 from evoexp.store.log_reader import read_log
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)  # per cubic segment

@@ -1,7 +1,7 @@
 """The conditions of an experiment at a small budget, for tests."""
 
 from evoexp.condition import Condition
-from evoexp.configuration import expansions
+from evoexp.configuration import compose
 
 
 def conditions(*overrides: str, budget: str = "smoke") -> dict[str, Condition]:
@@ -14,5 +14,5 @@ def conditions(*overrides: str, budget: str = "smoke") -> dict[str, Condition]:
     Raises:
         EvoexpError: If the experiment cannot be run.
     """
-    experiments = expansions.expand([*overrides, f"budget={budget}"])
+    experiments = compose.expand([*overrides, f"budget={budget}"])
     return {label: condition for each in experiments for label, condition in each.conditions}

@@ -28,10 +28,10 @@ from evoexp.store.log import SUMMARY
 TIMES = ("certificate_s", "cpu_s", "wall_s")  # [s] all that two runs of a replicate may differ in
 
 
-def masked_log(content: bytes) -> str:
+def masked_log(content: bytes) -> bytes:
     """Return the records of a log with its times, and what follows from them, set to zero."""
     records = StreamReader(BytesIO(content), emit_chunks=True).records
-    return "\n".join(map(repr, map(_masked, records)))
+    return "\n".join(map(repr, map(_masked, records))).encode()
 
 
 def masked_rows(summary: Path) -> list[dict[str, Any]]:

@@ -4,9 +4,10 @@ A damaged file is named and set aside, never deleted.
 """
 
 import os
+import threading
 import warnings
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -29,9 +30,7 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
     ending = f".{os.getpid()}{_SUFFIX}"
     files = {path: path.with_name(f".{path.name}{ending}") for path in contents}  # temporary
     try:
-        with ThreadPoolExecutor(min(NUM_THREADS, len(files) or 1)) as threads:
-            # raises what a thread raised
-            list(threads.map(_write, files, files.values(), contents.values()))
+        _write_all(deque((path, files[path], content) for path, content in contents.items()))
         for path, temporary in files.items():
             temporary.replace(path)
     finally:
@@ -44,6 +43,32 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
 def write_file(path: Path, content: bytes) -> None:
     """Write one file atomically and durably."""
     write_files({path: content})
+
+
+def _write_all(waiting: deque[tuple[Path, Path, bytes]]) -> None:
+    """Write files, each under its temporary name; raise the first error of the system.
+
+    The threads keep no process alive: one that is interrupted ends without them.
+    """
+    errors: list[Exception] = []
+
+    def work() -> None:
+        try:
+            while not errors:
+                _write(*waiting.popleft())
+        except IndexError:  # nothing is left
+            pass
+        except Exception as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=work, daemon=True) for _ in range(NUM_THREADS)]
+    threads = threads[: len(waiting)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for error in errors[:1]:
+        raise error
 
 
 def _write(path: Path, temporary: Path, content: bytes) -> None:

@@ -87,13 +87,3 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         match=r"scenario\.map\.file: must be a file that can be read \(is a directory\)",
     ):
         condition_with(tmp_path)
-
-
-def test_origins_of_a_content_are_in_alphabetical_order(tmp_path: Path) -> None:
-    paths = [str(tmp_path / name) for name in ("b", "c", "a")]
-    for path in paths:
-        Path(path).write_text(f"found in {tmp_path}")
-    sha256 = {attachments.read(path, ()) for path in paths}
-    assert len(sha256) == 1
-    assert attachments.origins(sha256.pop()) == sorted(paths)
-    assert attachments.origins("0" * 64) == []

@@ -33,6 +33,7 @@ SETTINGS = {
 ENDS_AT_ONCE = re.compile(r"evoexp/batch/\w*worker\w*\.py$")
 MODULE_TABLE_CALLS = {"update", "pop", "setdefault", "clear", "popitem"}
 
+
 def _is_private(name: str) -> bool:
     """Return whether a name begins with one underscore; `_` and `_target_` do not count."""
     return len(name) > 1 and name.startswith("_") and not name.endswith("_")

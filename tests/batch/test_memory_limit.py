@@ -15,7 +15,7 @@ from evoexp.batch.runner import Batch
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.records import Generation
+from evoexp.records import Generation, blocks
 from evoexp.store import log as log_module
 from evoexp.store.log import Log, LogTooLarge
 from shipped_conditions import of_kind
@@ -105,4 +105,4 @@ def test_a_log_that_no_reader_would_take_ends_its_replicate(
     row = (1.0, 1.0, 1.0, 0.0, 1, 1, 1, True, {}, np.ones(1), np.ones(1))
     generations = (Generation(index, np.ones(3), *row) for index in range(1000))
     with pytest.raises(LogTooLarge, match="run fewer generations"):
-        collections.deque(map(log.write, generations), maxlen=0)
+        collections.deque(map(log.write, blocks(generations)), maxlen=0)

@@ -17,8 +17,7 @@ from evoexp.batch import jobs, live_curves
 from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, fan_out
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.live_curves import read_curves
-from evoexp.batch.replicate import run_replicate, run_together
-from evoexp.batch.replicate_limits import ReplicateLimits
+from evoexp.batch.replicate import run_replicate
 from evoexp.batch.workers import Workers
 from evoexp.cli import main
 from evoexp.condition import Condition
@@ -26,11 +25,9 @@ from evoexp.configuration import compose
 from evoexp.errors import Busy, DamagedStore, SettingError
 from evoexp.store import log_reader
 from evoexp.store.identity import Plan
-from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
-from masked_logs import masked_log
 
 
 def stamps(directory: RunDirectory) -> dict[str, tuple[int, bytes]]:
@@ -403,71 +400,6 @@ def test_a_task_that_takes_long_begins_no_further_replicate(
     monkeypatch.setattr(jobs, "LONGEST_TASK_S", 0.0)
     assert [outcome.replicate for outcome in run_jobs(asked)] == [0]
     assert run_jobs([]) == []
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("experiment=chen_placement", "ga.num_generations=20"),
-        ("experiment=chen_mission", "budget=smoke"),
-        ("experiment=curkovic_methods", "budget=smoke"),
-        ("experiment=rana_planar", "ga.num_generations=20", "budget.collision_queries=100000"),
-    ],
-    ids=" ".join,
-)
-def test_replicates_run_step_by_step_are_those_run_one_by_one(words: tuple[str, ...]) -> None:
-    condition = compose.expand(words)[0].conditions[0].condition
-    together = run_together(condition, [3, 0, 5], condition.to_json())
-    for index, (content, summary) in zip([3, 0, 5], together, strict=True):
-        alone = run_replicate(condition, index)
-        assert masked_log(content) == masked_log(alone.content)
-        assert summary.replicate == index
-        assert 0.0 < summary.certificate_s < summary.cpu_s
-
-
-@pytest.fixture
-def groups(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
-    """Return the replicates of each call of `run_together`."""
-    found: list[list[int]] = []
-
-    def noted(condition: Condition, indices: Sequence[int], config_json: bytes) -> list[Finished]:
-        found.append([*indices])
-        return run_together(condition, indices, config_json)
-
-    monkeypatch.setattr("evoexp.batch.replicate.run_together", noted)
-    monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)
-    monkeypatch.setattr(jobs, "SHORT_S", math.inf)
-    monkeypatch.setattr(jobs, "TOGETHER", 4)
-    return found
-
-
-def test_replicates_of_a_condition_run_together(
-    faulty: Condition, groups: list[list[int]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    other = faulty._replace(seed=1)
-    asked = [Job(one.id, one.to_json(), k) for one in (faulty, other) for k in range(7)]
-    assert [outcome.key for outcome in run_jobs(asked)] == [job.key for job in asked]
-    assert groups == [[1, 2, 3, 4], [5, 6], [1, 2, 3, 4], [5, 6]]
-    groups.clear()
-    run_jobs(asked[:7], ReplicateLimits(timeout_s=60.0))
-    monkeypatch.setattr(jobs, "SHORT_S", 0.0)
-    run_jobs(asked[:7])
-    assert groups == []
-    monkeypatch.setattr(jobs, "SHORT_S", math.inf)
-    monkeypatch.setattr(jobs, "MEMORY", 1)
-    run_jobs(asked[:3])
-    assert groups == [[1], [2]]
-
-
-def test_a_replicate_that_fails_among_others_is_their_only_loss(
-    faulty: Condition, groups: list[list[int]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FAULTY", "raise:3")
-    outcomes = run_jobs([Job(faulty.id, faulty.to_json(), k) for k in range(7)])
-    assert [outcome.replicate for outcome in outcomes] == [*range(7)]
-    assert [outcome.replicate for outcome in outcomes if outcome.failed] == [3]
-    assert outcomes[3].reason.startswith("ArithmeticError: replicate 3 is")
-    assert groups[0] == [1, 2, 3, 4]
 
 
 def test_no_jobs_are_no_outcomes() -> None:

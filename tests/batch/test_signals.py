@@ -222,6 +222,7 @@ def heard() -> Iterator[Interruption]:
     interruption.hear()
     yield interruption
     interruption.end()
+    signal.setitimer(signal.ITIMER_REAL, 0.0)  # which would end this process
     sys.unraisablehook, sys.excepthook, threading.excepthook = hooks
     for number, handler in before.items():
         signal.signal(number, handler)

@@ -3,7 +3,6 @@
 import time
 
 import pytest
-from faulty_planner import Faulty
 
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.warm_kernels import warm_kernels
@@ -13,10 +12,10 @@ from evoexp.condition import Condition
 def test_conditions_that_differ_in_numbers_are_one_kind(
     faulty: Condition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    searched = []
-    evolve = Faulty.evolve
+    searched, planner = [], type(faulty.planner)
+    evolve = planner.evolve
     monkeypatch.setattr(
-        Faulty, "evolve", lambda *given: (searched.append(given), evolve(*given))[1]
+        planner, "evolve", lambda *given: (searched.append(given), evolve(*given))[1]
     )
     others = [faulty._replace(seed=seed) for seed in range(1, 4)]
     warm_kernels([faulty, *others], ReplicateLimits())

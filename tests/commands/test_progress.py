@@ -13,6 +13,7 @@ from evoexp.batch import live_curves
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.live_curves import NUM_POINTS, CurveFile, read_curves, thinned
 from evoexp.commands.progress import MOST_ROWS, BatchProgress, drawn
+from evoexp.records import Block, Generation
 
 WANTED = {"a": ("via-point GA", 3), "b": ("[bold]random search", 2)}
 
@@ -79,8 +80,9 @@ def test_workers_leave_curves_that_are_shown(
     monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
     file = CurveFile(tmp_path, "b", 1)
     for index, cost in enumerate([np.inf, 8.0, 4.0]):
-        generation: Any = SimpleNamespace(index=index, best_cost=cost)
-        file.hear(generation)
+        numbers = (cost, cost, cost, 0.0, 1, index, index, cost < np.inf)
+        best = np.zeros(1)
+        file.hear(Block.of(Generation(index, best, *numbers, {}, np.array([cost]), best)))
     (tmp_path / "1.json").write_text("half a fi")
     (curve,) = read_curves(tmp_path)
     out = console(is_terminal=True)

@@ -454,21 +454,6 @@ def test_normal_deviates_refuse_a_negative_size() -> None:
         standard_normal(np.random.default_rng(0), -1)
 
 
-@pytest.mark.matrix
-def test_kernels_do_not_load_scipy_but_those_that_need_blas_find_it() -> None:
-    code = """
-import sys, numba, numpy as np
-from evoexp.evolution.cost_statistics import cost_statistics
-assert cost_statistics(np.array([2.0, 1.0])).best == 1
-assert "scipy.linalg" not in sys.modules
-dot = numba.njit(lambda a, b: np.dot(a, b))
-assert dot(np.eye(3), np.ones(3)).sum() == 3.0
-assert np.isclose(numba.njit(lambda a: np.linalg.det(a))(np.eye(2)), 1.0)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-
-
 class Rows(NamedTuple):
     first: Array
     rest: tuple[Array, int, tuple[Array, Array]]

@@ -24,4 +24,7 @@ def test_pages_take_the_parts_of_a_report_from_the_kit(paper: str) -> None:
     assert own
     for path, text in own.items():
         for module in re.findall(r"^from (evoexp\.report\S*) import", text, re.MULTILINE):
-            assert module == "evoexp.report.kit" or module.startswith("evoexp.report.figures"), path
+            is_offered = module in ("evoexp.report.kit", "evoexp.report")
+            assert is_offered or module.startswith("evoexp.report.figures"), path
+        for name in re.findall(r"^from evoexp\.report import (.*)$", text, re.MULTILINE):
+            assert name == "kit", path

@@ -4,6 +4,7 @@ The fastest timing is toppra's (Pham & Pham 2018), within limits of speed and ac
 rest to rest; it stops where the direction of the motion jumps, as where two straight lines meet.
 """
 
+import warnings
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -95,7 +96,9 @@ def fastest(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Ti
         BadTiming: If toppra is not installed.
     """
     try:
-        import toppra
+        with warnings.catch_warnings():  # Python warns of its docstrings when it compiles them
+            warnings.simplefilter("ignore")
+            import toppra
     except ImportError:
         raise BadTiming(
             "--timing optimal needs toppra: pip install 'evoexp[timing]'; --timing uniform does not"

@@ -91,9 +91,11 @@ def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
     Returns:
         (shares, rows); NaN where a row has no values.
     """
+    found = np.full((len(shares), len(values)), np.nan)
+    if values.shape[1] == 0:
+        return found
     ordered, rows = np.sort(values, axis=1), np.arange(len(values))  # NaN comes last
     last = np.count_nonzero(~np.isnan(values), axis=1) - 1
-    found = np.full((len(shares), len(values)), np.nan)
     for own, share in zip(found, shares, strict=True):
         position = share * np.maximum(last, 0)
         below = np.floor(position).astype(np.int64)

@@ -3,6 +3,9 @@
 import hashlib
 import json
 import os
+import signal
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +18,7 @@ from evoexp.errors import DamagedStore, StoreError, UnknownHash
 from evoexp.records import Block
 from evoexp.store import log as log_module
 from evoexp.store import log_reader
-from evoexp.store.files import is_set_aside, set_aside
+from evoexp.store.files import is_set_aside, set_aside, write_files
 from evoexp.store.integrity import damaged_files, lost_replicates, mend
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory, find_runs, resolve
@@ -322,3 +325,25 @@ def test_stray_files_are_no_logs(run: RunDirectory, add: Add) -> None:
     (run.replicates / "folder").mkdir()
     assert run.completed() == {1}
     assert summary_table(run).num_rows == 1
+
+
+def test_an_interrupted_writer_leaves_no_temporary_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its threads are in the middle of their files when the signal arrives."""
+    begun = threading.Event()
+
+    def slow_sync(descriptor: int) -> None:
+        begun.set()
+        time.sleep(0.3)
+
+    def interrupt() -> None:
+        begun.wait()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(os, "fsync", slow_sync)
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        write_files({tmp_path / f"{number}.mcap": b"log" for number in range(100)})
+    time.sleep(0.4)
+    assert list(tmp_path.iterdir()) == []

@@ -13,11 +13,18 @@ from evoexp.batch.replicate_limits import ReplicateLimits, limited
 from evoexp.condition import Condition
 from evoexp.records import generations
 
+COMPILING_S = 120.0  # [s] that a short call may take; replicates that compile would be late, too
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 def warm_kernels(conditions: Iterable[Condition], limits: ReplicateLimits) -> None:
-    """Run every kernel that some conditions need; errors are left to the replicates."""
+    """Run every kernel that some conditions need; errors are left to the replicates.
+
+    Args:
+        conditions: They are run once per kind.
+        limits: Of a replicate; its time does not include compilation.
+    """
+    limits = limits._replace(timeout_s=max(limits.timeout_s or 0.0, COMPILING_S))
     # conditions that differ in numbers only need the same kernels
     kinds = {_NUMBER.sub("0", each.to_json().decode()): each for each in conditions}
     for condition in kinds.values():

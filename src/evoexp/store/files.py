@@ -5,6 +5,7 @@ A damaged file is named and set aside, never deleted.
 
 import os
 import threading
+import time
 import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,6 +15,7 @@ from pathlib import Path
 from evoexp.errors import DamagedStore
 
 NUM_THREADS = 8  # that write files at the same time
+ENDING_S = 2.0  # [s] that files of an interrupted process may take
 _SUFFIX = ".tmp"
 DAMAGED = ".damaged"  # ends the name of a file that was set aside
 MAX_NAMED = 3  # damaged files in one line
@@ -48,7 +50,8 @@ def write_file(path: Path, content: bytes) -> None:
 def _write_all(waiting: deque[tuple[Path, Path, bytes]]) -> None:
     """Write files, each under its temporary name; raise the first error of the system.
 
-    The threads keep no process alive: one that is interrupted ends without them.
+    Where this is interrupted, no further file begins, and those that are being written get
+    `ENDING_S`: a thread that the disk holds longer keeps no process alive.
     """
     errors: list[Exception] = []
 
@@ -63,10 +66,16 @@ def _write_all(waiting: deque[tuple[Path, Path, bytes]]) -> None:
 
     threads = [threading.Thread(target=work, daemon=True) for _ in range(NUM_THREADS)]
     threads = threads[: len(waiting)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    try:
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        waiting.clear()
+        end = time.monotonic() + ENDING_S
+        for thread in filter(threading.Thread.is_alive, threads):
+            thread.join(max(0.0, end - time.monotonic()))
     for error in errors[:1]:
         raise error
 

@@ -5,10 +5,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.report import style
+from evoexp.report.figures import groups
 from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.results import Results
-from evoexp.report.rows import groups
 from evoexp.report.swept_settings import Sweep
 
 PER_LINE = 3  # panels side by side

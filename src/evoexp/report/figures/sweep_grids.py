@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report import style
+from evoexp.report.figures import records
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
-from evoexp.report.rows import records
 from evoexp.report.statistics import quantile
 from evoexp.report.swept_settings import MainEffect, Sweep, Values
 

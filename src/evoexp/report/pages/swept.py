@@ -12,10 +12,9 @@ from evoexp.report import markdown, motion_pictures
 from evoexp.report.figures import sweep_curves, sweep_grids
 from evoexp.report.page_parts import Drawing, Page, Table
 from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.statistics import Proportion, spread
 from evoexp.report.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
 
 MOST_CURVES = 60  # curves of convergence on a page

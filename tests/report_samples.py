@@ -7,6 +7,8 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.report import build
+from evoexp.report.claim_rules import Rule
+from evoexp.report.judging import Hearing
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.store.manifest import manifest
@@ -22,6 +24,11 @@ REPORT = {
     "samples_per_segment": 10,
     "threshold_ratio": 1.25,
 }
+
+
+def hearing(kind: str, significance: float = 0.05) -> Hearing:
+    """Return the hearing of a claim of this kind."""
+    return Hearing(Rule("told", "", "", kind, "", "", {}, ()), "", significance)
 
 
 def expand(name: str, *overrides: str) -> Experiment:

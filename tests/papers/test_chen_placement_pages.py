@@ -10,7 +10,7 @@ from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import placements
-from evoexp.report import verdicts
+from evoexp.report import judging
 from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 
@@ -99,20 +99,20 @@ def test_verdicts_where_they_are_judged(
     verdict = {one.text: one.verdict for one in found}
     assert (
         verdict["least torque norm: the best posture has a torque norm of 1.73"]
-        == verdicts.REPRODUCED
+        == judging.REPRODUCED
     )
     assert (
         verdict["obstacle and link 2: the best posture has a torque norm of 2.08"]
-        == verdicts.CONTRADICTED
+        == judging.CONTRADICTED
     )
     assert (
         verdict["obstacle and platform: the best posture has a torque norm of 3.01"]
-        == verdicts.REPRODUCED
+        == judging.REPRODUCED
     )
     angles = [text for text in verdict if "is at or near the optimum" in text]
     assert len(angles) == 2
-    assert {verdict[text] for text in angles} == {verdicts.REPRODUCED}
+    assert {verdict[text] for text in angles} == {judging.REPRODUCED}
     assert (
         verdict["manipulability and torque: the Newton-type method gets stuck"]
-        == verdicts.REPRODUCED
+        == judging.REPRODUCED
     )

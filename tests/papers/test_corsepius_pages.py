@@ -22,10 +22,9 @@ from evoexp.papers.corsepius.figures.posture_motions import ShownPath
 from evoexp.papers.corsepius.population_claims import SizeComparison
 from evoexp.report import run_measures, style
 from evoexp.report.pages import page_of
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
-from evoexp.report.statistics import Interval
+from evoexp.report.statistics import Interval, Proportion
 from report_samples import (
     REPORT,
     figure_stems,

@@ -16,10 +16,10 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import judging
-from evoexp.report.judging import Judge
+from evoexp.report.judging import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Judge
+from evoexp.report.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.verdicts import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from report_samples import REPORT
 from shipped_conditions import expanded
 

@@ -17,7 +17,8 @@ from evoexp.papers.curkovic.figures import (
     robot_motions,
 )
 from evoexp.papers.curkovic.pareto_page import read_fronts
-from evoexp.report import judging, style, verdicts
+from evoexp.report import judging, style
+from evoexp.report.comparisons import compare
 from evoexp.report.page_parts import Page
 from evoexp.report.pages import page_of
 from evoexp.report.results import ConditionResults
@@ -294,14 +295,12 @@ def test_verdicts_follow_the_rows_of_a_sweep(
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
     settings, found = page_settings("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):
-        rows = tuple(
-            verdicts.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3)
-        )
+        rows = tuple(compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
         tested = [one._replace(rows=rows) for one in families.tested(results, settings, 12.0)[:1]]
         (judged,) = sweep_claims.of_sweep(results, settings, tested)
         found.append(judged.verdict)
         assert "constant 2 (A12" in judged.evidence
-    assert found == [verdicts.REPRODUCED, verdicts.CONTRADICTED, verdicts.INCONCLUSIVE]
+    assert found == [judging.REPRODUCED, judging.CONTRADICTED, judging.INCONCLUSIVE]
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:

@@ -12,12 +12,12 @@ from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report import body_contacts, motion_geometry, run_measures, style
+from evoexp.report import motion_geometry, run_measures, style
 from evoexp.report.figures import shares
 from evoexp.report.pages import page_of
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, gather
+from evoexp.report.statistics import Proportion
 from report_samples import (
     REPORT,
     figure_stems,
@@ -175,7 +175,7 @@ def test_arms_stand_as_the_paper_prints(outputs: Path) -> None:
 
 def test_solutions_show_tested_positions_and_contacts(outputs: Path) -> None:
     condition = blind(outputs)
-    replicate, verdict = next(iter(body_contacts.refuted(condition).items()))
+    replicate, verdict = next(iter(motion_geometry.refuted(condition).items()))
     found = measures.contacts(condition, replicate, verdict)
     table = reaching_motions.reaching_table([ShownMotion("7-DOF", condition, replicate, found)])
     links = table[table["element"] == reaching_motions.LINK]

@@ -15,19 +15,19 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.papers.lavoie import claims, control_claims, measures, sweep_claims
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import RULES
-from evoexp.report.judging import Judge, judge
-from evoexp.report.proportions import Proportion, fisher_exact
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.verdicts import (
+from evoexp.report.judging import (
     CONTRADICTED,
     INCONCLUSIVE,
     NOT_JUDGED,
     REPRODUCED,
-    Claim,
-    judge_greater,
+    Judge,
+    judge,
 )
-from report_samples import REPORT
+from evoexp.report.page_parts import Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import Proportion, fisher_exact
+from report_samples import REPORT, hearing
 
 SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]
 
@@ -98,8 +98,9 @@ def test_four_percentages_are_one_family_of_tests() -> None:
     ],
 )
 def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: str) -> None:
-    assert judge_greater(one, two, 0.05) == verdict
-    assert judge_greater(one, two, 0.05, p_adjusted=0.06) == INCONCLUSIVE
+    judged = hearing("greater").greater("", one, two)
+    assert judged.verdict == verdict
+    assert hearing("greater").greater("", one, two, 0.06).verdict == INCONCLUSIVE
 
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:

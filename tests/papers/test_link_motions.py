@@ -9,7 +9,7 @@ import pytest
 from evoexp.condition import Prepared
 from evoexp.papers.curkovic import link_motions, motion_page
 from evoexp.records import FloatArray
-from evoexp.report import body_contacts, motion_geometry
+from evoexp.report import motion_geometry
 from report_samples import expand
 
 
@@ -95,7 +95,7 @@ def test_a_contact_lies_on_both_bodies() -> None:
     found = judge_motion(one.planner, one.problem, one.planner.motion(one.problem, line))
     assert found.certified is False
     assert found.refuted_at is not None
-    x, y = body_contacts.contact(one, line, found.refuted_at, found.refuted_pair)
+    x, y = motion_geometry.contact(one, line, found.refuted_at, found.refuted_pair)
     q = np.degrees(one.planner.motion(one.problem, line).at(found.refuted_at))[:, None]
     names = {f"arm_{arm + 1}_link_{link + 1}": (a[0], b[0]) for arm, link, a, b in joints(one, q)}
     for name in found.refuted_pair.split(" – "):

@@ -5,10 +5,10 @@ import pytest
 from evoexp.report.claim_rules import Rule
 from evoexp.report.comparisons import by_column
 from evoexp.report.judging import Judge
+from evoexp.report.page_parts import Claim
 from evoexp.report.pages import assumptions
 from evoexp.report.pages.assumptions import Headline
 from evoexp.report.results import ConditionResults, Results, gather
-from evoexp.report.verdicts import Claim
 from report_samples import page_settings, smoke_experiment, store
 
 EXPERIMENT = """

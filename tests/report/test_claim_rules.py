@@ -5,11 +5,11 @@ import pytest
 
 from evoexp.papers.rana import page as rana_page
 from evoexp.report.claim_rules import KINDS, Rules, read_rules
+from evoexp.report.comparisons import compare
 from evoexp.report.judging import Judge, left_out, not_judged
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
-from evoexp.report.verdicts import compare
+from evoexp.report.statistics import Proportion
 from report_samples import REPORT
 
 BETTER = compare("cost", np.arange(12.0), np.arange(12.0) + 20.0, True, 0.95, 50)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evoexp.records import FloatArray
-from evoexp.report import distance_ranges
+from evoexp.report import motion_geometry
 
 
 def motions(lengths: list[int]) -> list[FloatArray]:
@@ -24,7 +24,7 @@ def motions(lengths: list[int]) -> list[FloatArray]:
 )
 def test_extremes_are_those_of_all_values(lengths: list[int]) -> None:
     every = motions(lengths)
-    found, negative = distance_ranges.extremes(
+    found, negative = motion_geometry.extremes(
         range(len(every)),
         lambda k: every[k],
         [lambda q: q[0] + q[1], lambda q: -q[0] - q[1]],
@@ -41,6 +41,6 @@ def test_extremes_are_those_of_all_values(lengths: list[int]) -> None:
 
 def test_the_first_of_equal_replicates_is_kept() -> None:
     first, second = np.array([[1.0, 5.0]]), np.array([[2.0, 6.0]])
-    (found,) = distance_ranges.extremes([0, 1], [first, second].__getitem__, [lambda q: 0.0 * q[0]])
+    (found,) = motion_geometry.extremes([0, 1], [first, second].__getitem__, [lambda q: 0.0 * q[0]])
     np.testing.assert_array_equal(found.at_lowest, first)
     np.testing.assert_array_equal(found.at_highest, first)

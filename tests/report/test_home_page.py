@@ -5,8 +5,7 @@ import json
 import pytest
 from test_html_page import HOSTILE
 
-from evoexp.report.home_page import Paper, StoredRun, home_page, site
-from evoexp.report.page_summary import ReportSummary
+from evoexp.report.home_page import Paper, ReportSummary, StoredRun, home_page, site
 from html_reader import Page
 
 RANA = Paper("rana", "Rana 1995", "arms", ("rana_planar", "rana_puma", "lavoie"), {"rana_puma": 3})
@@ -30,12 +29,11 @@ def test_a_card_counts_the_claims_of_whole_experiments() -> None:
         summary("rana_planar+12345678", picture="scene.svg"),
         summary("rana_three@smoke"),
     ]
-    (card,) = site(found, [RANA], []).papers
+    (card,) = site(found, [RANA], [])["papers"]
     assert card.counts == (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
     assert card.unjudged == 3
     assert card.missing == ("rana_puma",)
-    assert card.picture is not None
-    assert card.picture.file == "rana_planar/fig_5.svg"
+    assert card.face.picture == "rana_planar/fig_5.svg"
     assert [link.text for link in card.links] == [each.folder for each in found]
     assert card.links[1].url == "rana_planar%2B12345678/index.html?home"
 
@@ -46,7 +44,9 @@ def test_reports_of_no_paper_stand_by_themselves() -> None:
         summary("compare_rana_planar", "compare rana_planar"),
         summary("ranaplanar"),
     ]
-    groups = {name: [link.text for link in links] for name, links in site(found, [RANA], []).others}
+    groups = {
+        name: [link.text for link in links] for name, links in site(found, [RANA], [])["others"]
+    }
     assert groups == {
         "Arenas and other experiments": ["arena_rana", "ranaplanar"],
         "Comparisons": ["compare_rana_planar"],

@@ -10,7 +10,7 @@ from test_html_page import ID, page_of
 from chromium import CHROMIUM, Browser
 from evoexp.report.home_page import home_page
 from evoexp.report.html_page import html_page
-from evoexp.report.page_text import FigureText, RunText, Section, TableText
+from evoexp.report.page_parts import Figures, FigureText, RunText, Table
 from report_samples import smoke_report
 
 pytestmark = [
@@ -39,10 +39,10 @@ def page(tmp_path: Path) -> Path:
     rows = tuple((f"row {k}", cell) for k, cell in enumerate(("10 [1, 2]", "−3", "–", "9", "∞")))
     text = page_of("plain")._replace(
         sections=(
-            Section("Results", table=TableText(("a", "b"), rows)),
-            Section("Figures", figures=(FigureText("figure", "title", "caption", ("svg",)),)),
+            Table("Results", ("a", "b"), rows),
+            Figures((FigureText("figure", "title", "caption", ("svg",)),)),
         ),
-        runs=(RunText("label", ID, 1, 1, 0, False),),
+        runs=(RunText("label", ID, 1, 0, False),),
     )
     (tmp_path / "figure.svg").write_bytes(PICTURE)
     (tmp_path / "index.html").write_bytes(html_page(text, {"figure.svg": PICTURE}))

@@ -6,18 +6,17 @@ from pathlib import Path
 import pytest
 
 from evoexp.report import markdown
-from evoexp.report.html_page import html_page, verdict_counts
-from evoexp.report.page_summary import read_summary
-from evoexp.report.page_templates import inline, number_columns
-from evoexp.report.page_text import (
+from evoexp.report.home_page import read_summary
+from evoexp.report.html_page import html_page, inline, number_columns, verdict_counts
+from evoexp.report.page_parts import (
     Document,
+    Figures,
     FigureText,
     LogText,
-    MotionText,
     Notice,
+    Player,
     RunText,
-    Section,
-    TableText,
+    Table,
     Verdict,
 )
 from html_reader import Page, markdown_tables
@@ -38,14 +37,14 @@ LOGS = (
     LogText(0, f"../../runs/{ID[:12]}/replicates/0000.mcap", "162.8, certified"),
     LogText(1, f"../../runs/{ID[:12]}/replicates/0001.failed.json", "failed"),
 )
-FIGURE = FigureText("figure", "", "", ("svg", "png"), (MotionText("GA", "motion_1.html"),))
+FIGURE = FigureText("figure", "", "", ("svg", "png"), (Player("GA", "motion_1.html"),))
 
 
 def page_of(text: str) -> Document:
     """Return a page on which nothing is told but one text."""
-    table = TableText((text, "n"), ((text, 1), (f"`{text}`", 2)), text)
-    claims = TableText(("claim", "verdict"), ((text, Verdict("reproduced")),))
-    failures = TableText(("condition", "replicate", "reason"), ((text, 0, text),))
+    table = Table(text, (text, "n"), ((text, 1), (f"`{text}`", 2)), text)
+    claims = Table("Claims", ("claim", "verdict"), ((text, Verdict("reproduced")),))
+    failures = Table("Failures", ("condition", "replicate", "reason"), ((text, 0, text),))
     return Document(
         text,
         f"evoexp report {text}",
@@ -54,12 +53,12 @@ def page_of(text: str) -> Document:
         (Notice("Partial results", text),),
         text,
         (
-            Section(text, text, table),
-            Section("Claims", table=claims),
-            Section("Figures", figures=(FIGURE._replace(title=text, caption=text),)),
-            Section("Failures", table=failures),
+            table,
+            claims,
+            Figures((FIGURE._replace(title=text, caption=text),)),
+            failures,
         ),
-        (RunText(text, ID, 1, 2, 1, False, LOGS),),
+        (RunText(text, ID, 1, 1, False, LOGS),),
     )
 
 
@@ -136,9 +135,9 @@ def test_codes_that_name_a_run_of_the_page_link_to_its_commands() -> None:
 
 
 def test_heads_that_name_a_condition_link_to_its_run() -> None:
-    table = TableText(("quantity", "GA (n\u00a0=\u00a020)", "GA 2"), (("GA", "GA", 1),))
-    text = page_of("plain")._replace(sections=(Section("Results", table=table),))
-    page = Page(html_page(text._replace(runs=(RunText("GA", ID, 1, 1, 0, False),)), {}))
+    table = Table("Results", ("quantity", "GA (n\u00a0=\u00a020)", "GA 2"), (("GA", "GA", 1),))
+    text = page_of("plain")._replace(sections=(table,))
+    page = Page(html_page(text._replace(runs=(RunText("GA", ID, 1, 0, False),)), {}))
     links = [e.text for e in page.all("a") if e.attributes["href"] == f"#run-{ID[:12]}"]
     assert links == ["GA (n\u00a0=\u00a020)", "GA"]
 
@@ -183,9 +182,7 @@ def test_verdicts_are_counted_in_one_order() -> None:
 
 def test_failures_stand_at_the_top() -> None:
     failures = tuple(("GA", k, f"ValueError: {k}") for k in range(5))
-    text = page_of("plain")._replace(
-        sections=(Section("Failures", table=TableText(("a", "b", "c"), failures)),)
-    )
+    text = page_of("plain")._replace(sections=(Table("Failures", ("a", "b", "c"), failures),))
     page = Page(html_page(text, {}))
     (notice,) = page.all("div", class_="notice failed")
     assert "5 replicates failed." in notice.text
@@ -202,7 +199,7 @@ def test_commands_of_a_run_can_be_copied() -> None:
     assert [each.text for each in page.all("code", class_="copy")] == [
         f"evoexp {command} {ID[:12]}" for command in ("show", "reproduce", "view")
     ]
-    alone = page_of("plain")._replace(runs=(RunText("none", ID, 0, 2, 0, False),))
+    alone = page_of("plain")._replace(runs=(RunText("none", ID, 0, 0, False),))
     assert len(Page(html_page(alone, {})).all("code", class_="copy")) == 1
 
 

@@ -7,31 +7,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.report.latex_tables import SIZES, escaped, latex_tables
-from evoexp.report.page_text import (
-    Document,
-    RunText,
-    Section,
-    TableText,
-    Verdict,
-    provenance,
-)
+from evoexp.report.page_parts import Document, RunText, Table, Verdict, provenance
 
 LONG = "A claim that is too long for one line of a table, and so has a column that breaks lines"
-TABLE = TableText(
+TABLE = Table(
+    "Claims",
     ("claim", "λ = 10 & more", "verdict"),
     ((LONG, "−1.5 [−2, ∞]", Verdict("reproduced")), ("50 %_x", "–", Verdict("not judged"))),
     "Median `a_b`.",
     "table_1_claims.tex",
 )
-RUNS = tuple(RunText(f"condition {k}", f"{k}" * 64, 20, 20, 0, False) for k in range(6))
+RUNS = tuple(RunText(f"condition {k}", f"{k}" * 64, 20, 0, False) for k in range(6))
 
 
-def document(*tables: TableText, runs: tuple[RunText, ...] = RUNS[:1]) -> Document:
-    sections = tuple(Section("Claims", table=table) for table in tables)
-    return Document("A & B", "evoexp report x", "exp_1", "paper", (), "", sections, runs, (0, 7))
+def document(*tables: Table, runs: tuple[RunText, ...] = RUNS[:1]) -> Document:
+    return Document("A & B", "evoexp report x", "exp_1", "paper", (), "", tables, runs, (0, 7))
 
 
-def lines_of(table: TableText = TABLE) -> list[str]:
+def lines_of(table: Table = TABLE) -> list[str]:
     return latex_tables(document(table))[table.file].decode().splitlines()
 
 
@@ -57,7 +50,7 @@ def test_a_table_fits_on_a_line_or_is_made_to() -> None:
     number = "162.8 [160.7, 168.1]"
     for count, size, fits in ((1, "small", True), (3, "footnotesize", True), (7, "small", False)):
         headers, row = ("quantity", *"abcdefg"[:count]), (LONG, *[number] * count)
-        lines = lines_of(TableText(headers, (row,), "", "t.tex"))
+        lines = lines_of(Table("Claims", headers, (row,), "", "t.tex"))
         assert rf"\centering\{size}" in lines
         assert (r"\resizebox{\linewidth}{!}{%" in lines) is not fits
         assert (r"\end{tabular}}" in lines) is not fits

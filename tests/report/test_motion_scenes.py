@@ -64,7 +64,7 @@ def test_every_motion_has_its_pictures(name: str) -> None:
     )
     way = scenes[(scenes["element"] == "way") & (scenes["arm"] == 0)][["x", "y", "z"]]
     assert np.allclose(way.to_numpy(), shown.traces[0], atol=1e-6)
-    joints = motion_tables.joints_table(shown, np.full((len(shown.joints), 2), np.inf))
+    joints = motion_tables.joints_table(shown)
     first = joints[joints["joint"] == shown.joints[0].name]["value"].to_numpy()
     scale = 1.0 if shown.joints[0].prismatic else 180.0 / np.pi
     assert np.allclose(first, scale * shown.q[:, 0], atol=1e-6)

@@ -7,8 +7,9 @@ import pytest
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import NothingStored, StoreError
+from evoexp.report import markdown
 from evoexp.report import results as results_module
-from evoexp.report.index import render
+from evoexp.report.index import document
 from evoexp.report.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
@@ -82,7 +83,9 @@ def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: P
     assert found.added(fixed=1) == 2
     assert found.added(fixed=2) == 1  # the experiment's own number was fixed before
     assert found.added(fixed=3) == 0
-    text = render(Page("title", ""), Results("", "", (found,)), settings, "evoexp report")
+    text = markdown.page(
+        document(Page("title", ""), Results("", "", (found,)), settings, "evoexp report")
+    )
     assert f"**Replicates added later.** {found.label}: 2 of 3" in text
     (run.path / "plans.json").write_text('{"plans": [{"num_replicates": "3", "stored": 1}]}')
     with pytest.raises(StoreError, match=r"plans\.json: damaged"):

@@ -12,6 +12,7 @@ from evoexp.report.statistics import (
     EXACT_PAIRS,
     EXACT_VALUES,
     Interval,
+    Proportion,
     _weights,
     effect,
     effort_ratio,
@@ -26,7 +27,6 @@ from evoexp.report.statistics import (
     signed_rank,
     spread,
     vargha_delaney,
-    wilson,
 )
 
 FLOATS = st.floats(-1e3, 1e3)
@@ -64,13 +64,12 @@ def test_quantiles_of_infinite_and_missing_values() -> None:
 @pytest.mark.parametrize("confidence", [0.9, 0.95, 0.99])
 def test_wilson_is_that_of_scipy(successes: int, trials: int, confidence: float) -> None:
     expected = scipy.stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    assert wilson(successes, trials, confidence) == pytest.approx(
-        (expected.low, expected.high), abs=1e-9
-    )
+    found = Proportion(successes, trials).interval(confidence)
+    assert found == pytest.approx((expected.low, expected.high), abs=1e-9)
 
 
 def test_wilson_without_trials_knows_nothing() -> None:
-    assert wilson(0, 0, 0.95) == (0.0, 1.0)
+    assert Proportion(0, 0).interval(0.95) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("size", [1, 5, 12, 40])

@@ -12,26 +12,19 @@ import pytest
 from scipy import stats
 
 from evoexp.records import FloatArray
-from evoexp.report.proportions import Proportion, fisher_exact, newcombe
+from evoexp.report.comparisons import Comparison, adjusted, compare
+from evoexp.report.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED
 from evoexp.report.statistics import (
+    Proportion,
     effect,
     effort_ratio,
     expected_interval,
+    fisher_exact,
     holm,
-    wilson,
-)
-from evoexp.report.verdicts import (
-    CONTRADICTED,
-    INCONCLUSIVE,
-    REPRODUCED,
-    adjusted,
-    compare,
-    judge_best,
-    judge_better,
-    judge_better_than_all,
-    judge_greater,
+    newcombe,
 )
 from matrix import examples, matrices_are_asked_for
+from report_samples import hearing
 
 STUDIES = 2000 if matrices_are_asked_for() else 200
 LEVEL, SIGNIFICANCE = 0.95, 0.05
@@ -43,6 +36,10 @@ RESAMPLES = 400
 Draw = Callable[[np.random.Generator, int], FloatArray]
 
 
+def judge_better(comparison: Comparison) -> str:
+    return hearing("better", SIGNIFICANCE).better(comparison, "lower").verdict
+
+
 def coverage(holds: list[bool]) -> float:
     assert len(holds) == STUDIES
     return float(np.mean(holds))
@@ -52,7 +49,7 @@ def coverage(holds: list[bool]) -> float:
 def test_wilsons_interval_holds_the_share(share: float, runs: int) -> None:
     rng = np.random.default_rng(runs)
     counts = rng.binomial(runs, share, STUDIES)
-    intervals = {int(k): wilson(int(k), runs, LEVEL) for k in np.unique(counts)}
+    intervals = {int(k): Proportion(int(k), runs).interval(LEVEL) for k in np.unique(counts)}
     assert coverage([intervals[k].low <= share <= intervals[k].high for k in counts]) >= LOWEST
 
 
@@ -130,7 +127,7 @@ def test_where_nothing_differs_better_is_seldom_said(draw: Draw, runs: int) -> N
     rng, said = np.random.default_rng(runs), []
     for _ in range(STUDIES):
         found = compare("cost", draw(rng, runs), draw(rng, runs), True, LEVEL, 2)
-        said.append(judge_better(found, SIGNIFICANCE) != INCONCLUSIVE)
+        said.append(judge_better(found) != INCONCLUSIVE)
     assert coverage(said) <= MOST
 
 
@@ -138,7 +135,7 @@ def test_where_something_differs_better_is_said_and_never_the_wrong_way() -> Non
     rng, said = np.random.default_rng(1), []
     for _ in range(STUDIES):
         x, y = rng.normal(0.0, size=20), rng.normal(1.2, size=20)
-        said.append(judge_better(compare("cost", x, y, True, LEVEL, 2), SIGNIFICANCE))
+        said.append(judge_better(compare("cost", x, y, True, LEVEL, 2)))
     assert said.count(REPRODUCED) > 0.85 * STUDIES
     assert said.count(CONTRADICTED) <= 0.001 * STUDIES
 
@@ -149,8 +146,8 @@ def test_of_six_equal_settings_none_is_said_to_be_better_or_best() -> None:
         own, *others = (smooth(rng, 20) for _ in range(6))
         rows = adjusted([compare("cost", own, other, True, LEVEL, 2) for other in others])
         median = bool(np.median(own) <= min(np.median(other) for other in others))
-        better.append(judge_better_than_all(rows, SIGNIFICANCE) != INCONCLUSIVE)
-        best.append(judge_best(rows, median, SIGNIFICANCE) != INCONCLUSIVE)
+        better.append(hearing("better than all").better_than_all("", rows).verdict != INCONCLUSIVE)
+        best.append(hearing("best").best("", rows, median).verdict != INCONCLUSIVE)
     assert coverage(better) <= MOST
     assert coverage(best) <= MOST
 
@@ -162,7 +159,7 @@ def test_of_equal_shares_none_is_said_to_be_greater(share: float, runs: int) -> 
     for pair in rng.binomial(runs, share, (STUDIES, 2)).tolist():
         one, two = (Proportion(k, runs) for k in pair)
         key = one, two
-        verdicts[key] = verdicts.get(key) or judge_greater(one, two, SIGNIFICANCE)
+        verdicts[key] = verdicts.get(key) or hearing("greater").greater("", one, two).verdict
         said.append(verdicts[key] != INCONCLUSIVE)
     assert coverage(said) <= MOST
 

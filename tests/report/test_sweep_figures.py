@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from evoexp.report import style
 from evoexp.report.figures import convergence, effects, matrix, shares
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.proportions import Proportion
+from evoexp.report.statistics import Proportion
 
 
 def values(*runs: tuple[str, list[float]]) -> pd.DataFrame:

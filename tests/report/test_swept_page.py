@@ -16,7 +16,7 @@ from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.report import style
-from evoexp.report.figures import end_labels, sweep_curves, sweep_grids
+from evoexp.report.figures import end_labels, sweeps
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
@@ -109,10 +109,10 @@ def test_only_common_seeds_are_paired() -> None:
 def test_grids_hold_every_combination() -> None:
     sweep = sweep_of(two_settings())
     assert sweep is not None
-    table = sweep_grids.grid_table(sweep, lambda c: c.column("best_cost"))
+    table = sweeps.grid_table(sweep, lambda c: c.column("best_cost"))
     cells = {(row.y, row.x): row.median for row in table.itertuples()}
     assert cells == {values: np.median(costs) for values, costs in COSTS.items()}
-    figure = style.drawn(lambda: sweep_grids.draw_grid(table, "cost"), ("svg",), 60)["svg"]
+    figure = style.drawn(lambda: sweeps.draw_grid(table, "cost"), ("svg",), 60)["svg"]
     assert all(f">{value:.4g}<".encode() in figure for value in cells.values() if value < 100.0)
 
 
@@ -121,7 +121,7 @@ def test_three_settings_have_a_panel_for_each_value_of_the_first() -> None:
     labels = [f"mode={m} · x={x} · y={y}" for m, x, y in combinations]
     sweep = sweep_of(fake(*(condition(each, [1.0, 2.0]) for each in labels)))
     assert sweep is not None
-    table = sweep_grids.grid_table(sweep, lambda c: c.column("best_cost"))
+    table = sweeps.grid_table(sweep, lambda c: c.column("best_cost"))
     assert list(dict.fromkeys(table["panel"])) == ["mode = a", "mode = b"]
     assert (table["x_setting"] == "y").all() and (table["y_setting"] == "x").all()
 
@@ -151,10 +151,10 @@ def test_places_of_names_are_apart_in_order_and_inside(wanted: list[float], gap:
 def test_convergence_has_a_panel_for_each_value_of_the_first_setting(swept: Results) -> None:
     sweep = sweep_of(two_settings())
     assert sweep is not None
-    assert sweep_curves.facets(sweep) == [("GA", "ga.size = 20"), ("GA", "ga.size = 100")]
+    assert sweeps.facets(sweep) == [("GA", "ga.size = 20"), ("GA", "ga.size = 100")]
     own = sweep_of(swept)
     assert own is not None
-    table = sweep_curves.convergence_table(swept, own)
+    table = sweeps.convergence_table(swept, own)
     assert set(table["facet"]) == {""} and set(table["setting"]) == {"num_elites"}
     assert {(row.value, row.level) for row in table.itertuples()} == {("0", 0), ("2", 1)}
 

@@ -11,9 +11,9 @@ from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.claim_rules import Rule, Rules
+from evoexp.report.page_parts import Claim
 from evoexp.report.pages import page_of
 from evoexp.report.results import gather
-from evoexp.report.verdicts import Claim
 from evoexp.store.run_directory import outputs_root
 
 KEYS = (

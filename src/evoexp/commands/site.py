@@ -14,7 +14,7 @@ from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.build import ReportFiles
 from evoexp.report.claim_rules import Rules
 from evoexp.report.home_page import Paper, StoredRun, home_page, summaries
-from evoexp.report.page_summary import HTML
+from evoexp.report.html_page import HTML
 from evoexp.store.files import write_file
 from evoexp.store.run_directory import RunDirectory, outputs_root
 

@@ -1,21 +1,24 @@
 """Builds a report; no other module of it writes its files."""
 
+import functools
 import hashlib
+import inspect
 import json
-from collections.abc import Mapping, Sequence
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
 from evoexp.report import markdown
-from evoexp.report.data_schema import schema
-from evoexp.report.html_page import html_page
+from evoexp.report.html_page import HTML, html_page
 from evoexp.report.index import document
 from evoexp.report.latex_tables import latex_tables
+from evoexp.report.motion_pictures import players_of
 from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.page_summary import HTML
 from evoexp.report.pages import page_of
-from evoexp.report.players import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.report.statistics import forget_resamples
@@ -24,6 +27,9 @@ from evoexp.store.files import write_files
 from evoexp.version import __version__
 
 INDEX = "index.md"
+_RETURNS = re.compile(r"^Returns:\n((?:(?: .*)?\n?)+)", re.MULTILINE)
+_NAME = re.compile(r"`([A-Za-z_][\w.]*)`")
+_KINDS = {"b": "true or false", "i": "integer", "u": "integer", "f": "number"}
 
 
 class Request(NamedTuple):
@@ -116,7 +122,7 @@ def page_files(
     text = document(page, found, settings, command, players)
     files |= latex_tables(text)
     files[HTML] = html_page(text, files)
-    files |= {player.text.file: player.content for player in players.values()}
+    files |= {player.file: player.content for player in players.values()}
     files[INDEX] = markdown.page(text).encode()
     return ReportFiles(found.outputs / "reports" / request.report_name, files)
 
@@ -160,7 +166,11 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
             "file": f"{drawing.stem}.csv",
             "rows": len(table),
             "sha256": _sha256(rows),
-            **schema(table, drawing.table),
+            # kinds of its columns, and what the docstring of its source says of them
+            "columns": {
+                str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
+            },
+            "description": description(drawing.table),
         },
         "files": {name: _sha256(content) for name, content in pictures.items()},
     }
@@ -184,3 +194,40 @@ def _provenance(drawing: Drawing) -> list[dict[str, Any]]:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
+
+
+def description(source: Callable[..., Any]) -> str:
+    """Return the words of a function's docstring on the table that it returns, as one line.
+
+    Where it names another table (`links_table`) or a list of columns (`COLUMNS`), that is told
+    behind it.
+    """
+    return " ".join(_told(source, set()))
+
+
+def _told(source: Callable[..., Any], told: set[str]) -> Iterator[str]:
+    while isinstance(source, functools.partial):
+        source = source.func
+    text = inspect.getdoc(source) or ""
+    found = _RETURNS.search(text)
+    text = " ".join((found[1] if found else text).split())
+    yield text
+    module = sys.modules.get(getattr(source, "__module__", ""))
+    for name in dict.fromkeys(_NAME.findall(text)):
+        named = _named(module, name)
+        if named is None or name in told:
+            continue
+        told.add(name)
+        if isinstance(named, list | tuple):
+            yield f"`{name}`: {', '.join(map(str, named))}."
+        elif callable(named):
+            first, *more = _told(named, told)
+            yield " ".join([f"`{name}`: {first}", *more])
+
+
+def _named(module: Any, name: str) -> Any:
+    """Return the object of a dotted name in a module; of a module its `COLUMNS`."""
+    found = module
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    return getattr(found, "COLUMNS", None) if isinstance(found, ModuleType) else found

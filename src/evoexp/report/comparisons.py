@@ -1,6 +1,7 @@
 """Compares conditions on their common seeds, pair by pair."""
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,14 +9,75 @@ from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, wrapped
-from evoexp.report.verdicts import Comparison, adjusted, compare
+from evoexp.report.statistics import (
+    Effect,
+    RankSum,
+    SignedRank,
+    effect,
+    holm,
+    quantile,
+    rank_sum,
+    signed_rank,
+)
 
 Values = Callable[[ConditionResults], FloatArray]
+
+
+class Comparison(NamedTuple):
+    """One quantity of two conditions on their common seeds."""
+
+    quantity: str  # its name, or that of the pair in a table of one quantity
+    num_seeds: int  # replicates that both have
+    median_difference: float  # of first minus second
+    # Signed-rank test of the pairs; positive ranks are those of the first being better
+    test: SignedRank
+    # Its p-value by Holm over all quantities compared; equal to the plain one until `adjusted`
+    p_adjusted: float
+    unpaired: RankSum  # the same values tested as independent samples
+    unpaired_adjusted: float  # its p-value by Holm, a family of its own
+    better: Effect  # a12 of the first being better than the second
+
+    def says(self, significance: float) -> int:
+        """Return 1 if the first is significantly better, −1 if significantly worse, else 0.
+
+        Significance and direction are those of one statistic, the signed ranks: A12 and medians may
+        point the other way.
+        """
+        return self.test.direction if self.p_adjusted < significance else 0
 
 
 def by_column(name: str) -> Values:
     """Return the function that reads this column of a condition's summaries."""
     return lambda condition: condition.column(name)
+
+
+def compare(
+    quantity: str,
+    first: FloatArray,
+    second: FloatArray,
+    lower_is_better: bool,
+    confidence: float,
+    num_resamples: int,
+) -> Comparison:
+    """Compare a quantity of two conditions, (seeds,) each without NaN, seed by seed."""
+    sign = -1.0 if lower_is_better else 1.0
+    test, unpaired = signed_rank(sign * first, sign * second), rank_sum(first, second)
+    better = effect(sign * first, sign * second, confidence, num_resamples)
+    differences = np.zeros(len(first))  # two infinite costs do not differ
+    np.subtract(first, second, out=differences, where=first != second)
+    median = quantile(differences, 0.5)
+    return Comparison(
+        quantity, len(first), median, test, test.p_value, unpaired, unpaired.p_value, better
+    )
+
+
+def adjusted(comparisons: Iterable[Comparison]) -> list[Comparison]:
+    """Return comparisons with p-values adjusted by Holm; either test is a family of its own."""
+    rows = list(comparisons)
+    paired = holm([row.test.p_value for row in rows])
+    unpaired = holm([row.unpaired.p_value for row in rows])
+    found = zip(rows, paired, unpaired, strict=True)
+    return [row._replace(p_adjusted=p, unpaired_adjusted=q) for row, p, q in found]
 
 
 def compared_with_controls(
@@ -31,20 +93,13 @@ def compared_with_controls(
     Returns:
         (heading, one comparison per quantity), p-values adjusted over the quantities.
     """
-    found = []
-    for first in results.evolved:
-        for second in results.evolved:
-            if (
-                first.is_control
-                or not second.is_control
-                or not beside(first.condition, second.condition)
-            ):
-                continue
-            rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]
-            kept = [row for row in rows if row is not None]
-            if kept:
-                found.append((f"{first.label} against {second.label}", tuple(adjusted(kept))))
-    return tuple(found)
+    found = (
+        (f"{first.label} against {second.label}", _common(first, second, compared, settings))
+        for first in results.evolved
+        for second in results.evolved
+        if not first.is_control and second.is_control and beside(first.condition, second.condition)
+    )
+    return tuple((heading, tuple(adjusted(rows))) for heading, rows in found if rows)
 
 
 def beside(first: Condition, control: Condition) -> bool:
@@ -72,28 +127,28 @@ def compared(
     Returns:
         One comparison per pair, p-values adjusted over the pairs.
     """
-    rows = [
-        compare_on_common_seeds(a, b, named(a, b), lower_is_better, values, settings)
+    rows = (
+        row
         for a, b in pairs
-    ]
-    return tuple(adjusted([row for row in rows if row is not None]))
+        for row in _common(a, b, [(named(a, b), lower_is_better, values)], settings)
+    )
+    return tuple(adjusted(rows))
 
 
-def compare_on_common_seeds(
+def _common(
     first: ConditionResults,
     second: ConditionResults,
-    quantity: str,
-    lower_is_better: bool,
-    values: Values,
+    quantities: Sequence[tuple[str, bool, Values]],
     settings: ReportSettings,
-) -> Comparison | None:
-    """Compare a quantity over the replicates that both have; None if they share no replicate."""
+) -> list[Comparison]:
+    """Compare quantities over the replicates that both have; none where they share no replicate."""
     common = first.summaries.index.intersection(second.summaries.index)
-    x = values(first)[first.summaries.index.get_indexer(common)]
-    y = values(second)[second.summaries.index.get_indexer(common)]
-    known = ~(np.isnan(x) | np.isnan(y))
-    if not known.any():
-        return None
-    return compare(
-        quantity, x[known], y[known], lower_is_better, settings.confidence, settings.num_resamples
-    )
+    found = []
+    for name, lower_is_better, values in quantities:
+        x = values(first)[first.summaries.index.get_indexer(common)]
+        y = values(second)[second.summaries.index.get_indexer(common)]
+        known = ~(np.isnan(x) | np.isnan(y))
+        if known.any():
+            levels = settings.confidence, settings.num_resamples
+            found.append(compare(name, x[known], y[known], lower_is_better, *levels))
+    return found

@@ -1,19 +1,57 @@
 """The home page of all reports: papers, other reports, stored runs, and a search over them."""
 
+import html
+import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 from urllib.parse import quote
 
-from evoexp.report.html_page import verdict_counts
-from evoexp.report.page_summary import HTML, ReportSummary, read_summary, telling_rank
-from evoexp.report.page_templates import script_json, written
+from pydantic import Field, TypeAdapter
 
+from evoexp.report.html_page import HTML, script_json, telling_rank, verdict_counts, written
+
+MARKDOWN = "index.md"
 MAX_LINKS = 3  # reports named beside a run
 FROM_HOME = "?home"  # tells a report that it can link back
 COMPARE = "compare"
 USUAL = {"Conditions", "Results", "Claims", "Motions", "Figures", "Parameters", "Failures"}
 """Headings of nearly every report, which nobody looks for."""
+_SUMMARY = re.compile(r'<script type="application/json" id="summary">(.*?)</script>', re.DOTALL)
+_MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
+
+Hash = Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
+Picture = Annotated[str, Field(pattern=r"^([\w.-]+\.(svg|png))?$")]  # in the report's own folder
+
+
+class ReportSummary(NamedTuple):
+    """A report that is there, as its page says."""
+
+    folder: str  # its name under `reports`
+    file: str  # its page in the folder
+    title: str  # heading
+    command: str = ""  # that draws it, without `evoexp`; empty where it is not known
+    partial: str = ""  # the remark that results are missing; empty if none is
+    failed: int = 0  # number of failed replicates
+    # (text, place on the page) of its sections and figures
+    headings: tuple[tuple[str, str], ...] = ()
+    claims: tuple[tuple[str, str], ...] = ()  # (text, verdict)
+    runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
+    picture: Picture = ""  # the figure that shows best what it is about; empty if there is none
+
+    @property
+    def experiment(self) -> str:
+        """Name of the experiment in its folder's name: without budget and overrides."""
+        return re.split("[@+]", self.folder)[0]
+
+    @property
+    def is_comparison(self) -> bool:
+        """Whether `evoexp compare` draws it."""
+        return self.command.split(" ")[0] == COMPARE
+
+
+_REPORT = TypeAdapter(ReportSummary)
 
 
 class Paper(NamedTuple):
@@ -24,6 +62,10 @@ class Paper(NamedTuple):
     subtitle: str  # what it is about
     experiments: tuple[str, ...]  # names of its experiments
     claims: dict[str, int]  # experiment → number of claims that it judges
+
+    def has(self, experiment: str) -> bool:
+        """Whether an experiment is one of this paper's, by its name."""
+        return experiment == self.name or experiment.startswith(f"{self.name}_")
 
 
 class StoredRun(NamedTuple):
@@ -58,14 +100,7 @@ class Link(NamedTuple):
     partial: bool = False  # whether results are missing
     failed: int = 0  # number of failed replicates
     detail: str = ""  # its title
-
-
-class Picture(NamedTuple):
-    """A figure of a report: its file, and the report that it leads to."""
-
-    file: str
-    url: str
-    text: str
+    picture: str = ""  # address of its figure; empty if it has none
 
 
 class PaperCard(NamedTuple):
@@ -73,7 +108,7 @@ class PaperCard(NamedTuple):
 
     title: str  # authors and year
     subtitle: str  # what it is about
-    picture: Picture | None  # of one of its reports; None if none has any
+    face: Link | None  # the report whose figure is shown; None if none has any
     # (verdict, number of claims), over the reports of its experiments
     counts: tuple[tuple[str, int], ...]
     unjudged: int  # claims of experiments without a report at the paper's budget
@@ -81,16 +116,26 @@ class PaperCard(NamedTuple):
     missing: tuple[str, ...]  # experiments without a report
 
 
-class Site(NamedTuple):
-    """The content of the home page."""
+def read_summary(folder: Path) -> ReportSummary | None:
+    """Return the summary of a report's folder; None if it holds no report.
 
-    num_reports: int  # of all reports
-    partial: tuple[Link, ...]  # links to those whose results are not complete
-    num_earlier: int  # reports of an earlier version, of which only the title is known
-    unfinished: int  # runs of which planned replicates are missing, or failed
-    papers: tuple[PaperCard, ...]  # one card each
-    others: tuple[tuple[str, tuple[Link, ...]], ...]  # (heading, links): reports of no paper
-    runs: tuple[tuple[StoredRun, tuple[Link, ...]], ...]  # stored runs with links to reports
+    A report of an earlier version, which has no HTML page, has only a title and its command.
+    """
+    try:
+        found = _SUMMARY.search((folder / HTML).read_text(encoding="utf-8"))
+        if found:
+            named = {"folder": folder.name, "file": HTML, **json.loads(found[1])}
+            return _REPORT.validate_python(named)
+    except (OSError, ValueError, TypeError):
+        pass  # nobody's page, or no page of ours
+    try:
+        text = (folder / MARKDOWN).read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return None
+    title = text.partition("\n")[0].removeprefix("# ")
+    made = _MADE_BY.search(text)
+    command = html.unescape(made[1]) if made else ""
+    return ReportSummary(folder.name, MARKDOWN, html.unescape(title) or folder.name, command)
 
 
 def summaries(reports: Path) -> list[ReportSummary]:
@@ -109,31 +154,28 @@ def home_page(
 
 def site(
     found: Sequence[ReportSummary], papers: Sequence[Paper], runs: Sequence[StoredRun]
-) -> Site:
-    """Return the content of the home page; see `home_page`."""
-    owned = {paper.name: [r for r in found if _is_of(paper, r)] for paper in papers}
+) -> dict[str, Any]:
+    """Return the content of the home page, by the names that its template has."""
+    owned = {
+        paper.name: [r for r in found if paper.has(r.experiment) and not r.is_comparison]
+        for paper in papers
+    }
     of_papers = {each.folder for several in owned.values() for each in several}
     others = [each for each in found if each.folder not in of_papers]
-    compared = [each for each in others if each.command.split(" ")[0] == COMPARE]
-    rest = [each for each in others if each not in compared]
-    groups = (("Arenas and other experiments", rest), ("Comparisons", compared))
-    return Site(
-        len(found),
-        tuple(_link(each) for each in found if each.partial),
-        sum(each.file != HTML for each in found),
-        sum(run.state != "done" for run in runs),
-        tuple(_card(paper, owned[paper.name]) for paper in papers),
-        tuple((name, tuple(map(_link, each))) for name, each in groups if each),
-        tuple((run, tuple(_links(run, found))) for run in runs),
-    )
-
-
-def _is_of(paper: Paper, report: ReportSummary) -> bool:
-    return _begins(report.experiment, paper.name) and report.command.split(" ")[0] != COMPARE
-
-
-def _begins(experiment: str, name: str) -> bool:
-    return experiment == name or experiment.startswith(f"{name}_")
+    groups = {
+        "Arenas and other experiments": [each for each in others if not each.is_comparison],
+        "Comparisons": [each for each in others if each.is_comparison],
+    }
+    return {
+        "num_reports": len(found),
+        "partial": [_link(each) for each in found if each.partial],
+        # of which only the title is known
+        "num_earlier": sum(each.file != HTML for each in found),
+        "unfinished": sum(run.state != "done" for run in runs),
+        "papers": [_card(paper, owned[paper.name]) for paper in papers],
+        "others": [(name, list(map(_link, group))) for name, group in groups.items() if group],
+        "runs": [(run, list(_links(run, found))) for run in runs],
+    }
 
 
 def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
@@ -141,7 +183,7 @@ def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
     whole = [each for each in reports if each.folder == each.experiment]
     drawn, shown = {each.folder for each in whole}, {each.experiment for each in reports}
     names = (*paper.experiments, *paper.claims)
-    pictured = min(
+    face = min(
         (each for each in whole or reports if each.picture),
         key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
         default=None,
@@ -149,20 +191,18 @@ def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
     return PaperCard(
         paper.title,
         paper.subtitle,
-        _picture(pictured) if pictured else None,
-        verdict_counts([verdict for each in whole for _, verdict in each.claims]),
+        _link(face) if face else None,
+        verdict_counts(verdict for each in whole for _, verdict in each.claims),
         sum(count for name, count in paper.claims.items() if name not in drawn),
         tuple(map(_link, reports)),
-        tuple(sorted({name for name in names if _begins(name, paper.name)} - shown)),
+        tuple(sorted({name for name in names if paper.has(name)} - shown)),
     )
 
 
-def _picture(report: ReportSummary) -> Picture:
-    return Picture(f"{quote(report.folder)}/{quote(report.picture)}", _url(report), report.folder)
-
-
 def _link(report: ReportSummary) -> Link:
-    return Link(report.folder, _url(report), bool(report.partial), report.failed, report.title)
+    picture = f"{quote(report.folder)}/{quote(report.picture)}" * bool(report.picture)
+    told = bool(report.partial), report.failed, report.title
+    return Link(report.folder, _url(report), *told, picture)
 
 
 def _url(report: ReportSummary, place: str = "") -> str:
@@ -182,15 +222,11 @@ def _links(run: StoredRun, found: Iterable[ReportSummary]) -> Iterator[Link]:
 def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
     """Yield the entries that the search looks through."""
     for each in found:
-        yield _entry(each, "report", each.title)
-        for heading, place in each.headings:
-            if heading not in USUAL:
-                yield _entry(each, "heading", heading, place)
-        for text, verdict in each.claims:
-            yield _entry(each, f"claim, {verdict}", text, "claims")
-        for name, label in each.runs:
-            yield _entry(each, "run", f"{name} {label}", f"run-{name}")
-
-
-def _entry(report: ReportSummary, kind: str, text: str, place: str = "") -> dict[str, Any]:
-    return {"text": text, "kind": kind, "report": report.folder, "url": _url(report, place)}
+        entries = [
+            ("report", each.title, ""),
+            *(("heading", text, place) for text, place in each.headings if text not in USUAL),
+            *((f"claim, {verdict}", text, "claims") for text, verdict in each.claims),
+            *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
+        ]
+        for kind, text, place in entries:
+            yield {"text": text, "kind": kind, "report": each.folder, "url": _url(each, place)}

@@ -1,29 +1,30 @@
 """The text of a report, from its page and its results."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from evoexp.report import markdown
-from evoexp.report.condition_labels import have_two_parts, in_few_words
-from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.page_text import (
+from evoexp.report.comparisons import Comparison
+from evoexp.report.page_parts import (
+    Claim,
     Document,
+    Drawing,
+    Figures,
     FigureText,
     LogText,
     Notice,
+    Page,
+    Player,
     RunText,
-    Section,
-    TableText,
+    Table,
     Verdict,
     provenance,
 )
 from evoexp.report.parameters import Parameter, parameters, planned_replicates
-from evoexp.report.players import Players, key
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, Verdicts
-from evoexp.report.statistics import wilson
-from evoexp.report.verdicts import Claim, Comparison
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import Proportion
 
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
@@ -32,6 +33,7 @@ PARTS = (
     "In brackets: the conditions that have a value, where not all have it. A planner alone stands "
     "for it on all problems, a problem alone for all of its planners."
 )
+BETWEEN = " · "  # the parts of a label of a problem and a planner
 CLAIMS, FAILURES = "Claims", "Failures"  # headings
 
 
@@ -40,26 +42,27 @@ def document(
     results: Results,
     settings: ReportSettings,
     command: str,
-    players: Players | None = None,
+    players: Mapping[tuple[str, int], Player] | None = None,
 ) -> Document:
-    """Return the text of a page; the same results give the same text."""
+    """Return the text of a page; the same results give the same text.
+
+    `players` are the pages that play motions, by the keys of the played runs.
+    """
     notices = (_incomplete(results), _damaged(results), _added(results))
+    first = _conditions(results, settings), _quantities(page, results)
+    later = (
+        _claims(page.claims),
+        Table("Known defects and checks", ("check", "finding"), page.checks),
+        *(_comparison(heading, rows, settings) for heading, rows in page.comparisons),
+    )
+    figures = Figures(tuple(_figure(each, settings, players or {}) for each in page.drawings))
     sections = (
-        Section("Conditions", table=_conditions(results, settings)),
-        Section("Results", table=_quantities(page, results)),
-        *(Section(t.heading, table=TableText(t.headers, t.rows, t.note)) for t in page.tables),
-        Section(CLAIMS, table=_claims(page.claims)),
-        Section("Known defects and checks", table=_checks(page.checks)),
-        *(
-            Section(heading, table=_comparison(rows, settings))
-            for heading, rows in page.comparisons
-        ),
-        Section(
-            "Figures",
-            figures=tuple(_figure(each, settings, players or {}) for each in page.drawings),
-        ),
-        Section("Parameters", table=_parameters(results)),
-        Section(FAILURES, table=_failures(results)),
+        *(table for table in first if table.rows),
+        *page.tables,
+        *(table for table in later if table.rows),
+        *((figures,) if figures.figures else ()),
+        _parameters(results),
+        *_failures(results),
     )
     return Document(
         page.title,
@@ -68,7 +71,7 @@ def document(
         results.budget,
         tuple(notice for notice in notices if notice.text),
         page.introduction,
-        _with_files(each for each in sections if each.table or each.figures),
+        tuple(_with_files(sections)),
         tuple(map(_run, results.conditions)),
         _seeds(results.conditions),
     )
@@ -90,29 +93,22 @@ def _run(c: ConditionResults) -> RunText:
     done = (LogText(k, address(c.run.log_path(k)), text) for k, text in results.items())
     failed = (LogText(k, address(c.run.failure_path(k)), "failed") for k in c.failures)
     logs = tuple(sorted((*done, *failed)))
-    own = c.label, c.condition.id, c.done, c.planned, c.failed, c.is_reference
-    return RunText(*own, logs)
+    return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, logs)
 
 
-def _with_files(sections: Iterable[Section]) -> tuple[Section, ...]:
+def _with_files(sections: Iterable[Table | Figures]) -> Iterator[Table | Figures]:
     """Name the files of tables: by their number and heading."""
-    found: list[Section] = []
+    number = 0
     for section in sections:
-        table, number = section.table, 1 + sum(each.table is not None for each in found)
-        if table is not None:
+        if isinstance(section, Table):
+            number += 1
             words = "_".join(re.findall("[a-z0-9]+", section.heading.lower()))[:LONGEST_NAME]
-            table = table._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex")
-        found.append(section._replace(table=table))
-    return tuple(found)
+            section = section._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex")
+        yield section
 
 
 def _seeds(conditions: Iterable[ConditionResults]) -> tuple[int, ...]:
     return tuple(sorted({c.condition.seed for c in conditions}))
-
-
-def render(page: Page, results: Results, settings: ReportSettings, command: str) -> str:
-    """Return the page as Markdown; see `document`."""
-    return markdown.page(document(page, results, settings, command))
 
 
 def _incomplete(results: Results) -> Notice:
@@ -159,30 +155,22 @@ def _added(results: Results) -> Notice:
     )
 
 
-def _conditions(results: Results, settings: ReportSettings) -> TableText:
+def _conditions(results: Results, settings: ReportSettings) -> Table:
     rows = []
     for c in results.conditions:
-        interval = (
-            markdown.percent(wilson(c.solved, c.done, settings.confidence)) if c.done else "–"
-        )
-        solved = f"{markdown.share(c.solved, c.done)} ({interval})" if c.done else "–"
-        verdicts = c.verdicts
-        broken = verdicts.margin_broken if verdicts.judged else "–"
-        rows.append(
-            (
-                c.label,
-                f"`{c.condition.id[:12]}`",
-                c.done,
-                c.planned,
-                c.failed,
-                solved,
-                *_verdicts(verdicts),
-                broken,
-            )
-        )
-    exact = ("certified", "refuted", "undecided", "solved, yet refuted")
+        solved, verdicts, found = "–", ("–",) * 5, c.verdicts
+        if c.done:
+            interval = Proportion(c.solved, c.done).interval(settings.confidence)
+            solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
+        exact: tuple[object, ...] = verdicts
+        if found.judged:
+            proven = found.certified, found.refuted, found.undecided
+            exact = (*proven, found.solved_refuted, found.margin_broken)
+        name = f"`{c.condition.id[:12]}`"
+        rows.append((c.label, name, c.done, c.planned, c.failed, solved, *exact))
+    exact_heads = ("certified", "refuted", "undecided", "solved, yet refuted")
     own = ("condition", "hash", "done", "planned", "failed", "solved")
-    headers = (*own, *exact, "required margin not kept")
+    headers = (*own, *exact_heads, "required margin not kept")
     level = f"{100 * settings.confidence:g} %"
     note = (
         "\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's "
@@ -190,60 +178,42 @@ def _conditions(results: Results, settings: ReportSettings) -> TableText:
         'motion, by the distance of the bodies themselves; "required margin not kept": certified, '
         "yet somewhere closer than the scenario's security margin."
     )
-    return TableText(headers, tuple(rows), note)
+    return Table("Conditions", headers, tuple(rows), note)
 
 
-def _verdicts(verdicts: Verdicts) -> tuple[object, ...]:
-    if not verdicts.judged:
-        return ("–",) * 4
-    return verdicts.certified, verdicts.refuted, verdicts.undecided, verdicts.solved_refuted
-
-
-def _quantities(page: Page, results: Results) -> TableText | None:
+def _quantities(page: Page, results: Results) -> Table:
     labels = [c.label for c in results.with_data]
-    if not labels or not page.quantities:
-        return None
     note = "Median [first quartile, third quartile] over finished replicates."
     heads = [f"{c.label} (n\u00a0=\u00a0{c.done})" for c in results.with_data]
+    cells = [[markdown.spread(q.spreads[label]) for label in labels] for q in page.quantities]
     if len(labels) > WIDEST:
-        cells = [
-            (head, *(markdown.spread(q.spreads[c]) for q in page.quantities))
-            for head, c in zip(heads, labels, strict=True)
-        ]
         names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
-        return TableText(("condition", *names), tuple(cells), note)
-    rows = [
-        (q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels))
-        for q in page.quantities
-    ]
-    return TableText(("quantity", "unit", *heads), tuple(rows), note)
+        below = tuple(zip(heads, *cells, strict=True)) if cells else ()
+        return Table("Results", ("condition", *names), below, note)
+    rows = [(q.name, q.unit, *own) for q, own in zip(page.quantities, cells, strict=True)]
+    return Table("Results", ("quantity", "unit", *heads), tuple(rows) * bool(labels), note)
 
 
-def _claims(claims: Sequence[Claim]) -> TableText | None:
-    if not claims:
-        return None
+def _claims(claims: Sequence[Claim]) -> Table:
     rows = [
         (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
         for c in claims
     ]
-    return TableText(("claim", "verdict", "evidence", "n", "rule", "paper"), tuple(rows))
+    headers = ("claim", "verdict", "evidence", "n", "rule", "paper")
+    return Table(CLAIMS, headers, tuple(rows))
 
 
-def _checks(checks: Sequence[tuple[str, str]]) -> TableText | None:
-    return TableText(("check", "finding"), tuple(checks)) if checks else None
-
-
-def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> TableText:
+def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettings) -> Table:
     cells = [
         (
             c.quantity,
             c.num_seeds,
             markdown.number(c.median_difference),
             f"{c.better.a12:.3f} [{c.better.interval.low:.3f}, {c.better.interval.high:.3f}]",
-            markdown.p_value(c.test.p_value),
-            markdown.p_value(c.p_adjusted),
-            markdown.p_value(c.unpaired.p_value),
-            markdown.p_value(c.unpaired_adjusted),
+            *map(
+                markdown.p_value,
+                (c.test.p_value, c.p_adjusted, c.unpaired.p_value, c.unpaired_adjusted),
+            ),
         )
         for c in rows
     ]
@@ -257,18 +227,20 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> TableTe
         "which verdicts follow, and Mann and Whitney's of the same values as independent "
         "samples; adjusted: Holm over the rows of this table, test by test."
     )
-    return TableText(headers, tuple(cells), note)
+    return Table(heading, headers, tuple(cells), note)
 
 
-def _figure(drawing: Drawing, settings: ReportSettings, players: Players) -> FigureText:
+def _figure(
+    drawing: Drawing, settings: ReportSettings, players: Mapping[tuple[str, int], Player]
+) -> FigureText:
     runs = [(c.condition.id[:12], c.done) for c in drawing.conditions]
     whose = provenance(runs, _seeds(drawing.conditions))
     caption = f"{drawing.caption} {whose}".strip()
-    motions = tuple(players[key(run)].text for run in drawing.plays if key(run) in players)
+    motions = tuple(players[run.key] for run in drawing.plays if run.key in players)
     return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats), motions)
 
 
-def _parameters(results: Results) -> TableText:
+def _parameters(results: Results) -> Table:
     """Return one row per setting, and one per value where conditions differ in it."""
     by_name: dict[str, dict[Parameter, list[str]]] = {}
     for condition in results.conditions:
@@ -287,7 +259,7 @@ def _parameters(results: Results) -> TableText:
         for parameter, labels in by_name[name].items()
     ]
     note = PARTS * have_two_parts(every)
-    return TableText(("setting", "value", "unit", "source"), tuple(rows), note)
+    return Table("Parameters", ("setting", "value", "unit", "source"), tuple(rows), note)
 
 
 def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
@@ -298,10 +270,58 @@ def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
         yield from (name for name in by_name if name.split(".")[0].split("[")[0] == group)
 
 
-def _failures(results: Results) -> TableText | None:
+def _failures(results: Results) -> Iterator[Table]:
+    """Yield the table of failed replicates, if there are any."""
     rows = [
         (c.label, replicate, reason)
         for c in results.conditions
         for replicate, reason in c.failures.items()
     ]
-    return TableText(("condition", "replicate", "reason"), tuple(rows)) if rows else None
+    if rows:
+        yield Table(FAILURES, ("condition", "replicate", "reason"), tuple(rows))
+
+
+def have_two_parts(labels: Sequence[str]) -> bool:
+    """Whether all labels are of a problem and a planner, and some share one."""
+    parts = [label.split(BETWEEN) for label in labels]
+    names = {part for own in parts for part in own}
+    return all(len(own) == 2 for own in parts) and len(names) < 2 * len(parts)
+
+
+def in_few_words(labels: Sequence[str], every: Sequence[str]) -> str:
+    """Return a list of labels; a part of them stands for all labels that have it.
+
+    Args:
+        labels: Some of them.
+        every: All labels of the page.
+
+    Returns:
+        "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
+        labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
+        themselves where they have not two parts.
+    """
+    if not have_two_parts(every):
+        return ", ".join(labels)
+    parts = [(label.split(BETWEEN)[0], label.split(BETWEEN)[1]) for label in every]
+    chosen = {own for own, label in zip(parts, every, strict=True) if label in set(labels)}
+    turned, chosen_turned = [own[::-1] for own in parts], {own[::-1] for own in chosen}
+    found = _grouped(chosen, parts), _grouped(chosen_turned, turned)
+    return min((", ".join(labels), *found), key=len)
+
+
+def _grouped(chosen: set[tuple[str, str]], parts: Sequence[tuple[str, str]]) -> str:
+    """Return pairs by their second parts, those together that are chosen of the same first ones."""
+    groups: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
+    for second in dict.fromkeys(own[1] for own in parts):
+        own = [pair for pair in parts if pair[1] == second]
+        in_it = tuple(first for first, _ in own if (first, second) in chosen)
+        out = tuple(first for first, _ in own if (first, second) not in chosen)
+        if in_it:
+            groups.setdefault((in_it, out), []).append(second)
+    words = []
+    for (in_it, out), names in groups.items():
+        where = (
+            f" except on {', '.join(out)}" if len(out) < len(in_it) else f" on {', '.join(in_it)}"
+        )
+        words.append(", ".join(names) + where * bool(out))
+    return "; ".join(words)

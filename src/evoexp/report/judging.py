@@ -4,15 +4,22 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report import markdown, verdicts
+from evoexp.report import markdown
 from evoexp.report.claim_rules import NO_RULES, OWN, Rule, Rules
+from evoexp.report.comparisons import Comparison
+from evoexp.report.page_parts import Claim
 from evoexp.report.parameters import option, planned_replicates
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
-from evoexp.report.verdicts import Claim, Comparison
+from evoexp.report.statistics import Proportion, fisher_exact
 from evoexp.shipped import config_directory, shipped
 
+REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
+    "reproduced",
+    "contradicted",
+    "inconclusive",
+    "not judged",
+)
 ONLY_CONTROLS = "only a control was run"
 
 
@@ -24,13 +31,16 @@ class Hearing(NamedTuple):
     significance: float  # below this adjusted p-value a difference counts
 
     def every(self, evidence: str, holds: int, done: int, planned: int) -> Claim:
-        """Judge a claim about every run; see `verdicts.judge_all`."""
-        return self._claim("every", evidence, done, verdicts.judge_all(holds, done, planned))
+        """Judge a claim about every run.
+
+        One counter-example contradicts; all planned runs are needed to reproduce.
+        """
+        return self._claim("every", evidence, done, 0 < planned <= done, holds < done)
 
     def majority(self, evidence: str, holds: int, done: int) -> Claim:
         """Judge a claim that is reproduced if it holds in more than half of the runs."""
-        verdict = verdicts.REPRODUCED if holds > done / 2 else verdicts.CONTRADICTED
-        return self._claim("majority", evidence, done, verdict if done else verdicts.INCONCLUSIVE)
+        most = holds > done / 2
+        return self._claim("majority", evidence, done, most, bool(done) and not most)
 
     def better(self, row: Comparison | None, word: str, told: str = "{}") -> Claim:
         """Judge a claim that the first condition of a comparison is better than the second.
@@ -40,36 +50,54 @@ class Hearing(NamedTuple):
             word: Of the one that is better: "lower", "earlier".
             told: The evidence; its {} stands for the comparison in words.
         """
-        verdict = verdicts.judge_better(row, self.significance)
+        says = row.says(self.significance) if row else 0
         words = evidence(row, word) if row else "nothing to compare"
         heard = self._replace(
             rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         )
-        return heard._claim("better", told.replace("{}", words), row and row.num_seeds, verdict)
+        counted = row and row.num_seeds
+        return heard._claim("better", told.replace("{}", words), counted, says == 1, says == -1)
 
     def better_than_all(self, evidence: str, rows: Sequence[Comparison]) -> Claim:
-        """Judge a claim that a condition is better than each of several others."""
-        verdict = verdicts.judge_better_than_all(rows, self.significance)
-        return self._claim("better than all", evidence, _seeds(rows), verdict)
+        """Judge a claim that a condition is better than each of several others.
+
+        One that is significantly better contradicts; all must be significantly worse to reproduce.
+        """
+        says = {row.says(self.significance) for row in rows}
+        return self._claim("better than all", evidence, _seeds(rows), says == {1}, -1 in says)
 
     def best(self, evidence: str, rows: Sequence[Comparison], best_median: bool) -> Claim:
-        """Judge a claim that one of several settings is the best; see `verdicts.judge_best`."""
-        verdict = verdicts.judge_best(rows, best_median, self.significance)
-        return self._claim("best", evidence, _seeds(rows), verdict)
+        """Judge a claim that one of several settings is the best.
+
+        One that is significantly better contradicts; it is reproduced if it has the best median and
+        one other setting at least is significantly worse: neighbours of a best setting are about as
+        good, so not all need be.
+        """
+        says = {row.says(self.significance) for row in rows}
+        holds = best_median and 1 in says
+        return self._claim("best", evidence, _seeds(rows), holds, -1 in says)
 
     def greater(
         self, evidence: str, one: Proportion, two: Proportion, p_adjusted: float | None = None
     ) -> Claim:
-        """Judge a claim that `one` is greater than `two`; see `verdicts.judge_greater`."""
-        verdict = verdicts.judge_greater(one, two, self.significance, p_adjusted)
-        return self._claim("greater", evidence, f"{one.total} and {two.total}", verdict)
+        """Judge a claim that `one` is greater than `two`, by Fisher's exact test.
+
+        Its p-value is given where it is one of several, adjusted.
+        """
+        p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
+        says = greater(one, two, p_value, self.significance)
+        counted = f"{one.total} and {two.total}"
+        return self._claim("greater", evidence, counted, says == 1, says == -1)
 
     def same_share(
         self, evidence: str, own: Proportion, printed: Proportion, p_adjusted: float
     ) -> Claim:
         """Judge a claim that gives a share, a sample itself, by Fisher's exact test."""
-        verdict = verdicts.judged(p_adjusted >= self.significance if own.total else None)
-        return self._claim("same share", evidence, f"{own.total} and {printed.total}", verdict)
+        same, counted = p_adjusted >= self.significance, f"{own.total} and {printed.total}"
+        is_known = own.total > 0
+        return self._claim(
+            "same share", evidence, counted, is_known and same, is_known and not same
+        )
 
     def own(self, evidence: str, n: object, holds: bool | None) -> Claim:
         """Judge a claim by a rule of its own, which its `claims.yaml` states.
@@ -79,18 +107,23 @@ class Hearing(NamedTuple):
             n: Runs, or whatever else was counted.
             holds: Whether it is reproduced; None: nobody can say.
         """
-        return self._claim(OWN, evidence, n, verdicts.judged(holds))
+        return self._claim(OWN, evidence, n, holds is True, holds is False)
 
     def elsewhere(self, evidence: str) -> Claim:
         """Return the claim unjudged: another experiment judges it, or nothing can."""
-        return self.made(evidence, "–", verdicts.NOT_JUDGED)
+        return self.made(evidence, "–", NOT_JUDGED)
 
-    def _claim(self, kind: str, evidence: str, n: object, verdict: str) -> Claim:
+    def _claim(
+        self, kind: str, evidence: str, n: object, reproduced: bool, contradicted: bool
+    ) -> Claim:
         if kind != self.rule.kind:
             raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
         # a comparison without a pair of runs
         reason = self.reason or ("nothing to compare" if n in (None, "0") else "")
-        return self.made(evidence, n, f"{verdicts.NOT_JUDGED} ({reason})" if reason else verdict)
+        if reason:
+            return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
+        verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else INCONCLUSIVE
+        return self.made(evidence, n, verdict)
 
     def made(self, evidence: str, n: object, verdict: str) -> Claim:
         """Return the claim with this evidence and verdict."""
@@ -102,6 +135,16 @@ def _seeds(rows: Sequence[Comparison]) -> str:
     """Return the numbers of common seeds: "20", or "18 to 20"."""
     counts = sorted({row.num_seeds for row in rows})
     return " to ".join(map(str, counts if len(counts) < 2 else (counts[0], counts[-1]))) or "0"
+
+
+def greater(one: Proportion, two: Proportion, p_value: float, significance: float) -> int:
+    """Return 1 if a proportion is significantly greater than another, −1 if smaller, else 0.
+
+    The p-value is that of Fisher's exact test, adjusted where it is one of several.
+    """
+    if not one.total or not two.total or p_value >= significance:
+        return 0
+    return int(one.share > two.share) - int(one.share < two.share)
 
 
 class Judge(NamedTuple):
@@ -158,10 +201,7 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
     missing = {row.label for row in rows} - {c.label for c in results.conditions}
     if not missing:
         return
-    known, verdict = (
-        {claim.name for claim in judged},
-        f"{verdicts.NOT_JUDGED} (conditions left out)",
-    )
+    known, verdict = {claim.name for claim in judged}, f"{NOT_JUDGED} (conditions left out)"
     for paper in names(CLAIMS):
         registration = registered(CLAIMS, paper)
         assert registration is not None

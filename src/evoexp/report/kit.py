@@ -13,25 +13,28 @@ protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 - the seed is the unit of all statistics: `spread`, `Proportion`, `fisher_exact`, `holm`, ….
 """
 
-from evoexp.report import body_contacts as body_contacts
-from evoexp.report import distance_ranges as distance_ranges
 from evoexp.report import judging as judging
 from evoexp.report import markdown as markdown
 from evoexp.report import motion_geometry as motion_geometry
 from evoexp.report import run_measures as run_measures
 from evoexp.report import style as style
 from evoexp.report import sweep_figures as sweep_figures
-from evoexp.report import verdicts as verdicts
 from evoexp.report.claim_rules import read_rules as read_rules
+from evoexp.report.comparisons import Comparison as Comparison
 from evoexp.report.comparisons import Values as Values
+from evoexp.report.comparisons import adjusted as adjusted
 from evoexp.report.comparisons import beside as beside
 from evoexp.report.comparisons import by_column as by_column
 from evoexp.report.comparisons import compared as compared
 from evoexp.report.comparisons import compared_with_controls as compared_with_controls
 from evoexp.report.figures import convergence as convergence
+from evoexp.report.figures import groups as groups
+from evoexp.report.figures import records as records
+from evoexp.report.figures import rounded as rounded
 from evoexp.report.figures import shares as shares
 from evoexp.report.judging import Judge as Judge
 from evoexp.report.judging import evidence as evidence
+from evoexp.report.page_parts import Claim as Claim
 from evoexp.report.page_parts import Drawing as Drawing
 from evoexp.report.page_parts import Page as Page
 from evoexp.report.page_parts import PlayedRun as PlayedRun
@@ -43,16 +46,10 @@ from evoexp.report.pages.assumptions import Headline as Headline
 from evoexp.report.parameters import overridden as overridden
 from evoexp.report.parameters import parameters as parameters
 from evoexp.report.parameters import planned_replicates as planned_replicates
-from evoexp.report.proportions import Proportion as Proportion
-from evoexp.report.proportions import fisher_exact as fisher_exact
-from evoexp.report.proportions import newcombe as newcombe
 from evoexp.report.report_settings import ReportSettings as ReportSettings
 from evoexp.report.results import ConditionResults as ConditionResults
 from evoexp.report.results import Results as Results
 from evoexp.report.results import wrapped as wrapped
-from evoexp.report.rows import groups as groups
-from evoexp.report.rows import records as records
-from evoexp.report.rows import rounded as rounded
 from evoexp.report.run_measures import counted as counted
 from evoexp.report.run_measures import grouped as grouped
 from evoexp.report.run_measures import median_replicate as median_replicate
@@ -62,12 +59,13 @@ from evoexp.report.run_measures import solved as solved
 from evoexp.report.run_measures import success as success
 from evoexp.report.statistics import BOOTSTRAP_SEED as BOOTSTRAP_SEED
 from evoexp.report.statistics import Interval as Interval
+from evoexp.report.statistics import Proportion as Proportion
 from evoexp.report.statistics import effort_ratio as effort_ratio
 from evoexp.report.statistics import expected_effort as expected_effort
 from evoexp.report.statistics import expected_interval as expected_interval
+from evoexp.report.statistics import fisher_exact as fisher_exact
 from evoexp.report.statistics import holm as holm
+from evoexp.report.statistics import newcombe as newcombe
 from evoexp.report.statistics import quantile as quantile
 from evoexp.report.statistics import quantiles as quantiles
 from evoexp.report.statistics import spread as spread
-from evoexp.report.verdicts import Claim as Claim
-from evoexp.report.verdicts import Comparison as Comparison

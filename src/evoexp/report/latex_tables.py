@@ -3,7 +3,7 @@ r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs}`.
 import re
 from collections.abc import Iterable, Sequence
 
-from evoexp.report.page_text import Document, Section, TableText
+from evoexp.report.page_parts import Document, Table
 
 LONG_TEXT = 30  # letters of a cell, from which on its column breaks lines
 NARROWEST = 14  # letters of a line in such a column
@@ -59,21 +59,11 @@ def escaped(text: str) -> str:
 
 def latex_tables(document: Document) -> dict[str, bytes]:
     """Return the tables of a page, by the names of their files."""
-    return {
-        section.table.file: _latex(section, section.table, document).encode()
-        for section in document.sections
-        if section.table and section.table.file
-    }
+    return {t.file: _latex(t, document).encode() for t in document.tables if t.file}
 
 
 def tabular(headers: Iterable[str], rows: Iterable[Iterable[str]], columns: str) -> list[str]:
-    """Return the lines of a table without its frame.
-
-    Args:
-        headers: Heads of the columns, in LaTeX.
-        rows: Their cells, in LaTeX.
-        columns: How the columns stand: "lrr".
-    """
+    """Return the lines of a table without its frame; heads and cells are LaTeX, columns "lrr"."""
     return [
         rf"\begin{{tabular}}{{{columns}}}",
         r"\toprule",
@@ -85,17 +75,21 @@ def tabular(headers: Iterable[str], rows: Iterable[Iterable[str]], columns: str)
     ]
 
 
-def _latex(section: Section, table: TableText, document: Document) -> str:
+def _latex(table: Table, document: Document) -> str:
     size, columns, fits = _layout(table)
     lines = tabular(map(_cell, table.headers), (map(_cell, row) for row in table.rows), columns)
+    # heading, note, and whose runs these are
+    note = f" {table.note}" if table.note else ""
+    caption = f"{document.title}: {table.heading}.{note} {document.provenance}".replace("`", "")
+    words = f"{document.experiment or document.runs[0].hash12} {table.heading}"
     framed = [
         f"% made by {' '.join(document.command.split())}",
         f"% runs: {', '.join(run.hash12 for run in document.runs)}",
         *([] if fits else [r"% wider than a line, so made smaller: needs \usepackage{graphicx}"]),
         r"\begin{table}",
         rf"\centering\{size}",
-        rf"\caption{{{escaped(_caption(section, table, document))}}}",
-        rf"\label{{tab:{_label(section, document)}}}",
+        rf"\caption{{{escaped(caption)}}}",
+        rf"\label{{tab:{'-'.join(re.findall('[a-z0-9]+', words.lower()))}}}",
         *([] if fits else [r"\resizebox{\linewidth}{!}{%"]),
         *lines[:-1],
         lines[-1] + "}" * (not fits),
@@ -105,18 +99,7 @@ def _latex(section: Section, table: TableText, document: Document) -> str:
     return "\n".join(framed)
 
 
-def _caption(section: Section, table: TableText, document: Document) -> str:
-    """Return the heading, the note, and whose runs these are."""
-    note = f" {table.note}" if table.note else ""
-    return f"{document.title}: {section.heading}.{note} {document.provenance}".replace("`", "")
-
-
-def _label(section: Section, document: Document) -> str:
-    words = f"{document.experiment or document.runs[0].hash12} {section.heading}"
-    return "-".join(re.findall("[a-z0-9]+", words.lower()))
-
-
-def _layout(table: TableText) -> tuple[str, str, bool]:
+def _layout(table: Table) -> tuple[str, str, bool]:
     """Return the size of the type, how columns stand, and whether all of it fits on a line.
 
     Numbers stand to the right, long texts as paragraphs in the room that the others leave.

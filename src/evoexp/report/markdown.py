@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from evoexp.report.page_text import PICTURES, Document, FigureText, Section, TableText
+from evoexp.report.page_parts import PICTURES, Document, Figures, FigureText, Table
 from evoexp.report.statistics import Interval, Spread
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
@@ -24,18 +24,12 @@ def page(document: Document) -> str:
     return inert("\n".join(part for part in parts if part))
 
 
-def _section(section: Section) -> str:
-    parts = [
-        f"{section.introduction}\n" if section.introduction else "",
-        _table_with_note(section.table) if section.table else "",
-        *(_figure(figure) for figure in section.figures),
-    ]
-    return "\n".join(part for part in parts if part)
-
-
-def _table_with_note(text: TableText) -> str:
-    note = f"\n{text.note}\n" * bool(text.note)
-    return table(text.headers, text.rows) + note + f"\n[tex]({text.file})\n" * bool(text.file)
+def _section(section: Table | Figures) -> str:
+    if isinstance(section, Figures):
+        return "\n".join(map(_figure, section.figures))
+    note = f"\n{section.note}\n" * bool(section.note)
+    file = f"\n[tex]({section.file})\n" * bool(section.file)
+    return table(section.headers, section.rows) + note + file
 
 
 def _figure(figure: FigureText) -> str:

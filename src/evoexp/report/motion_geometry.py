@@ -1,7 +1,11 @@
-"""Geometry of stored motions: places of links, outlines of obstacles, distances of bodies."""
+"""Geometry of stored motions: places of links, outlines of obstacles, distances and contacts.
+
+Motions are looked at one after the other and not kept, so that ten thousand take no more memory
+than one.
+"""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,13 +13,18 @@ import pandas as pd
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
+from evoexp.collision.certifier.certificate import PAIR
+from evoexp.collision.certifier.least_distance import LeastDistance, known
+from evoexp.collision.scene import Scene
 from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
+from evoexp.report.results import ConditionResults
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ELLIPSE, HALF_SPACE, SPHERE, ObstacleTable
 
 OUTLINE_POINTS = 49  # of a round obstacle
+Measure = Callable[[FloatArray], FloatArray]  # (nq, configurations) → (configurations,)
 LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]  # columns of `links_table`
 
 
@@ -118,9 +127,8 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
         else:
             along = np.zeros(2) if kind == SPHERE else size[1] * matrix[:2, 2]
             outline = size[0] * circle + np.where((circle @ along >= 0.0)[:, None], along, -along)
-            if (
-                kind != SPHERE and along.any()
-            ):  # the outline begins where it turns from one end to the other
+            # the outline begins where it turns from one end to the other
+            if kind != SPHERE and along.any():
                 first = int(np.argmax(np.diff(circle @ along >= 0.0))) + 1
                 outline = np.roll(outline[:-1], -first, axis=0)
                 outline = np.vstack([outline, outline[:1]])
@@ -132,24 +140,14 @@ class BodyDistance:
     """Exact distances between bodies, by coal."""
 
     def __init__(self, model: Any, geometry: Any) -> None:
-        """Take a robot and the pairs of bodies that are looked at.
-
-        Args:
-            model: A `pin.Model`.
-            geometry: A `pin.GeometryModel` with its collision pairs.
-        """
+        """Take a `pin.Model`, and its `pin.GeometryModel` with the pairs that are looked at."""
         self._model, self._geometry = model, geometry
         self._data, self._placements = model.createData(), geometry.createData()
 
     def nearest(self, q: FloatArray, pair: int | None = None) -> Nearest:
         """Return the nearest points of two bodies at one configuration (nq,) [rad].
 
-        Args:
-            q: The configuration.
-            pair: Number of the pair; None: the closest one.
-
-        Returns:
-            The points with their distance, 0 where bodies touch.
+        `pair` is the number of the pair, None: the closest one. Where bodies touch it is 0.
         """
         pin.computeDistances(self._model, self._data, self._geometry, self._placements, q)
         results = list(self._placements.distanceResults)
@@ -221,3 +219,74 @@ def _frames(assembly: Assembly, q: FloatArray) -> Iterator[FloatArray]:
     for configuration in q.T:
         pin.forwardKinematics(assembly.model, data, DEGREE * configuration)
         yield np.array([placement.homogeneous for placement in data.oMi])
+
+
+def refuted(condition: ConditionResults) -> dict[int, tuple[float, str]]:
+    """Return the first contact of every refuted motion: replicate → (instant, its pair)."""
+    rows = condition.summaries[condition.summaries["refuted_at"].notna()]
+    columns = zip(rows.index, rows["refuted_at"], rows["refuted_pair"], strict=True)
+    return {int(k): (float(instant), str(pair)) for k, instant, pair in columns}
+
+
+def contact(
+    prepared: Prepared, solution: FloatArray, instant: float, pair: str
+) -> tuple[float, float]:
+    """Return the point in the plane, (x, y), at which two bodies touch."""
+    planner, problem = prepared
+    motion = planner.motion(problem, solution)
+    scene = next(p.scene for p in planner.parts(problem, motion) if p.first <= instant <= p.last)
+    number = [PAIR.join(scene.pair_names(k)) for k in range(len(scene.pairs))].index(pair)
+    points = BodyDistance(scene.model, scene.geometry).nearest(motion.at(instant), number).points
+    x, y, _ = np.mean(points, axis=0)
+    return float(x), float(y)
+
+
+class Extremes(NamedTuple):
+    """The least and the greatest value at each instant, and the configurations that have them."""
+
+    lowest: FloatArray  # (instants,); inf where nothing was seen
+    highest: FloatArray  # (instants,); −inf where nothing was seen
+    at_lowest: FloatArray  # (nq, instants), of the first replicate of several
+    at_highest: FloatArray  # (nq, instants), of the first replicate of several
+
+    def with_others(self, later: "Extremes") -> "Extremes":
+        """Return the extremes of these and others, of which these come first."""
+        own, later = self._of_length(len(later.lowest)), later._of_length(len(self.lowest))
+        lower, higher = later.lowest < own.lowest, later.highest > own.highest
+        return Extremes(
+            np.where(lower, later.lowest, own.lowest),
+            np.where(higher, later.highest, own.highest),
+            np.where(lower, later.at_lowest, own.at_lowest),
+            np.where(higher, later.at_highest, own.at_highest),
+        )
+
+    def _of_length(self, length: int) -> "Extremes":
+        """Return them with so many instants at least."""
+        more = max(0, length - len(self.lowest))
+        if not more:
+            return self
+        lowest = np.pad(self.lowest, (0, more), constant_values=np.inf)
+        highest = np.pad(self.highest, (0, more), constant_values=-np.inf)
+        at = (np.pad(q, ((0, 0), (0, more))) for q in (self.at_lowest, self.at_highest))
+        return Extremes(lowest, highest, *at)
+
+
+def extremes(
+    replicates: Sequence[int], sampled: Callable[[int], FloatArray], measures: Sequence[Measure]
+) -> tuple[Extremes, ...]:
+    """Return the extremes of several quantities over replicates, one at least.
+
+    `sampled` gives a replicate's motion, (nq, instants).
+    """
+    found: list[Extremes] = []
+    for replicate in replicates:
+        q = sampled(replicate)
+        own = [Extremes(values, values, q, q) for values in (measure(q) for measure in measures)]
+        pairs = zip(found, own, strict=True)
+        found = [seen.with_others(later) for seen, later in pairs] if found else own
+    return tuple(found)
+
+
+def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:
+    """Return a quick measure of a scene's least distance; coal where it alone knows bodies."""
+    return LeastDistance(scene) if known(scene) else exact

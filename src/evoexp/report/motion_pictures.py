@@ -1,17 +1,19 @@
 """Pictures of the motions that any planner found: scene, stages, joints, covers."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.playback import player_page
 from evoexp.playback.recording import Heading, NoMotion, Recording, record
-from evoexp.records import FloatArray
 from evoexp.report.figures import motion_scenes, motion_tables
-from evoexp.report.page_parts import Drawing, PlayedRun
+from evoexp.report.page_parts import Drawing, PlayedRun, Player
 from evoexp.report.results import ConditionResults, Results
 
+JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`
+VERDICTS = {True: "certified", False: "refuted", None: "undecided"}
 MOST = 4  # conditions whose motions are shown, those with the least best cost
 
 
@@ -23,14 +25,35 @@ class ShownMotion(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Label, replicate and verdict, as one line."""
-        verdict = {True: "certified", False: "refuted", None: "undecided"}
-        return f"{self.condition.label}: {verdict[self.recording.verdict.certified]}"
+        """Label and verdict, as one line."""
+        return f"{self.condition.label}: {VERDICTS[self.recording.verdict.certified]}"
 
     @property
     def run(self) -> PlayedRun:
         """The run, to be played beside a figure."""
         return PlayedRun(self.condition, self.recording.heading.replicate)
+
+
+def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, int], Player]:
+    """Return the players of all motions that figures show, each once, by the keys of the runs.
+
+    The name of the experiment is empty for runs given by their hashes.
+    """
+    runs = {run.key: run for drawing in drawings for run in drawing.plays}
+    players = ((key, _player(experiment, run)) for key, run in runs.items())
+    return {key: player for key, player in players if player}
+
+
+def _player(experiment: str, run: PlayedRun) -> Player | None:
+    """Return the player of a run; None if its solution is no motion."""
+    c, k = run
+    try:
+        title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
+        found = record(c.condition, c.solutions[k], Heading(title, k))
+    except NoMotion:
+        return None
+    words = f"{c.label}, replicate {k}: {VERDICTS[found.verdict.certified]}"
+    return Player(words, f"motion_{c.condition.id[:12]}_{k:04d}.html", player_page.page([found]))
 
 
 def best_motions(results: Results) -> list[ShownMotion]:
@@ -54,7 +77,7 @@ def drawings(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     if not shown:
         return ()
     best = min(shown, key=lambda each: _best_cost(each.condition))
-    found = [
+    return (
         *scene_drawing(shown),
         Drawing(
             "stages",
@@ -68,28 +91,26 @@ def drawings(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
             "joints",
             "Joints over the motion",
             "Each joint between its limits (dashed) over the same motion.",
-            partial(motion_tables.joints_table, best.recording, _limits(best)),
+            partial(motion_tables.joints_table, best.recording),
             motion_scenes.draw_joints,
             (best.condition,),
         ),
-    ]
-    return (*found, *_cover_drawing(shown))
+        *_cover_drawing(shown),
+    )
 
 
 def scene_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     """Return the figure of robots and scenes, with the motions to be played; none without any."""
     if not shown:
         return ()
-    titled = [(each.title, each.recording) for each in shown]
-    conditions = tuple(each.condition for each in shown)
     found = Drawing(
         "scene",
         "Robot, scene and way",
         "The best replicate of each condition: exact bodies at start and goal, and the way of "
         "each tool. Meshes are drawn by their convex hulls.",
-        partial(motion_tables.scenes_table, titled),
+        partial(motion_tables.scenes_table, [(each.title, each.recording) for each in shown]),
         motion_scenes.draw_scenes,
-        conditions,
+        tuple(each.condition for each in shown),
         tuple(each.run for each in shown),
     )
     return (found,)
@@ -108,37 +129,27 @@ def notes(shown: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
 
 def _cover_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     """Return the figure of bodies beside covers: one row per robot that has covers."""
-    rows, conditions = [], []
-    seen: list[object] = []
+    rows: dict[object, tuple[str, Recording, Sequence[Any]]] = {}
+    conditions = []
     for each in shown:
         planner, problem = each.condition.prepared
         covers = tuple(planner.covers(problem))
-        robot = each.condition.condition.robot
-        key = (robot, len(covers))
-        if covers and key not in seen:
-            seen.append(key)
-            rows.append((each.condition.label, each.recording, covers))
+        key = each.condition.condition.robot, len(covers)
+        if covers and key not in rows:
+            rows[key] = each.condition.label, each.recording, covers
             conditions.append(each.condition)
     if not rows:
         return ()
-    return (
-        Drawing(
-            "covers",
-            "Bodies and covers",
-            "The exact bodies, which verdicts are about, beside the spheres and capsules that the "
-            "search tests in their place.",
-            partial(motion_tables.covers_table, rows),
-            motion_scenes.draw_covers,
-            tuple(conditions),
-        ),
+    found = Drawing(
+        "covers",
+        "Bodies and covers",
+        "The exact bodies, which verdicts are about, beside the spheres and capsules that the "
+        "search tests in their place.",
+        partial(motion_tables.covers_table, list(rows.values())),
+        motion_scenes.draw_covers,
+        tuple(conditions),
     )
-
-
-def _limits(shown: ShownMotion) -> FloatArray:
-    """Return the limits of the robot's joints, (nq, 2), infinite where there is none."""
-    model = shown.recording.parts[0].scene.model
-    limits = np.array([model.lowerPositionLimit, model.upperPositionLimit], dtype=np.float64).T
-    return np.where(np.abs(limits) < 1e6, limits, np.copysign(np.inf, limits))
+    return (found,)
 
 
 def _best_cost(condition: ConditionResults) -> float:

@@ -8,16 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.report import markdown
-from evoexp.report.comparisons import Values, by_column, compared
+from evoexp.report.comparisons import Comparison, Values, by_column, compared
+from evoexp.report.comparisons import adjusted as adjusted_rows
 from evoexp.report.figures import matrix
 from evoexp.report.page_parts import Drawing, Table
-from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.run_measures import search_seconds, success
-from evoexp.report.statistics import holm
-from evoexp.report.verdicts import Comparison
-from evoexp.report.verdicts import adjusted as adjusted_rows
+from evoexp.report.statistics import Proportion, fisher_exact, holm, newcombe
 
 MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import Proportion
 
 
 def planned_by(results: Results, planner: type) -> bool:

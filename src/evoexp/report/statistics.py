@@ -57,6 +57,34 @@ class SignedRank(NamedTuple):
         return int(twice > total) - int(twice < total)
 
 
+class Proportion(NamedTuple):
+    """A count of runs that have a property."""
+
+    having: int  # runs that have it
+    total: int  # all runs
+
+    @property
+    def share(self) -> float:
+        """In [0, 1]; NaN without runs."""
+        return self.having / self.total if self.total else math.nan
+
+    def interval(self, confidence: float) -> Interval:
+        """Return Wilson's score interval; [0, 1] without runs."""
+        if not self.total:
+            return Interval(0.0, 1.0)
+        found = stats.binomtest(self.having, self.total).proportion_ci(confidence, method="wilson")
+        return Interval(float(found.low), float(found.high))
+
+    def with_interval(self, confidence: float, decimals: int = 0) -> str:
+        """Return the proportion and its interval in words: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
+        if not self.total:
+            return "0 of 0"
+        share, low, high = (
+            f"{100 * value:.{decimals}f}" for value in (self.share, *self.interval(confidence))
+        )
+        return f"{self.having} of {self.total} = {share} % [{low}, {high}]"
+
+
 class RankSum(NamedTuple):
     """Mann and Whitney's test of two independent samples."""
 
@@ -114,23 +142,11 @@ def spread(values: FloatArray) -> Spread:
     return Spread(median, lower, upper, int(np.count_nonzero(~np.isnan(values))))
 
 
-def wilson(successes: int, trials: int, confidence: float) -> Interval:
-    """Return Wilson's score interval of a proportion; [0, 1] without trials."""
-    if trials == 0:
-        return Interval(0.0, 1.0)
-    low, high = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    return Interval(float(low), float(high))
-
-
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
-    """Test whether paired values differ (Wilcoxon 1945); ties share their mean rank.
+    """Test whether paired values (pairs,) differ (Wilcoxon 1945); ties share their mean rank.
 
-    The p-value is the same for (y, x): it is summed over the lower tail, which W+ of one order and
-    W− of the other share.
-
-    Args:
-        x: (pairs,); infinite values are compared as such, equal pairs are left out.
-        y: (pairs,).
+    Infinite values are compared as such, equal pairs are left out. The p-value is the same for
+    (y, x): it is summed over the lower tail, which W+ of one order and W− of the other share.
     """
     differing = x != y
     difference = x[differing] - y[differing]
@@ -150,11 +166,7 @@ def _lower_tail(ranks: FloatArray, limit: float) -> float:
     """Return the probability that ranks with random signs give a W+ up to a limit.
 
     The exact distribution, built rank by rank: sums of positive numbers alone, so that no digit is
-    lost however small they are.
-
-    Args:
-        ranks: (n,) multiples of 1/2.
-        limit: A multiple of 1/2.
+    lost however small they are. All numbers are multiples of 1/2.
     """
     share = np.zeros(int(2.0 * limit) + 1)  # by twice the sum
     share[0] = 1.0
@@ -166,11 +178,9 @@ def _lower_tail(ranks: FloatArray, limit: float) -> float:
 
 
 def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
-    """Test whether two samples differ (Mann and Whitney 1947); ties share their mean rank.
+    """Test whether two samples (n,) and (m,) differ (Mann and Whitney 1947).
 
-    Args:
-        x: (n,); infinite values are compared as such.
-        y: (m,).
+    Ties share their mean rank, infinite values are compared as such.
     """
     values = np.concatenate([x, y])
     if not len(x) or not len(y) or (values == values[0]).all():
@@ -178,23 +188,34 @@ def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
     if len(np.unique(values)) == len(values) <= EXACT_VALUES:
         found = stats.mannwhitneyu(x, y, method="exact")
     elif len(values) <= MOST_CHOSEN:  # with ties: every choice of the first sample's ranks
-        return _chosen_ranks(stats.rankdata(values), len(x))
+        ranks, size = stats.rankdata(values), len(x)
+        observed = float(ranks[:size].sum())
+        sums = np.array([sum(chosen) for chosen in itertools.combinations(ranks, size)])
+        p_value = 2.0 * min(float(np.mean(sums <= observed)), float(np.mean(sums >= observed)))
+        return RankSum(observed - 0.5 * size * (size + 1), min(1.0, p_value))
     else:  # corrected for ties and continuity
         found = stats.mannwhitneyu(x, y, method="asymptotic")
     return RankSum(float(found.statistic), float(found.pvalue))
 
 
-def _chosen_ranks(ranks: FloatArray, size: int) -> RankSum:
-    """Test the sum of the first ranks against that of all choices of as many.
+def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
+    """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10).
 
-    Args:
-        ranks: (n + m,) of both samples, multiples of 1/2.
-        size: Of the first sample, n.
+    Where one of them has no runs it is [−1, 1].
     """
-    observed = float(ranks[:size].sum())
-    sums = np.array([sum(chosen) for chosen in itertools.combinations(ranks, size)])
-    p_value = 2.0 * min(float(np.mean(sums <= observed)), float(np.mean(sums >= observed)))
-    return RankSum(observed - 0.5 * size * (size + 1), min(1.0, p_value))
+    if not one.total or not two.total:
+        return Interval(-1.0, 1.0)
+    (low_one, high_one), (low_two, high_two) = one.interval(confidence), two.interval(confidence)
+    difference = one.share - two.share
+    below = math.sqrt((one.share - low_one) ** 2 + (high_two - two.share) ** 2)
+    above = math.sqrt((high_one - one.share) ** 2 + (two.share - low_two) ** 2)
+    return Interval(difference - below, difference + above)
+
+
+def fisher_exact(one: Proportion, two: Proportion) -> float:
+    """Return the two-sided p of Fisher's exact test: all tables at most as likely as this one."""
+    table = np.array([[each.having, each.total - each.having] for each in (one, two)])
+    return float(stats.fisher_exact(table).pvalue)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
@@ -215,29 +236,14 @@ def vargha_delaney(x: FloatArray, y: FloatArray) -> float:
 
 
 def _ranks(x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many of y lie below each of x, and how many up to it; none of a NaN.
-
-    Args:
-        x: (n,).
-        y: (m,).
-
-    Returns:
-        (n,) and (n,).
-    """
+    """Return how many of y (m,) lie below each of x (n,), and how many up to it; none of a NaN."""
     ordered, known = np.sort(y), ~np.isnan(x)
     below, up_to = (np.searchsorted(ordered, x, side) for side in ("left", "right"))
     return np.where(known, below, 0), np.where(known, up_to, 0)
 
 
 def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) -> Effect:
-    """Return A12 of paired values with a percentile interval over resampled pairs.
-
-    Args:
-        x: (pairs,).
-        y: (pairs,).
-        confidence: Level of the interval.
-        num_resamples: Of the bootstrap.
-    """
+    """Return A12 of paired values (pairs,) with a percentile interval over resampled pairs."""
     if not len(x):
         return Effect(math.nan, Interval(math.nan, math.nan))
     (below, up_to), order = _ranks(x, y), np.argsort(y, kind="stable")
@@ -271,13 +277,9 @@ def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
 def expected_interval(
     effort: FloatArray, solved: np.ndarray, confidence: float, num_resamples: int
 ) -> Interval:
-    """Return an interval of the expected running time; without a success it has no upper end.
+    """Return a bootstrap interval of the expected running time of runs (runs,).
 
-    Args:
-        effort: (runs,).
-        solved: (runs,).
-        confidence: Level of the interval.
-        num_resamples: Of the bootstrap.
+    Without a success it has no upper end.
     """
     low, high = percentiles(_resampled_effort(effort, solved, num_resamples), confidence)
     return Interval(low, high if solved.any() else math.inf)
@@ -291,13 +293,8 @@ def effort_ratio(
 ) -> Interval:
     """Return the percentile interval of the ratio of two expected running times, one over two.
 
-    Both are of the same seeds. If neither has a success, the interval is [0, inf].
-
-    Args:
-        one: Effort and success of every run, (runs,) each.
-        two: The same of other runs with the same seeds.
-        confidence: Level of the interval.
-        num_resamples: Of the bootstrap.
+    Both are effort and success of every run, (runs,) each, of the same seeds. If neither has a
+    success, the interval is [0, inf].
     """
     (effort_one, solved_one), (effort_two, solved_two) = one, two
     if not solved_one.any() or not solved_two.any():
@@ -334,13 +331,7 @@ def _resampled_effort(
     these seeds. Half a success and half a failure that nobody saw are added (Jeffreys' prior of the
     share), as without them few failures, or none, would say too much. They cost the mean of their
     kind; a kind that was never seen costs nothing as a success, and twice the dearest run as a
-    failure.
-
-    Args:
-        effort: (runs,).
-        solved: (runs,).
-        num_resamples: Of the bootstrap.
-        stream: Of the added runs' weights; another one for each condition of a comparison.
+    failure. Their weights are drawn from a stream of their own in each condition of a comparison.
     """
     won = np.asarray(solved, dtype=bool)
     of_success = float(effort[won].mean()) if won.any() else 0.0

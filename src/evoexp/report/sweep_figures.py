@@ -5,13 +5,13 @@ from functools import partial
 
 import numpy as np
 
+from evoexp.report.comparisons import Comparison
 from evoexp.report.figures import effects, shares
 from evoexp.report.figures.effects import Values
 from evoexp.report.page_parts import Drawing
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
-from evoexp.report.verdicts import Comparison
+from evoexp.report.statistics import Proportion
 
 WHISKERS = "whiskers to the last value within 1.5 interquartile ranges"
 CENSORED = (

@@ -9,7 +9,7 @@ from evoexp.papers.chen.path_measures import Group
 from evoexp.papers.chen.rules import RULES
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import judging, markdown, verdicts
+from evoexp.report.kit import judging, markdown
 
 DISTANCE, UNSAFENESS, COST = "term_distance", "term_unsafeness", "best_cost"
 
@@ -97,7 +97,7 @@ def _compromise(
         for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
         for row in rows
     )
-    rows = verdicts.adjusted([*safer, *shorter])
+    rows = kit.adjusted([*safer, *shorter])
     safest = next(iter(_compared(c, b, UNSAFENESS, settings)), None)
     return (
         judge.on("compromise", condition=b.label, first=a.label, last=c.label).better_than_all(

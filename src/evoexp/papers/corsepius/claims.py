@@ -6,7 +6,7 @@ from evoexp.papers import run_values
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import kit
-from evoexp.report.kit import judging, markdown, verdicts
+from evoexp.report.kit import judging, markdown
 
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
@@ -104,7 +104,7 @@ def _planning_time(judge: kit.Judge, condition: kit.ConditionResults) -> Iterato
         f"{cycles.min():.0f} to {cycles.max():.0f} cycles; theirs: a Pentium III, and some 30 000 "
         f"spheres to this model's {shapes}"
     )
-    verdict = f"{verdicts.NOT_JUDGED} (another machine, another model)"
+    verdict = f"{judging.NOT_JUDGED} (another machine, another model)"
     yield judge.on("planning_time", who=condition.label).made(told, condition.done, verdict)
 
 

@@ -10,7 +10,7 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import kit
-from evoexp.report.kit import markdown, verdicts
+from evoexp.report.kit import judging, markdown
 
 RECOMMENDED = 100.0  # individuals (section 5)
 METRICS: dict[str, kit.Values] = {
@@ -151,7 +151,7 @@ def _converges_less(
         [kit.fisher_exact(kit.success(c), kit.success(own)) for _, _, c, own in pairs]
     )
     says = [
-        verdicts.greater(kit.success(own), kit.success(c), p, settings.significance)
+        judging.greater(kit.success(own), kit.success(c), p, settings.significance)
         for (_, _, c, own), p in zip(pairs, adjusted, strict=True)
     ]
     clear = [pair for pair, said in zip(pairs, says, strict=True) if said]

@@ -8,7 +8,7 @@ from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import methods
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report import kit
-from evoexp.report.kit import generic, judging, markdown, verdicts
+from evoexp.report.kit import generic, judging, markdown
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 
@@ -59,7 +59,7 @@ def _claims(
     costs: tuple[kit.Comparison, ...],
     certified: tuple[kit.Comparison, ...],
     threshold: float,
-) -> tuple[verdicts.Claim, ...]:
+) -> tuple[kit.Claim, ...]:
     judge = judging.judge(results, settings, RULES)
     found = [
         judge.on("faster", who="", measure=title, pair=f": {row.quantity}").better(row, word)

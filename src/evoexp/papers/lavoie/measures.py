@@ -10,7 +10,7 @@ from evoexp.planners.proofs import judge_motion
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import body_contacts
+from evoexp.report.kit import motion_geometry
 
 PRINTED_RUNS = 1000  # section 5: "a thousand experiments were conducted for each simulation"
 Contact = tuple[float, str]
@@ -93,7 +93,7 @@ def touches(condition: kit.ConditionResults) -> np.ndarray:
 def refuted_paths(condition: kit.ConditionResults) -> np.ndarray:
     """Return which sub-paths of each run's motion the exact verdict refutes, (done, 2)."""
     refuted = np.zeros((condition.done, 2), dtype=bool)
-    for replicate, verdict in body_contacts.refuted(condition).items():
+    for replicate, verdict in motion_geometry.refuted(condition).items():
         row = condition.summaries.index.get_loc(replicate)
         for instant, _ in contacts(condition, replicate, verdict):
             refuted[row, int(instant >= 1.0)] = True

@@ -11,7 +11,7 @@ from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import PAPER, RULES
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.report import kit
-from evoexp.report.kit import body_contacts, generic, judging, markdown, run_measures
+from evoexp.report.kit import generic, judging, markdown, motion_geometry, run_measures
 
 ACCEPTED = "Accepted motions that touch an obstacle between tested positions (exact verdict)"
 REMOVED = (
@@ -179,7 +179,7 @@ def _postures(name: str, shown: list[ShownMotion]) -> kit.Drawing:
 
 def _solution(condition: kit.ConditionResults, replicate: int) -> ShownMotion:
     """Return a run as it is drawn: its error, its contacts."""
-    verdict = body_contacts.refuted(condition).get(replicate)
+    verdict = motion_geometry.refuted(condition).get(replicate)
     found = measures.contacts(condition, replicate, verdict) if verdict else []
     error = float(measures.errors(condition)[condition.summaries.index.get_loc(replicate)])
     title = f"{condition.label}: run {replicate}, error {markdown.number(error)}"

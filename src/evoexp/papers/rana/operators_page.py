@@ -7,7 +7,7 @@ import numpy as np
 from evoexp.papers.rana import crossover_checks, measures
 from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.report import kit
-from evoexp.report.kit import generic, judging, markdown, run_measures, sweep_figures, verdicts
+from evoexp.report.kit import generic, judging, markdown, run_measures, sweep_figures
 
 
 class ComparedQuantity(NamedTuple):
@@ -113,7 +113,7 @@ def operator_claims(
         compared_rows = [rows[name].get(part.label) for name in rows]
         found = [row for row in compared_rows if row is not None]
         says = [row.says(settings.significance) for row in found]
-        says.append(verdicts.greater(other, own, p_value, settings.significance))
+        says.append(judging.greater(other, own, p_value, settings.significance))
         told = (
             f"{_told(rows[COST].get(part.label), COST, '–')}; "
             f"{_told(rows[EVENNESS].get(part.label), EVENNESS, 'deg', (printed, part))}; "

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report import style
+from evoexp.report.figures import groups
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.rows import groups
 from evoexp.report.statistics import quantiles
 
 COLUMNS = ("best_cost", "mean_cost")

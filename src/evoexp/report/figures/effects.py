@@ -12,11 +12,11 @@ from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray, IntArray
 from evoexp.report import style
+from evoexp.report.comparisons import Comparison
+from evoexp.report.figures import groups
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.rows import groups
 from evoexp.report.statistics import quantile
-from evoexp.report.verdicts import Comparison
 
 WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn

@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.report import style
-from evoexp.report.rows import records
-from evoexp.report.verdicts import Comparison
+from evoexp.report.comparisons import Comparison
+from evoexp.report.figures import records
 
 SIZE = 0.44  # [inch] of a cell
 LONGEST = 28  # characters of a name beside the matrix

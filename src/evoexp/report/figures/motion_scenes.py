@@ -15,9 +15,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from evoexp.playback.colours import OBJECT, OBSTACLE
 from evoexp.records import FloatArray
 from evoexp.report import style
-from evoexp.report.figures import surfaces
+from evoexp.report.figures import groups, records, surfaces
 from evoexp.report.figures.motion_tables import POSE, SIZE
-from evoexp.report.rows import groups, records
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}

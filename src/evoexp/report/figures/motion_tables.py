@@ -13,9 +13,9 @@ import pinocchio as pin
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import Outline, Shape
 from evoexp.records import FloatArray
-from evoexp.report.figures import surfaces
-from evoexp.report.rows import rounded
+from evoexp.report.figures import rounded, surfaces
 
+NO_LIMIT = 1e6  # [rad, length unit] from here on a joint has no limit
 STAGES = 5  # pictures of a motion besides that of its whole way
 POSE = ["x", "y", "z", "qx", "qy", "qz", "qw"]
 SIZE = ["size_1", "size_2", "size_3"]
@@ -78,17 +78,15 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.Da
     return pd.concat(tables, ignore_index=True)
 
 
-def joints_table(recording: Recording, limits: FloatArray) -> pd.DataFrame:
-    """Return all joints over a motion.
-
-    Args:
-        recording: The motion.
-        limits: (nq, 2) of the robot [rad, length unit]; infinite where there is none.
+def joints_table(recording: Recording) -> pd.DataFrame:
+    """Return all joints over a motion, with the robot's limits, infinite where there is none.
 
     Returns:
         Columns joint, unit (deg or length), instant, value, low, high.
     """
-    tables = []
+    model, tables = recording.parts[0].scene.model, []
+    limits = np.array([model.lowerPositionLimit, model.upperPositionLimit], dtype=np.float64).T
+    limits = np.where(np.abs(limits) < NO_LIMIT, limits, np.copysign(np.inf, limits))
     for k, joint in enumerate(recording.joints):
         scale = 1.0 if joint.prismatic else 180.0 / np.pi
         columns = {"instant": recording.times, "value": scale * recording.q[:, k]}

@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.report import style
-from evoexp.report.rows import groups, records
-from evoexp.report.verdicts import CONTRADICTED, REPRODUCED
+from evoexp.report.figures import groups, records
+from evoexp.report.judging import CONTRADICTED, REPRODUCED
 
 COLUMNS = [
     "quantity",

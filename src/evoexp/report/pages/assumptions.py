@@ -36,13 +36,12 @@ from evoexp.report.claim_rules import OWN, Rule, Rules
 from evoexp.report.comparisons import Values, beside
 from evoexp.report.figures import robustness
 from evoexp.report.judging import Hearing, Judge
-from evoexp.report.page_parts import Drawing, Page, Table
+from evoexp.report.page_parts import Claim, Drawing, Page, Table
 from evoexp.report.pages import generic
 from evoexp.report.parameters import OVERRIDE, Parameter, parameters
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import spread
-from evoexp.report.verdicts import Claim
 
 ASSUMED = "assumed"
 SHOWN = 4  # values of a list that are written out

@@ -12,7 +12,7 @@ from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
 from evoexp.report import markdown
 from evoexp.report.best_known import shipped_best_known
-from evoexp.report.comparisons import compared
+from evoexp.report.comparisons import Comparison, compared
 from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.given_data import MARK, GivenData
@@ -20,20 +20,19 @@ from evoexp.report.page_parts import Drawing, Page, Table
 from evoexp.report.pages import ranking
 from evoexp.report.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.problem_ranks import standing
-from evoexp.report.proportions import Proportion
 from evoexp.report.proven_answers import first_reached
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.run_measures import search_seconds
 from evoexp.report.statistics import (
     Interval,
+    Proportion,
     Spread,
     expected_effort,
     expected_interval,
     quantile,
     spread,
 )
-from evoexp.report.verdicts import Comparison
 
 INTRODUCTION = (
     "An answer counts if the exact certifier proves the whole motion free of contact and it is a "

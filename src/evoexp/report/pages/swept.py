@@ -9,13 +9,12 @@ from functools import partial
 import numpy as np
 
 from evoexp.report import markdown, motion_pictures
-from evoexp.report.figures import sweep_curves, sweep_grids
+from evoexp.report.figures import sweeps
 from evoexp.report.page_parts import Drawing, Page, Table
 from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.statistics import Proportion, spread
 from evoexp.report.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
 
 MOST_CURVES = 60  # curves of convergence on a page
@@ -132,8 +131,8 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
             f"{name[0].upper()}{name[1:]} over {where}",
             "Medians over runs; all panels share one scale of colours. ∞: at least half of the "
             f"runs have no feasible solution.{_more(_num_maps(sweep))}",
-            partial(sweep_grids.grid_table, sweep, of),
-            partial(sweep_grids.draw_grid, name=name),
+            partial(sweeps.grid_table, sweep, of),
+            partial(sweeps.draw_grid, name=name),
             conditions,
         )
     if effects:
@@ -142,8 +141,8 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
             "Effect of each setting on the best cost",
             "Median difference of pairs of runs with the same seed and the same other settings, "
             "and its interval; left of the dashed line the second value is better.",
-            partial(sweep_grids.effect_table, effects),
-            sweep_grids.draw_effects,
+            partial(sweeps.effect_table, effects),
+            sweeps.draw_effects,
             conditions,
         )
     if len(conditions) <= MOST_CURVES:
@@ -152,9 +151,9 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
             "Convergence",
             "Median of the best cost so far; panels of one condition share one scale; at the end "
             f"of each curve its {sweep.settings[-1]}. Costs of the first twentieth of a run may "
-            f"lie above the panel.{_more(len(sweep_curves.facets(sweep)))}",
-            partial(sweep_curves.convergence_table, results, sweep),
-            sweep_curves.draw_convergence,
+            f"lie above the panel.{_more(len(sweeps.facets(sweep)))}",
+            partial(sweeps.convergence_table, results, sweep),
+            sweeps.draw_convergence,
             conditions,
         )
 
@@ -165,5 +164,5 @@ def _num_maps(sweep: Sweep) -> int:
 
 def _more(count: int) -> str:
     """Tell how many panels are left out; empty if none is."""
-    most = sweep_grids.MOST_PANELS
+    most = sweeps.MOST_PANELS
     return f" The first {most} of {count} panels; the data have all." if count > most else ""

@@ -12,7 +12,7 @@ from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import body_contacts, distance_ranges, motion_geometry, style
+from evoexp.report.kit import motion_geometry, style
 
 COLUMNS = 2  # of panels
 LOWEST, HIGHEST, BEST, STRAIGHT = "lowest", "highest", "best replicate", "straight line"
@@ -29,7 +29,7 @@ def distances_table(conditions: tuple[kit.ConditionResults, ...], samples: int) 
     parts = []
     for position, c in enumerate(conditions):
         columns = {"condition": c.label, "position": position}
-        counts = {"replicates": c.done, "refuted": len(body_contacts.refuted(c))}
+        counts = {"replicates": c.done, "refuted": len(motion_geometry.refuted(c))}
         for name, distances in _series(c, samples).items():
             columns["series"] = name
             instants = np.arange(len(distances)) / samples
@@ -46,13 +46,13 @@ def _series(condition: kit.ConditionResults, samples: int) -> dict[str, FloatArr
     prepared, solutions = condition.prepared, condition.solutions
     scene = condition.problem(Problem).scene
     distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
-    quick = distance_ranges.distance_measure(scene, distance)
+    quick = motion_geometry.distance_measure(scene, distance)
 
     def sampled(solution: FloatArray) -> FloatArray:
         executed = link_motions.executed(prepared, solution)
         return DEGREE * link_motions.sampled(executed, samples).q
 
-    (found,) = distance_ranges.extremes(list(solutions), lambda k: sampled(solutions[k]), [quick])
+    (found,) = motion_geometry.extremes(list(solutions), lambda k: sampled(solutions[k]), [quick])
     series = {
         LOWEST: found.at_lowest,
         HIGHEST: found.at_highest,

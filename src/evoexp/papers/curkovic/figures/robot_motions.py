@@ -15,7 +15,7 @@ from evoexp.condition import Prepared
 from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions, measures
 from evoexp.report import kit
-from evoexp.report.kit import body_contacts, motion_geometry, style
+from evoexp.report.kit import motion_geometry, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
@@ -103,7 +103,7 @@ def tools_table(conditions: Sequence[kit.ConditionResults]) -> pd.DataFrame:
             tcp_radius=model.tcp_radius,
             collision_substeps=model.collision_substeps,
             at_configuration=path["instant"] == path["instant"].round(),
-            refuted=shown in body_contacts.refuted(c),
+            refuted=shown in motion_geometry.refuted(c),
         )
         parts.append(given)
     table = kit.rounded(pd.concat(parts, ignore_index=True)).assign(
@@ -172,8 +172,8 @@ def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFra
 def _contacts(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the first contacts of bodies in the motions that the exact verdict refutes."""
     rows = []
-    for replicate, (instant, pair) in body_contacts.refuted(condition).items():
-        x, y = body_contacts.contact(
+    for replicate, (instant, pair) in motion_geometry.refuted(condition).items():
+        x, y = motion_geometry.contact(
             condition.prepared, condition.solutions[replicate], instant, pair
         )
         rows.append((CONTACT, replicate, -1, -1, instant, x, y, x, y, 0.0))

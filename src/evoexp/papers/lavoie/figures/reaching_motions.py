@@ -14,7 +14,7 @@ from evoexp.papers import marks
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import body_contacts, motion_geometry, style
+from evoexp.report.kit import motion_geometry, style
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
 LINK, TOUCHING, CONTACT = "link", "touching", "contact"
@@ -137,7 +137,7 @@ def _contacts(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
     for instant, pair in one.contacts:
         assert one.replicate is not None, "only motions touch"
         solution, q = one.condition.solutions[one.replicate], one.condition.motion(one.replicate)
-        place = body_contacts.contact(one.condition.prepared, solution, instant, pair)
+        place = motion_geometry.contact(one.condition.prepared, solution, instant, pair)
         yield (CONTACT, pair, 1 + int(instant >= 1.0), instant, -1, *place, *place, *NO_SIZE)
         yield from _links(one, TOUCHING, np.array([instant]), q.at(instant)[:, None])
 

@@ -17,7 +17,7 @@ from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_plane
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import distance_ranges, motion_geometry, style
+from evoexp.report.kit import motion_geometry, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
@@ -52,7 +52,7 @@ COLUMNS = {  # of `sampled_distances`, by kind of pairs and measure
     motions.ARMS: {CENTRES: "centres", LINKS: "links"},
     motions.OBSTACLES: {CENTRES: "centres_to_obstacles", LINKS: "links_to_obstacles"},
 }
-Measure = distance_ranges.Measure
+Measure = motion_geometry.Measure
 TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
@@ -166,7 +166,7 @@ def sampled_distances(condition: kit.ConditionResults, samples: int) -> pd.DataF
         | {column: exactly(q) for column, (exactly, _) in measures.items()}
         for name, q in series.items()
     ]
-    ranges = distance_ranges.extremes(
+    ranges = motion_geometry.extremes(
         list(condition.solutions),
         lambda replicate: sampled(condition.solutions[replicate]),
         [quickly for _, quickly in measures.values()],
@@ -197,7 +197,7 @@ def _measures(condition: kit.ConditionResults) -> dict[str, tuple[Measure, Measu
     found = dict[str, tuple[Measure, Measure]]()
     for kind, bodies in by_coal.items():
         pairs = kinds[kind][0]
-        quick = distance_ranges.distance_measure(problem.scene.of_pairs(pairs), bodies)
+        quick = motion_geometry.distance_measure(problem.scene.of_pairs(pairs), bodies)
         found[COLUMNS[kind][CENTRES]] = (centres[kind], centres[kind])
         found[COLUMNS[kind][LINKS]] = (_in_radians(bodies), _in_radians(quick))
     return found

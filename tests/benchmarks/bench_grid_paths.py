@@ -68,7 +68,7 @@ def bench_climbing_trials(beside: Any) -> None:
     drawn = own.sample(problem, rng, planner.num_paths)
     paths = np.zeros((len(drawn), size + 1), dtype=np.int32)
     paths[:, : drawn.shape[1]] = drawn
-    population = Population(paths, own.cost(problem, drawn).results)
+    population = Population(paths, own.measured(problem, drawn))
     ledger = Ledger.of(paths, problem.world)
     draws = Block(rng.random(200 * TRIALS), np.zeros(1, dtype=np.int64))
     world = problem.world

@@ -15,7 +15,7 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.planners.coevolution import breeder as breeder_module
+from evoexp.planners.coevolution import generations as team_generations
 from evoexp.planners.coevolution import kernels
 from evoexp.planners.coevolution import settings as settings_module
 from evoexp.planners.coevolution.planner import Coevolution
@@ -235,8 +235,9 @@ def test_every_planted_fault_is_noticed(
     distinct = "index" if plant is copies_on_the_front else "genome"
     changes = {"ga.num_elites": 2, "scenario.obstacles": DISCS, "ga.hall_distinct": distinct}
     given = condition(SMALL | changes)
-    for name in ("breed", "renew"):
-        monkeypatch.setattr(breeder_module, name, getattr(kernels, name).py_func)
+    for name in ("follow", "breed", "renew"):
+        function = getattr(team_generations, name).py_func
+        monkeypatch.setattr(team_generations, name, function)
     plant(monkeypatch)
     if plant is nothing:
         compare(given, 0)

@@ -9,7 +9,7 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.planners.coevolution import generations as team_generations
-from evoexp.planners.coevolution.generations import CACHED, PER_CALL, TeamSearch, per_call
+from evoexp.planners.coevolution.generations import CACHED, PER_CALL, per_call
 from evoexp.records import Generation, generations
 
 SMALL = ("ga.population_size=12", "ga.num_generations=30")
@@ -48,15 +48,16 @@ def told(found: Iterator[Generation], rng: np.random.Generator) -> Iterator[tupl
     ids=" ".join,
 )
 def test_generations_in_one_call_are_those_of_one_kernel_after_the_other(
-    words: tuple[str, str],
+    words: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = words[0].split()
     named = {word.split("=")[0] for word in given}
     small = [word for word in SMALL if word.split("=")[0] not in named]
     planner, problem = prepared(*given, *small, only=words[1])
     one, other = np.random.default_rng(5), np.random.default_rng(5)
-    at_once = told(generations(TeamSearch(planner, problem).blocks(one)), one)
-    in_turn = told(generations(planner._step_by_step(problem, other)), other)
+    at_once = list(told(generations(planner.evolve(problem, one)), one))
+    monkeypatch.setattr(type(problem.collision), "is_lines", False)
+    in_turn = told(generations(planner.evolve(problem, other)), other)
     for ours, expected in zip(at_once, in_turn, strict=True):
         assert ours == expected
 

@@ -7,8 +7,7 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.planners.coevolution import breeder as breeder_module
-from evoexp.planners.coevolution import kernels
+from evoexp.planners.coevolution import generations as team_generations
 from evoexp.records import generations
 from matrix import first
 
@@ -63,18 +62,20 @@ def test_the_best_team_never_worsens_in_other_scenes(experiment: str, label: str
 def halls(given: Condition, seed: int, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Return (populations, teams (teams, robots)) of every generation's hall."""
     found: list[Any] = []
-    renew = kernels.renew
+    renew = team_generations.renew
 
     def watched(populations: Any, *rest: Any) -> int:
-        held = renew(populations, *rest)
-        found.append((populations.copy(), rest[4][0][:held].copy()))
+        held, heredity = renew(populations, *rest), rest[-1]
+        found.append((populations.copy(), heredity.hall.teams[:held].copy()))
         return int(held)
 
     with monkeypatch.context() as patch:
-        patch.setattr(breeder_module, "renew", watched)
         planner, problem = given.prepare()
         # kernel by kernel, so that one of them can be watched
-        for _ in planner._step_by_step(problem, np.random.default_rng(seed)):
+        patch.setattr(type(problem.collision), "is_lines", False)
+        patch.setattr(team_generations, "follow", team_generations.follow.py_func)
+        patch.setattr(team_generations, "renew", watched)
+        for _ in planner.evolve(problem, np.random.default_rng(seed)):
             pass
     assert found
     return found

@@ -59,7 +59,7 @@ def test_pieces_are_those_of_whole_paths_that_are_regenerated_settled_and_measur
     size = problem.fields.grid.num_nodes
     paths = np.zeros((num_paths, size + 1), dtype=np.int32)
     paths[:, : drawn.shape[1]] = drawn
-    results = own.cost(problem, drawn).results
+    results = own.measured(problem, drawn)
     one = Population(paths.copy(), results.copy())
     two = Population(paths.copy(), results.copy())
     assert Ledger.is_fit(problem.world)

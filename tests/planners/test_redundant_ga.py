@@ -13,6 +13,7 @@ from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
+from evoexp.planners.redundant_ga.sub_path_costs import judge_paths
 from evoexp.records import FloatArray, generations
 
 SMALL = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")
@@ -57,9 +58,9 @@ def test_costs_are_the_papers_formula() -> None:
         second = math.dist(tip(two), (18.0, 8.5)) + 0.7 * math.dist(one, two)
         x, y = tip(two)
         inside = 16.0 <= x <= 23.0 and 2.0 <= y <= 11.0
-        assert judged.terms[0, 0, k] == pytest.approx(first, abs=1e-11)
-        assert judged.terms[1, 0, k] == (pytest.approx(second, abs=1e-11) if inside else np.inf)
-        assert judged.cost[k] == (judged.terms[1, 0, k] if first < 6.0 else np.inf)
+        assert judged.terms["of_sp1"][k] == pytest.approx(first, abs=1e-11)
+        assert judged.terms["of_sp2"][k] == (pytest.approx(second, abs=1e-11) if inside else np.inf)
+        assert judged.cost[k] == (judged.terms["of_sp2"][k] if first < 6.0 else np.inf)
     assert judged.collision_queries == 0
 
 
@@ -178,7 +179,7 @@ def test_what_a_generation_knows_of_itself_is_what_judging_it_again_gives(
     for generation in generations(planner.evolve(problem, np.random.default_rng(5))):
         if generation.terms["sub_path"] == 1.0:  # from the start, the same in every attempt
             starts = np.repeat(problem.start[:, None], generation.population.shape[1], axis=1)
-            again = planner._judge(problem, 0, starts, generation.population)
+            again = judge_paths(starts, generation.population, planner.judging(problem, 0))
             np.testing.assert_array_equal(generation.costs[0], again[0])
             judged += 1
     assert judged > 20
@@ -233,7 +234,7 @@ def test_random_search_draws_pairs_of_postures() -> None:
     judged = planner.cost(problem, population)
     assert population.shape == (2, 7, 300)
     assert judged.collision_queries == 2 * 10 * 300
-    assert judged.named_terms(4)["of_sp1"] == judged.terms[0, 0, 4]
+    assert judged.named_terms(4)["of_sp1"] == judged.terms["of_sp1"][4]
     solution = planner.solution(problem, population, 4)
     assert np.array_equal(solution.reshape(3, 7)[1:], population[:, :, 4])
     terms = planner.evaluate(problem, solution)

@@ -112,7 +112,7 @@ def test_draws_are_the_same_however_many_are_made_per_call(monkeypatch: pytest.M
         rng = np.random.default_rng(2)
         runs.append(
             [
-                (each.population.tobytes(), each.costs.tobytes(), str(rng.bit_generator.state))
+                (each.population.tobytes(), each.costs.tobytes(), each.state)
                 for each in generations(planner.evolve(problem, rng))
             ]
         )

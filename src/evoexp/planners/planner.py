@@ -192,14 +192,6 @@ class PlannerDefaults:
         """Return None: there is no local operator."""
         return None
 
-    def random_run(self, problem: Any, rng: np.random.Generator) -> Iterator[Block] | None:
-        """Return the generations of random search, many drawn per call; None: one by one.
-
-        They are those of `RandomSearch`: as many individuals as the planner evaluates, drawn as
-        `sample` draws them and judged as `cost` judges them.
-        """
-        return None
-
     def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
         """Return the whole motion with the problem's scene, or nothing without a scene."""
         bodies: Scene | None = problem.scene

@@ -57,6 +57,7 @@ class TableSearch(ABC):
         summaries: (places, SUMMARY).
         costs: (places, …, individuals).
         states: Of the generator behind each generation computed last, where it is ahead of them.
+        is_done: Whether the search ends before its last generation.
         queries_each: Configurations that judging an individual asks for.
         keeper: Of the best so far.
         reached: Index of the generation computed last.
@@ -64,7 +65,7 @@ class TableSearch(ABC):
 
     costs: FloatArray
     states: list[bytes] | None = None
-    queries_each = 0
+    queries_each, is_done = 0, False
 
     def __init__(self, ga: Sizes, per_call: int) -> None:
         """Begin a run.
@@ -81,8 +82,8 @@ class TableSearch(ABC):
         """Yield the initial population, then every other generation, one block per call."""
         self.begin(rng)
         yield self._block(0, 0)
-        last = self._ga.num_generations
-        while self.reached < last:
+        last, self.reached = self._ga.num_generations, 0
+        while self.reached < last and not self.is_done:
             first = self.reached
             self.reached = self.go_on(rng, first, min(first + self.num_places - 1, last))
             yield self._block(first + 1, self.reached)
@@ -95,7 +96,7 @@ class TableSearch(ABC):
         ends, steps = last == self._ga.num_generations, range(1, len(places) + 1)
         evaluations, queries = self.counts(first)
         block = Block(
-            first,
+            keeper.index + 1,
             bests,
             self.lowest(places).tolist(),
             means,
@@ -105,10 +106,10 @@ class TableSearch(ABC):
             [keeper.collision_queries + queries * k for k in steps],
             self.costs[places],
             lambda k: self.population(first + k),
-            self.states if first else None,
+            self.states,
             self.criteria(places.item(-1)) if ends else None,
         )
-        keeper.index, keeper.evaluations = last, block.evaluations[-1]
+        keeper.index, keeper.evaluations = keeper.index + len(places), block.evaluations[-1]
         keeper.collision_queries = block.collision_queries[-1]
         return block
 

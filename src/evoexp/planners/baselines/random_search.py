@@ -24,14 +24,6 @@ class RandomSearch(WrappedPlanner):
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation of new samples after the other."""
-        random_run = getattr(self.planner, "random_run", None)  # planners of others may lack it
-        if random_run is not None and not self.answers_are_proven:
-            together: Iterator[Block] | None = random_run(problem, rng)
-            if together is not None:
-                return together
-        return self._one_by_one(problem, rng)
-
-    def _one_by_one(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         planner, keeper = self.planner, Keeper()
         for index in range(planner.num_generations + 1):
             population = planner.sample(problem, rng, planner.num_evaluations(index))

@@ -1,24 +1,32 @@
-"""Generations of robots that are lines, several of them in one call of a kernel.
+"""One run of co-evolving populations: the way from a generation to the next (Fig. 2).
 
-What other collision models do step by step (`Coevolution.evolve`) is here one kernel: with
-populations of 100, Python between the steps would take a third of the time.
+Of robots that are lines several generations are one call of a kernel: with populations of 100,
+Python between the steps would take a third of the time. Others are evaluated by
+`Coevolution.evaluated`, one generation after the other.
 """
 
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from evoexp.evolution.best_team import BestTeam, CollisionCounts
+from evoexp.evolution.best_team import BestTeam
 from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.random_stream import DrawnAhead
-from evoexp.planners.coevolution.breeder import Breeder, num_uniforms
-from evoexp.planners.coevolution.kernels import NOT_FINITE, Breeding, breed, evaluate_lines, renew
-from evoexp.planners.coevolution.link_problem import Problem
-from evoexp.planners.coevolution.teams import Evaluated, survey
+from evoexp.planners.coevolution.kernels import (
+    Heredity,
+    breed,
+    evaluate_lines,
+    num_uniforms,
+    renew,
+)
+from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem
+from evoexp.planners.coevolution.proven_teams import ProvenTeams
+from evoexp.planners.coevolution.teams import Evaluated, survey, teamable_costs
 from evoexp.planners.planner import Candidate
 from evoexp.planners.table_search import TableSearch, generations_per_call
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import FloatArray, IntArray
 
 PER_CALL = 8  # generations that are computed in one call, at most
 CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
@@ -28,48 +36,19 @@ class Table(NamedTuple):
     """Some generations; number g is at place g modulo the number of places."""
 
     populations: FloatArray  # (places, robots, 2 K, individuals)
-    # (places, robots, 4, individuals) see `Evaluated`, and so are the next three
-    criteria: FloatArray
-    own: FloatArray  # (places, robots, individuals)
-    costs: FloatArray  # (places, robots, individuals)
-    collisions: CollisionCounts  # (places, pairs of robots, individuals, individuals)
-    teams: IntArray  # (places, robots) the best team of each
-    team_costs: FloatArray  # (places,)
+    judged: Evaluated  # of each place
+    teams: IntArray  # (places, robots) the best team of each; −1 if there is none
+    team_costs: FloatArray  # (places,) inf if there is none
 
     @classmethod
     def room(cls, places: int, robots: int, genes: int, count: int) -> Self:
         """Return memory for some generations."""
-        own, costs = np.empty((2, places, robots, count))
         return cls(
             np.empty((places, robots, genes, count)),
-            np.empty((places, robots, 4, count)),
-            own,
-            costs,
-            np.empty((places, robots * (robots - 1) // 2, count, count), dtype=np.int16),
+            Evaluated.room(places, robots, count),
             np.empty((places, robots), dtype=np.int64),
             np.empty(places),
         )
-
-
-class Task(NamedTuple):
-    """Ends, arms and weights, by which individuals are judged; see `evaluate_lines`."""
-
-    starts: FloatArray  # (robots, 2) [rad]
-    goals: FloatArray  # (robots, 2) [rad]
-    arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
-    weights: tuple[float, float, float]  # of C2, C3, C4
-    collision_weight: float  # of C1
-
-
-class Heredity(NamedTuple):
-    """The rules by which one generation follows another."""
-
-    breeding: Breeding  # of any generation; its mutation rate is that of none
-    moving: BoolArray  # (robots,) false for robots that stand still
-    hall: Hall  # with room for as many teams as it may hold
-    rules: HallRules  # which teams it takes
-    by_genome: bool  # see `renew`; then the best team is offered, too
-    numbers: IntArray  # (individuals + 1,) that breeding takes for so many offspring of a robot
 
 
 @kernel
@@ -77,20 +56,20 @@ def evolve(
     uniforms: FloatArray,
     rates: FloatArray,
     first: int,
-    task: Task,
+    task: tuple[FloatArray, FloatArray, FloatArray, tuple[float, float, float], float],
     heredity: Heredity,
     table: Table,
     num_teams: IntArray,
     summaries: FloatArray,
     taken: IntArray,
 ) -> bool:
-    """Go on from one generation to others, or judge the initial one.
+    """Go on from one generation of lines to others.
 
     Args:
         uniforms: Numbers for all of them, in the order in which they are used.
         rates: (generations,) of mutation, on the way to each of them.
-        first: The present generation; −1 if the initial one is to be judged.
-        task: See `Task`.
+        first: The present generation.
+        task: See `evaluate_lines`: from `starts` to `collision_weight`.
         heredity: See `Heredity`.
         table: See `Table`, written.
         num_teams: (1,) teams that the hall holds, changed.
@@ -101,35 +80,31 @@ def evolve(
         False if a coordinate is not finite.
     """
     table, summaries, taken = borrowed((table, summaries, taken))
-    places, robots, _, count = table.populations.shape
-    nobody, blocked = np.full(robots, -1), np.zeros((robots, count), dtype=np.int64)
-    begin = 0
+    starts, goals, arms, weights, collision_weight = task
+    populations, places, begin = table.populations, len(summaries), 0
     for step in range(len(rates)):
         own, other = (first + step) % places, (first + step + 1) % places
-        taken[step] = 0
-        if first + step >= 0:
-            taken[step] = follow(
-                uniforms[begin:], rates[step], heredity, table, own, other, nobody, num_teams
-            )
-            begin += taken[step]
+        taken[step] = follow(uniforms[begin:], rates[step], heredity, table, own, other, num_teams)
+        begin += taken[step]
+        found = at_place(table.judged, other)
         if not evaluate_lines(
-            table.populations[other],
-            task.starts,
-            task.goals,
-            task.arms,
-            task.weights,
-            task.collision_weight,
-            table.criteria[other],
-            table.own[other],
-            table.collisions[other],
-            table.costs[other],
+            populations[other], starts, goals, arms, weights, collision_weight, found
         ):
             return False
-        costs, lone, hits = table.costs[other], table.own[other], table.collisions[other]
-        cost, num_feasible, best, mean, std = survey(costs, lone, hits, blocked, table.teams[other])
-        table.team_costs[other], summary = cost, summaries[other]
-        summary[0], summary[1], summary[2], summary[3] = best, mean, std, num_feasible
+        table.team_costs[other] = survey(found, table.teams[other], summaries[other])
     return True
+
+
+@kernel
+def at_place(judged: Evaluated, place: int) -> Evaluated:
+    """Return the populations at a place, evaluated: views."""
+    return Evaluated(
+        judged.costs[place],
+        judged.criteria[place],
+        judged.own[place],
+        judged.collisions[place],
+        judged.blocked[place],
+    )
 
 
 @kernel
@@ -140,7 +115,6 @@ def follow(
     table: Table,
     own: int,
     other: int,
-    nobody: IntArray,
     num_teams: IntArray,
 ) -> int:
     """Renew the hall of fame, and breed the generation that follows one.
@@ -152,46 +126,29 @@ def follow(
         table: Of generations.
         own: Place of the present one.
         other: Place of the next one, written.
-        nobody: (robots,) all −1.
         num_teams: (1,) changed.
 
     Returns:
         How many numbers it took.
     """
-    hall, rules, before = heredity.hall, heredity.rules, table.populations[own]
+    hall, before, judged = heredity.hall, table.populations[own], table.judged
     if len(hall.teams):
         num_teams[0] = renew(
             before,
-            table.criteria[own],
-            table.collisions[own],
-            table.own[own],
-            table.teams[own] if heredity.by_genome else nobody,
-            hall,
+            judged.criteria[own],
+            judged.collisions[own],
+            teamable_costs(judged.own[own], judged.blocked[own]),
+            table.teams[own],
             num_teams[0],
-            rules,
-            heredity.by_genome,
+            heredity,
         )
-    breeding, moving = heredity.breeding, 0
+    moving = 0
     for robot in range(len(before)):
         moving += heredity.moving[robot]
-    numbers = heredity.numbers[before.shape[2] - breeding.num_elites - num_teams[0]]
-    breed(
-        uniforms[: moving * numbers].reshape((moving, numbers)),
-        before,
-        table.costs[own],
-        heredity.moving,
-        hall.teams[: num_teams[0]],
-        Breeding(
-            breeding.num_elites,
-            breeding.inverse,
-            breeding.crossover_rate,
-            rate,
-            breeding.mutation_step,
-            breeding.limit,
-            breeding.symmetric,
-        ),
-        table.populations[other],
-    )
+    numbers = num_uniforms(before.shape[2] - heredity.num_elites - num_teams[0])
+    given, teams = uniforms[: moving * numbers], hall.teams[: num_teams[0]]
+    given = given.reshape((moving, numbers))
+    breed(given, rate, before, judged.costs[own], teams, heredity, table.populations[other])
     return int(moving * numbers)
 
 
@@ -202,7 +159,7 @@ def per_call(robots: int, count: int) -> int:
 
 
 class TeamSearch(TableSearch):
-    """One run of robots that are lines, and memory for its generations."""
+    """One run, and memory for its generations."""
 
     def __init__(self, planner: Any, problem: Problem) -> None:
         """Begin a run.
@@ -213,53 +170,94 @@ class TeamSearch(TableSearch):
         """
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size
-        super().__init__(ga, per_call(robots, self._size))
-        genes, breeder = 2 * planner.num_configurations, Breeder(ga, problem.moving)
-        numbers = np.array([num_uniforms(count) for count in range(self._size + 1)])
-        self._most, self._rate = breeder.num_moving * int(numbers.max()), ga.mutation_rate_at
-        self._blocked = np.zeros((robots, self._size), dtype=np.int64)
-        self._table = Table.room(self.num_places, robots, genes, self._size)
-        self.costs = self._table.costs
-        task = Task(
-            problem.start,
-            problem.goal,
-            problem.arms,
-            planner.objective.own_weights,
-            planner.objective.collision_weight,
+        self._proven = ProvenTeams(planner, problem) if planner.answers_are_proven else None
+        stepwise = not problem.collision.is_lines or ga.restart_after is not None
+        self._at_once = not stepwise and self._proven is None
+        super().__init__(ga, per_call(robots, self._size) if self._at_once else 1)
+        self._table = Table.room(
+            self.num_places, robots, 2 * planner.num_configurations, self._size
         )
-        heredity = Heredity(
-            breeder.breeding(0),
+        self.costs, self._waiting = self._table.judged.costs, 0
+        by_genome = ga.hall_distinct == "genome"
+        self._heredity = Heredity(
+            ga.num_elites,
+            ga.selection == "inverse",
+            ga.crossover_rate,
+            DEGREE * ga.mutation_step,
+            ga.mutation_direction == "symmetric",
             problem.moving,
-            breeder.hall,
-            breeder.rules,
-            breeder.by_genome,
-            numbers,
+            Hall.room(ga.num_hall_teams, robots),
+            HallRules(
+                memory=ga.hall_memory or 0,
+                frozen=ga.hall_frozen,
+                exclusive=problem.moving if by_genome else np.ones_like(problem.moving),
+            ),
+            by_genome,
         )
-        num_teams = np.zeros(1, dtype=np.int64)
-        self._arguments = (task, heredity, self._table, num_teams, self.summaries)
+        self._num_teams = np.zeros(1, dtype=np.int64)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial populations."""
         self._table.populations[0] = self._planner.sample(self._problem, rng, self._size)
-        self._evolve(np.empty(0), -1, 0)
-        self._ahead = DrawnAhead(rng, self._most)
+        self._judge(0)
+        most = int(np.count_nonzero(self._problem.moving)) * num_uniforms(self._size)
+        self._ahead = DrawnAhead(rng, max(most, self._table.populations[0].size))
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations with numbers that are drawn ahead."""
-        taken = self._evolve(self._ahead.draw(last - first), first, last)
-        self.states = self._ahead.take(taken)
+        uniforms = self._ahead.draw(last - first)
+        rates = np.array([self._planner.ga.mutation_rate_at(k + 1) for k in range(first, last)])
+        arguments = self._heredity, self._table, self._num_teams
+        taken = np.empty(len(rates), dtype=np.int64)
+        if not self._at_once:
+            taken[0] = self._follow(uniforms, float(rates[0]), first)
+            self._judge(last % self.num_places)
+        else:
+            task = self._planner.task(self._problem)
+            if not evolve(uniforms, rates, first, task, *arguments, self.summaries, taken):
+                raise ValueError(NOT_FINITE)
+        self.states = self._ahead.take(taken.tolist())
         return last
+
+    def _follow(self, uniforms: FloatArray, rate: float, index: int) -> int:
+        """Breed the generation behind one, or begin anew; return how many numbers that took."""
+        places = index % self.num_places, (index + 1) % self.num_places
+        self._waiting = 0 if self.keeper.best.solved else self._waiting + 1
+        patience = self._planner.ga.restart_after
+        if patience is None or self._waiting < patience:
+            taken = follow(uniforms, rate, self._heredity, self._table, *places, self._num_teams)
+            return int(taken)
+        # "If no convergence has occurred, …, the algorithm generates new populations" (section 3)
+        populations = self._table.populations[places[1]]
+        own = uniforms[: populations.size].reshape(populations.shape)
+        populations[:] = self._planner.populations_of(self._problem, own)
+        self._waiting = self._num_teams[0] = 0
+        return int(populations.size)
+
+    def _judge(self, place: int) -> None:
+        """Evaluate the populations at a place, whatever the model is; see who is proven."""
+        populations, found = self._table.populations[place], at_place(self._table.judged, place)
+        evaluated = self._planner.evaluated(self._problem, populations)
+        for array, values in zip(found, evaluated, strict=True):
+            array[...] = values
+        settled = self._proven.settle(populations, found) if self._proven else None
+        team = self._table.teams[place]
+        self._table.team_costs[place] = survey(found, team, self.summaries[place])
+        if settled is not None:
+            team[:], self._table.team_costs[place] = settled
 
     def lowest(self, places: IntArray) -> FloatArray:
         """Return the costs of the best teams."""
         return np.asarray(self._table.team_costs[places])
 
     def best(self, place: int) -> Candidate:
-        """Return the best team of a generation."""
-        populations, found = self._table.populations[place], self._evaluated(place)
-        team = self._best_team(place)
-        candidate: Candidate = self._planner.candidate(self._problem, populations, found, team)
-        return candidate
+        """Return the best team, or the best of every population where no team was found."""
+        found = at_place(self._table.judged, place)
+        best = BestTeam(self._table.teams[place], self._table.team_costs.item(place))
+        team = best.individuals if best.found else found.costs.argmin(axis=1)
+        populations = self._table.populations[place]
+        solution = self._planner.team_solution(self._problem, populations, team)
+        return Candidate(solution, found.terms_of(team), best.found)
 
     def counts(self, index: int) -> tuple[int, int]:
         """Return the individuals of all populations, and the configurations of all teams."""
@@ -272,21 +270,4 @@ class TeamSearch(TableSearch):
 
     def criteria(self, place: int) -> FloatArray | None:
         """Return the criteria of all individuals."""
-        return np.asarray(self._table.criteria[place])
-
-    def _best_team(self, place: int) -> BestTeam:
-        return BestTeam(self._table.teams[place], self._table.team_costs.item(place))
-
-    def _evaluated(self, place: int) -> Evaluated:
-        _, criteria, own, costs, collisions, _, _ = self._table
-        return Evaluated(
-            costs[place], criteria[place], own[place], collisions[place], self._blocked
-        )
-
-    def _evolve(self, uniforms: FloatArray, first: int, last: int) -> list[int]:
-        """Compute generations after one, up to another; return how many numbers each took."""
-        rates = np.array([self._rate(index) for index in range(first + 1, last + 1)])
-        taken = np.empty(len(rates), dtype=np.int64)
-        if not evolve(uniforms, rates, first, *self._arguments, taken):
-            raise ValueError(NOT_FINITE)
-        return taken.tolist()
+        return np.asarray(self._table.judged.criteria[place])

@@ -17,32 +17,47 @@ from evoexp.evolution.selection import (
     spin_roulette,
 )
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions
+from evoexp.planners.coevolution.teams import Evaluated
 from evoexp.records import BoolArray, FloatArray, IntArray
 
-NOT_FINITE = "points and bases must be finite and below 1e150"
+HALF_TURN = DEGREE * 180.0  # [rad] genes live in [0, π)
 
 
-class Breeding(NamedTuple):
-    """Settings of selection, cross-over and mutation, as a generation has them."""
+class Heredity(NamedTuple):
+    """The rules by which one generation follows another."""
 
     num_elites: int  # individuals copied untouched
     inverse: bool  # whether weights on the wheel are inverse costs; else differences to the highest
     crossover_rate: float  # probability that a pair is crossed
-    mutation_rate: float  # probability that an allele of an individual is mutated (Eq. 10).
     mutation_step: float  # largest change of an allele (Eq. 9) [rad].
-    limit: float  # what a mutated allele stays below [rad]
     symmetric: bool  # whether alleles may decrease, too
+    moving: BoolArray  # (robots,) false for robots that stand still
+    hall: Hall  # with room for as many teams as it may hold
+    rules: HallRules  # which teams it takes
+    # whether copies count as one individual, and members of the hall are offered again; else
+    # members of the hall and their copies leave the fronts
+    by_genome: bool
+
+
+@kernel
+def num_uniforms(count: int) -> int:
+    """Return how many numbers `breed` takes for so many offspring of a robot.
+
+    One for each parent, two for each pair that may be crossed, three for each mutation.
+    """
+    return count + 2 * (count // 2) + 3 * count
 
 
 @kernel
 def breed(
     uniforms: FloatArray,
+    mutation_rate: float,
     populations: FloatArray,
     costs: FloatArray,
-    moving: BoolArray,
     teams: IntArray,
-    breeding: Breeding,
+    heredity: Heredity,
     bred: FloatArray,
 ) -> None:
     """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
@@ -50,42 +65,42 @@ def breed(
     Args:
         uniforms: (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then
             mutation.
+        mutation_rate: Probability that an allele of an individual is mutated (Eq. 10).
         populations: (robots, genes, individuals).
         costs: (robots, individuals).
-        moving: (robots,) false for robots that stand still: their populations are copied.
         teams: (teams, robots) members of the hall; written: their places in the next populations.
-        breeding: See `Breeding`.
+        heredity: See `Heredity`.
         bred: Like populations, written.
     """
-    size, num_elites = populations.shape[2], breeding.num_elites
+    size, num_elites = populations.shape[2], heredity.num_elites
     count = size - num_elites - len(teams)
     last = count + 2 * (count // 2)  # behind the numbers of cross-over
     weights, parents = np.empty(size), np.empty(count, dtype=np.int64)
     elites = np.empty(num_elites, dtype=np.int64)
     row = 0
     for robot in range(len(populations)):
-        if not moving[robot]:
+        if not heredity.moving[robot]:
             bred[robot] = populations[robot]
             continue
         draws, genes, before = uniforms[row], bred[robot], populations[robot]
         row += 1
         # parents by roulette
-        if breeding.inverse:
+        if heredity.inverse:
             inverse_weights(costs[robot], weights)
         else:
             difference_weights(costs[robot], weights)
         spin_roulette(weights, draws[:count], parents)
         # single-point cross-over of neighbours
-        cross_single_point(draws[count:last], before, parents, breeding.crossover_rate, genes)
+        cross_single_point(draws[count:last], before, parents, heredity.crossover_rate, genes)
         # mutation of one allele (Eq. 9)
         mutate_allele(
             draws[last:],
             genes,
             count,
-            breeding.mutation_rate,
-            breeding.mutation_step,
-            breeding.limit,
-            breeding.symmetric,
+            mutation_rate,
+            heredity.mutation_step,
+            HALF_TURN,
+            heredity.symmetric,
         )
         # elites and members of the hall, untouched
         choose_elites(costs[robot], elites)
@@ -110,37 +125,39 @@ def renew(
     collisions: CollisionCounts,
     own: FloatArray,
     best: IntArray,
-    hall: Hall,
     num_teams: int,
-    rules: HallRules,
-    by_genome: bool,
+    heredity: Heredity,
 ) -> int:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
+
+    Members of the fronts are offered with their best collaborators. With distinct genomes the best
+    team of the generation is offered as it is, so that it is never lost; and a robot that stands
+    still, which has one genome, may be in all teams.
 
     Args:
         populations: (robots, genes, individuals).
         criteria: (robots, criteria, individuals), all minimised.
         collisions: See `best_team`.
         own: See `best_team`.
-        best: (robots,) see `renew_hall`, as the rest.
-        hall: See `Hall`, with room for as many teams as it may hold.
+        best: (robots,) the best team; −1 if there is none.
         num_teams: Teams of the hall at present.
-        rules: See `HallRules`: which teams it takes.
-        by_genome: Whether copies count as one individual, and members of the hall are offered
-            again; else members of the hall and their copies leave the fronts.
+        heredity: The hall and its rules.
 
     Returns:
         Number of teams that the hall holds then.
     """
-    count = populations.shape[2]
+    hall, count = heredity.hall, populations.shape[2]
     fronts = np.empty((len(populations), count), dtype=np.bool_)
     for robot in range(len(populations)):
         non_dominated(criteria[robot], count, fronts[robot])
-    if by_genome:
+    if heredity.by_genome:
         merge_copies(populations, criteria[:, 1], hall.teams[:num_teams], fronts)
+        offered = best
     else:
         drop_copies(populations, hall.teams[:num_teams], fronts)
-    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, best, rules))
+        offered = np.full(len(populations), -1)
+    rules = heredity.rules
+    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, offered, rules))
 
 
 @kernel
@@ -261,31 +278,26 @@ def evaluate_lines(
     arms: FloatArray,
     weights: tuple[float, float, float],
     collision_weight: float,
-    criteria: FloatArray,
-    own: FloatArray,
-    collisions: CollisionCounts,
-    costs: FloatArray,
+    found: Evaluated,
 ) -> bool:
     """Evaluate everybody against everybody of the other robots, where robots are lines (Eq. 4).
 
-    One call does what other models do step by step (`Coevolution.evaluated`); between the steps
-    Python would take a third of the time.
+    One call does what `Coevolution.evaluated` does step by step with other models; between the
+    steps Python would take a third of the time. The first arguments are those of `measure`.
 
     Args:
-        populations: See `measure`, and so are the next four.
-        starts: As they are there.
-        goals: As they are there.
-        arms: As they are there.
+        populations: (robots, 2 K, individuals) link angles [rad].
+        starts: (robots, 2) [rad].
+        goals: (robots, 2) [rad].
+        arms: (robots, 4) base x, base y, lengths of both links [length unit].
         weights: Of C2, C3, C4.
         collision_weight: Of C1.
-        criteria: (robots, 4, individuals) written.
-        own: (robots, individuals) written: weighted sum of C2, C3, C4.
-        collisions: (pairs of robots, individuals, individuals) written.
-        costs: (robots, individuals) written: weighted sum of all four.
+        found: Written, all but `blocked`: there are no obstacles.
 
     Returns:
         False if a coordinate is not finite.
     """
+    costs, criteria, own, collisions = found.costs, found.criteria, found.own, found.collisions
     robots, genes, count = populations.shape
     last = genes // 2 + 1
     paths, points = np.empty((robots, last + 1, 2, count)), np.empty((robots, last + 1, 4, count))

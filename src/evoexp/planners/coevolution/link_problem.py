@@ -11,6 +11,8 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 
+NOT_FINITE = "points and bases must be finite and below 1e150"
+
 
 class Problem(NamedTuple):
     """Robots and their scenario, prepared."""

@@ -20,20 +20,18 @@ from pydantic import model_validator
 from evoexp.collision.models.link_collision import LinkCrossings
 from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
-from evoexp.evolution.best_team import BestTeam
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
-from evoexp.planners.coevolution.breeder import HALF_TURN, Breeder
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.generations import TeamSearch
-from evoexp.planners.coevolution.kernels import NOT_FINITE, evaluate_lines, measure
-from evoexp.planners.coevolution.link_problem import Problem, check_ends
+from evoexp.planners.coevolution.kernels import HALF_TURN, evaluate_lines, measure
+from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem, check_ends
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
-from evoexp.planners.coevolution.teams import Evaluated, Judgement, Standing
+from evoexp.planners.coevolution.teams import Evaluated, Judgement
 from evoexp.planners.departures import of_limits, of_place
-from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
+from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
@@ -104,72 +102,7 @@ class Coevolution(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
-        at_once = problem.collision.is_lines and self.ga.restart_after is None
-        if at_once and not self.answers_are_proven:
-            return TeamSearch(self, problem).blocks(rng)
-        return self._step_by_step(problem, rng)
-
-    def _step_by_step(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
-        """Evolve as `evolve` does, kernel by kernel."""
-        ga, keeper, breeder = self.ga, Keeper(), Breeder(self.ga, problem.moving)
-        proven, waiting = ProvenTeams(self, problem) if self.answers_are_proven else None, 0
-        populations = self.sample(problem, rng, ga.population_size)
-        for index in range(1, ga.num_generations + 2):
-            found = self.evaluated(problem, populations)
-            settled = proven.settle(populations, found) if proven else None
-            standing = found.standing()
-            best = settled or standing.best
-            yield self.recorded(keeper, problem, populations, found, standing._replace(best=best))
-            if index > ga.num_generations:
-                return
-            breeder.renew_hall(populations, found, best)
-            waiting = 0 if keeper.best.solved else waiting + 1
-            if ga.restart_after is not None and waiting >= ga.restart_after:
-                # "If no convergence has occurred, …, the algorithm generates new populations"
-                # (section 3).
-                populations, waiting = self.sample(problem, rng, ga.population_size), 0
-                breeder.num_teams = 0
-            else:
-                populations = breeder.bred(rng, populations, found.costs, index)
-
-    def recorded(
-        self,
-        keeper: Keeper,
-        problem: Problem,
-        populations: FloatArray,
-        found: Evaluated,
-        standing: Standing,
-    ) -> Block:
-        """Keep the best team if it is better, and return a block of the generation.
-
-        Args:
-            keeper: Of the run.
-            problem: The problem.
-            populations: (robots, 2 K, individuals).
-            found: Of these.
-            standing: Of these.
-        """
-        (robots, _, count), best = populations.shape, standing.best
-        if keeper.improves(best.cost):
-            keeper.keep(best.cost, self.candidate(problem, populations, found, best))
-        return keeper.record(
-            standing.statistics,
-            found.costs,
-            populations,
-            lowest=best.cost,
-            num_feasible=standing.num_feasible,
-            evaluations=robots * count,
-            collision_queries=self.queries(problem, count),
-            criteria=found.criteria if keeper.index + 1 == self.ga.num_generations else None,
-        )
-
-    def candidate(
-        self, problem: Problem, populations: FloatArray, found: Evaluated, best: BestTeam
-    ) -> Candidate:
-        """Return the best team, or the best of every population where no team was found."""
-        team = best.individuals if best.found else found.costs.argmin(axis=1)
-        solution = self.team_solution(problem, populations, team)
-        return Candidate(solution, found.terms_of(team), best.found)
+        return TeamSearch(self, problem).blocks(rng)
 
     def num_evaluations(self, index: int) -> int:
         """Return the size of each population: elites are judged again, by other collaborators."""
@@ -180,7 +113,12 @@ class Coevolution(PlannerDefaults, Component):
 
         Robots that stand still keep their posture.
         """
-        genes = HALF_TURN * rng.random((len(problem.start), 2 * self.num_configurations, count))
+        shape = len(problem.start), 2 * self.num_configurations, count
+        return self.populations_of(problem, rng.random(shape))
+
+    def populations_of(self, problem: Problem, uniforms: FloatArray) -> FloatArray:
+        """Return the populations of uniform numbers of their shape, see `sample`."""
+        genes = HALF_TURN * uniforms
         for robot in np.flatnonzero(~problem.moving):
             genes[robot] = np.tile(problem.start[robot], self.num_configurations)[:, None]
         return genes
@@ -192,16 +130,18 @@ class Coevolution(PlannerDefaults, Component):
             problem: The problem.
             populations: (robots, 2 K, individuals).
         """
-        if problem.collision.is_lines:
-            return self._evaluated_lines(problem, populations)
         collision, objective = problem.collision, self.objective
         robots, _, count = populations.shape
+        if collision.is_lines:
+            lined = Evaluated.room(robots, count)
+            if not evaluate_lines(populations, *self.task(problem), lined):
+                raise ValueError(NOT_FINITE)
+            return lined
         # paths, and C2 … C4 (Eqs. 6–8)
         criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
         paths = np.empty((robots, self.num_configurations + 2, 2, count))
         points = np.empty((robots, self.num_configurations + 2, 4, count))
-        ends, weights = (problem.start, problem.goal), objective.own_weights
-        measure(populations, *ends, problem.arms, weights, paths, points, criteria, own)
+        measure(populations, *self.task(problem)[:4], paths, points, criteria, own)
         # C1 (Eqs. 4, 5): an obstacle is in the way whoever the collaborator is
         lines = [collision.outlines(r, paths[r], points[r]) for r in range(robots)]
         blocked = np.array([collision.with_obstacles(r, lines[r]) for r in range(robots)])
@@ -212,21 +152,15 @@ class Coevolution(PlannerDefaults, Component):
             sums[a] += crossings.sums_1
             sums[b] += crossings.sums_2
         criteria[:, 0] = sums
-        pairs = hits[0][np.newaxis] if len(hits) == 1 else np.array(hits)
-        return Evaluated(objective.collision_weight * sums + own, criteria, own, pairs, blocked)
+        costs = objective.collision_weight * sums + own
+        return Evaluated(costs, criteria, own, np.array(hits), blocked)
 
-    def _evaluated_lines(self, problem: Problem, populations: FloatArray) -> Evaluated:
-        """Evaluate populations of robots that are lines, by one kernel."""
-        robots, _, count = populations.shape
-        criteria, (own, costs) = np.empty((robots, 4, count)), np.empty((2, robots, count))
-        pairs = np.empty((robots * (robots - 1) // 2, count, count), dtype=np.int16)
-        objective, ends = self.objective, (problem.start, problem.goal)
-        weights = objective.own_weights, objective.collision_weight
-        if not evaluate_lines(
-            populations, *ends, problem.arms, *weights, criteria, own, pairs, costs
-        ):
-            raise ValueError(NOT_FINITE)
-        return Evaluated(costs, criteria, own, pairs, np.zeros((robots, count), dtype=np.int64))
+    def task(
+        self, problem: Problem
+    ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[float, float, float], float]:
+        """Return starts, goals, arms, weights of C2 … C4 and of C1; see `evaluate_lines`."""
+        weights = self.objective.own_weights, self.objective.collision_weight
+        return problem.start, problem.goal, problem.arms, *weights
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

@@ -5,18 +5,12 @@ costs of individuals and how often they collide; everything else here reads it.
 """
 
 from itertools import combinations
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from evoexp.evolution.best_team import (
-    BestTeam,
-    CollisionCounts,
-    best_team,
-    find_best_team,
-    pair_index,
-)
-from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
+from evoexp.evolution.best_team import CollisionCounts, best_team, find_best_team, pair_index
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
 
@@ -31,16 +25,19 @@ class Evaluated(NamedTuple):
     collisions: CollisionCounts
     blocked: IntArray  # (robots, individuals) configurations that collide with obstacles
 
+    @classmethod
+    def room(cls, *shape: int) -> Self:
+        """Return memory for populations of a shape (…, robots, individuals)."""
+        *places, robots, count = shape
+        own, costs = np.empty((2, *shape))
+        pairs = np.empty((*places, robots * (robots - 1) // 2, count, count), dtype=np.int16)
+        blocked = np.zeros(shape, dtype=np.int64)
+        return cls(costs, np.empty((*places, robots, 4, count)), own, pairs, blocked)
+
     @property
     def teamable(self) -> FloatArray:
         """(robots, individuals) own cost; inf for those that collide with an obstacle."""
-        return np.where(self.blocked > 0, np.inf, self.own) if self.blocked.any() else self.own
-
-    def standing(self) -> "Standing":
-        """Return the best team, the statistics of all costs, and the number of feasible ones."""
-        team = np.empty(len(self.own), dtype=np.int64)
-        cost, num_feasible, best, mean, std = survey(self.costs, *self[2:], team)
-        return Standing(BestTeam(team, cost), CostStatistics(best, mean, std), num_feasible)
+        return np.asarray(teamable_costs(self.own, self.blocked))
 
     def team_of(self, individual: int) -> IntArray:
         """Return the cheapest collision-free team with an individual of the first robot.
@@ -99,15 +96,6 @@ class Evaluated(NamedTuple):
         return terms
 
 
-class Standing(NamedTuple):
-    """How populations stand."""
-
-    best: BestTeam  # the cheapest team without a collision
-    statistics: CostStatistics  # of the costs of all individuals
-    # individuals of the first robot with a collision-free partner in every population
-    num_feasible: int
-
-
 class Judgement(NamedTuple):
     """Individuals of the first robot, each with its cheapest collision-free team."""
 
@@ -126,32 +114,28 @@ class Judgement(NamedTuple):
 
 
 @kernel
-def survey(
-    costs: FloatArray,
-    own: FloatArray,
-    collisions: CollisionCounts,
-    blocked: IntArray,
-    team: IntArray,
-) -> tuple[float, int, int, float, float]:
-    """Write the best team.
+def survey(found: Evaluated, team: IntArray, summary: FloatArray) -> float:
+    """Write the best team (robots,), −1 if there is none, and a summary; return the team's cost.
 
-    Args:
-        costs: See `Evaluated`, and so are the next three.
-        own: As it is there.
-        collisions: As they are there.
-        blocked: As they are there.
-        team: (robots,) written; −1 if there is none.
-
-    Returns:
-        Its cost, `Standing.num_feasible`, and `CostStatistics`.
+    The summary has the index of the best individual of all populations, mean and deviation of all
+    costs, and the number of individuals of the first robot with a collision-free partner in every
+    population.
     """
+    teamable = teamable_costs(found.own, found.blocked)
+    cost = find_best_team(found.collisions, teamable, teamable.shape[1], team)
+    summary[0], summary[1], summary[2] = cost_statistics(found.costs.reshape(-1))
+    summary[3] = count_partnered(found.collisions, found.blocked)
+    return float(cost)
+
+
+@kernel
+def teamable_costs(own: FloatArray, blocked: IntArray) -> FloatArray:
+    """Return own costs (robots, individuals); inf of those that collide with an obstacle."""
     teamable = np.empty(own.shape)
     for r in range(len(own)):
         for k in range(own.shape[1]):
             teamable[r, k] = np.inf if blocked[r, k] > 0 else own[r, k]
-    cost = find_best_team(collisions, teamable, own.shape[1], team)
-    best, mean, std = cost_statistics(costs.reshape(-1))
-    return cost, count_partnered(collisions, blocked), best, mean, std
+    return teamable
 
 
 @kernel

@@ -126,12 +126,7 @@ def evolve(
 def note(population: Population, place: int, found: Population, summaries: FloatArray) -> None:
     """Write to a place what is recorded of a generation.
 
-    Args:
-        population: The generation.
-        place: Where.
-        found: Written: results of all paths, and the best path alone.
-        summaries: (places, 4) written: index of the best, mean and deviation of the costs, number
-            of paths: all are valid.
+    These are the results of all paths, the best path alone, and the summary: all paths are valid.
     """
     results, own = population.results, summaries[place]
     found.results[place] = results
@@ -153,18 +148,7 @@ def advance(
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
-    Args:
-        draws: Uniform numbers.
-        world: Grid and fields.
-        weights: ε and λ of Eq. 1.
-        breeding: Settings of the operators.
-        population: The present one.
-        following: Written.
-        chosen: Parents and elites, written.
-        scratch: Of the operators.
-
-    Returns:
-        Whether the draws sufficed; if not, what is written is not complete.
+    Returns whether the draws sufficed; if not, what is written is not complete.
     """
     (paths, results), (children, values) = population, following
     parents, elites, count = chosen.parents, chosen.elites, len(chosen.parents)
@@ -246,11 +230,3 @@ def climb(
             for row in range(RESULTS):
                 results[row, k] = values[row, 0]
     return last
-
-
-@kernel
-def copy_paths(paths: NodeArray, out: NodeArray) -> None:
-    """Copy paths into another table, whatever the width of either."""
-    paths, out = borrowed((paths, out))
-    for k in range(len(paths)):
-        copy_path(paths[k], out[k])

@@ -87,7 +87,7 @@ class _Climbing(TableSearch):
         """Draw the random walks; keep the best of them, in a table as wide as any path."""
         planner, problem = self._planner, self._problem
         drawn = planner.sample(problem, rng, planner.ga.population_size)
-        results = planner.cost(problem, drawn).results
+        results = planner.measured(problem, drawn)
         best = np.argsort(results[COST], kind="stable")[: self._num_paths]
         paths = np.zeros((len(best), problem.fields.grid.num_nodes + 1), dtype=np.int32)
         paths[:, : drawn.shape[1]] = drawn[best]

@@ -91,16 +91,7 @@ def cross(
     every coordinate), drawn among all such pairs, is connected, by a move or by a node between.
     Start and goal, which all paths have in common, are no sites.
 
-    Args:
-        draws: Uniform numbers.
-        world: Grid and fields.
-        parents: Two paths.
-        breeding: Settings of the operators.
-        children: Two paths, written if the parents are crossed.
-        scratch: Scratch.
-
-    Returns:
-        Whether they are crossed: there may be no site.
+    Returns whether they are crossed, and the children written: there may be no site.
     """
     one, two = parents
     place, joined, sites, erase = scratch.place, scratch.joined, scratch.sites, breeding.erase
@@ -145,13 +136,6 @@ def exchange_without_loops(
 
     A loop begins in a head and ends in a tail, at a site. Erasing loops one by one leaves the head
     up to the first node that the tail passes, too, and the tail from there.
-
-    Args:
-        one: A path without loops.
-        two: Another one.
-        sites: (sites,) of both, see `coincident_sites`.
-        site: The number of the one.
-        children: Written.
     """
     # the first node of the first path's head among those of the second one's tail
     own = sites[site]
@@ -212,14 +196,8 @@ def coincident_sites(one: NodeArray, two: NodeArray, seen: IntArray, sites: IntA
     the place in the first path is in front of the lowest `PLACE_BITS`, that in the second in them.
     Sites ascend by the latter.
 
-    Args:
-        one: The first path.
-        two: The second path.
-        seen: See `Scratch`; of all paths before, nothing needs to be cleared.
-        sites: Written.
-
-    Returns:
-        The number of sites.
+    `seen` needs not be cleared between searches; both are described in `Scratch`.
+    Returns the number of sites.
     """
     search = seen[-1] + (1 << PLACE_BITS)
     seen[-1] = search
@@ -239,15 +217,7 @@ def near_sites(
 ) -> tuple[int, int]:
     """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate.
 
-    Args:
-        draws: Uniform numbers.
-        coordinates: (nodes, dimensions).
-        one: A path.
-        two: A path.
-        reach: [cell].
-
-    Returns:
-        Their places in both paths; (0, 0) if there is no such pair.
+    Returns their places in both paths; (0, 0) if there is no such pair.
     """
     # how many pairs there are
     num = 0

@@ -41,10 +41,10 @@ from evoexp.planners.grid_path_ga.kernels import (
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
-from evoexp.planners.planner import Candidate, PlannerDefaults
+from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.planners.table_search import ScaledSearch
-from evoexp.records import Block, BoolArray, FloatArray
+from evoexp.records import Block, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
@@ -70,28 +70,6 @@ class Problem(NamedTuple):
     world: World  # grid and fields, as the kernels take them
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
     security_margin: float  # clearance that the task requires [length unit]
-
-
-class Judgement(NamedTuple):
-    """Judged paths."""
-
-    results: FloatArray  # (3, individuals) length, mean unsafeness, cost
-    num_nodes: NodeArray  # (individuals,)
-    collision_queries: int = 0  # 0: free nodes and moves are known before
-
-    @property
-    def cost(self) -> FloatArray:
-        """(individuals,)."""
-        return np.asarray(self.results[COST])
-
-    @property
-    def feasible(self) -> BoolArray:
-        """(individuals,) true: paths are valid by construction."""
-        return np.isfinite(self.cost)
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the terms of one path by name."""
-        return named_terms(self.results[:, individual], self.num_nodes[individual])
 
 
 class GridPathGa(PlannerDefaults, Component):
@@ -156,8 +134,8 @@ class GridPathGa(PlannerDefaults, Component):
         while (complete := walk_each(draws.block, *arguments, complete, paths, place)) < len(paths):
             draws.extend(rng)
 
-    def cost(self, problem: Problem, population: np.ndarray) -> Judgement:
-        """Judge paths (individuals, longest + 1), valid ones.
+    def cost(self, problem: Problem, population: np.ndarray) -> JudgementArrays:
+        """Judge paths (individuals, longest + 1), which are valid by construction.
 
         Raises:
             ValueError: If a path is empty or longer than the table is wide.
@@ -167,9 +145,15 @@ class GridPathGa(PlannerDefaults, Component):
             or not 1 <= population[:, 0].min() <= population[:, 0].max() < population.shape[1]
         ):
             raise ValueError(f"paths must be (individuals, longest + 1), was {population.shape}")
-        results = np.empty((RESULTS, len(population)))
-        kernels.measure_all(population, problem.world, self.objective.weights, results)
-        return Judgement(results, population[:, 0])
+        distance, unsafeness, cost = self.measured(problem, population)
+        terms = {"distance": distance, "unsafeness": unsafeness, "num_nodes": population[:, 0]}
+        return JudgementArrays(cost, np.isfinite(cost), 0, terms)
+
+    def measured(self, problem: Problem, paths: NodeArray) -> FloatArray:
+        """Return lengths, mean unsafenesses and costs of paths, (3, individuals)."""
+        results = np.empty((RESULTS, len(paths)))
+        kernels.measure_all(paths, problem.world, self.objective.weights, results)
+        return results
 
     def solution(self, problem: Problem, population: np.ndarray, individual: int) -> FloatArray:
         """Return a path as a flat solution."""
@@ -255,16 +239,15 @@ class _Search(ScaledSearch):
             planner.crossover_reach,
             ga.mutation_rate,
         )
-        scratch, found = Scratch.of(nodes), (self._found, self.summaries)
-        self._world = problem.world, planner.objective.weights
-        self.arguments = *self._world, breeding, self._table, self.chosen, scratch, *found
+        world, found = (problem.world, planner.objective.weights), (self._found, self.summaries)
+        self.arguments = *world, breeding, self._table, self.chosen, Scratch.of(nodes), *found
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
         paths, results = self._table.paths[0], self._table.results[0]
         drawn = self._planner.sample(self._problem, rng, len(paths))
         paths[:, : drawn.shape[1]] = drawn
-        kernels.measure_all(paths, *self._world, results)
+        results[:] = self._planner.measured(self._problem, paths)
         kernels.note(Population(paths, results), 0, self._found, self.summaries)
 
     def candidate(self, place: int, individual: int) -> Candidate:
@@ -281,9 +264,8 @@ class _Search(ScaledSearch):
 
 def trimmed(paths: NodeArray) -> NodeArray:
     """Return a copy of paths as wide as the longest one; zeros stand behind the others."""
-    out = np.zeros((len(paths), int(paths[:, 0].max()) + 1), dtype=np.int32)
-    kernels.copy_paths(paths, out)
-    return out
+    width = int(paths[:, 0].max()) + 1
+    return np.where(np.arange(width) <= paths[:, :1], paths[:, :width], np.int32(0))
 
 
 @functools.lru_cache(maxsize=32)

@@ -97,17 +97,7 @@ def advance(
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
-    Args:
-        draws: Uniform numbers.
-        breeding: Settings of the operators.
-        coding: The meaning of strings.
-        model: Task, weights and limits of the criteria.
-        population: The present one.
-        following: Written.
-        chosen: Parents and elites, written.
-
-    Returns:
-        Whether the draws sufficed; if not, what is written is not complete.
+    Returns whether the draws sufficed; if not, what is written is not complete.
     """
     strings, rows, children = population.strings, population.rows, following.strings
     parents, elites, bits, count = chosen.parents, chosen.elites, coding.bits, len(chosen.parents)
@@ -129,37 +119,6 @@ def advance(
         for row in range(ROWS):
             following.rows[row, count + e] = rows[row, elites[e]]
     return True
-
-
-@kernel
-def draw_generations(
-    uniforms: FloatArray,
-    first: int,
-    coding: Coding,
-    model: Model,
-    table: Population,
-    summaries: FloatArray,
-) -> None:
-    """Draw and judge generations of random strings.
-
-    Args:
-        uniforms: (generations, 2 · individuals) in [0, 1): a row per generation.
-        first: The generation before them.
-        coding: The meaning of strings.
-        model: Task, weights and limits of the criteria.
-        table: Some generations, written; number g is at place g modulo the number of places.
-        summaries: (places, 4) written, see `summarise_rows`.
-    """
-    coding, model, table, summaries = borrowed((coding, model, table, summaries))
-    count, values = table.strings.shape[2], 2.0**coding.bits
-    for step in range(len(uniforms)):
-        place = (first + 1 + step) % len(summaries)
-        strings, rows = table.strings[place], table.rows[place]
-        for gene in range(GENES):
-            for k in range(count):
-                strings[gene, k] = int(values * uniforms[step, gene * count + k])
-        judge(strings, coding, model, count, rows)
-        summarise_rows(rows, summaries[place])
 
 
 @kernel

@@ -19,17 +19,16 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import of_limits
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
-from evoexp.planners.planner import Candidate, PlannerDefaults
+from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.table_search import ScaledSearch, TableSearch, generations_per_call
-from evoexp.records import Block, BoolArray, FloatArray, IntArray
+from evoexp.planners.table_search import ScaledSearch
+from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
@@ -39,8 +38,6 @@ NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, �
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
 PER_CALL = 16  # generations; see `ScaledSearch`: another number needs another revision
-DRAWN_PER_CALL = 64  # generations of random strings that are computed in one call, at most,
-MEMORY = 1 << 21  # [B] or as many as take so much memory
 BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
@@ -53,20 +50,6 @@ class Problem(NamedTuple):
     # the bodies themselves, links against links too, for the exact verdict on a posture
     scene: Scene
     security_margin: float  # clearance that the task requires [length unit]
-
-
-class Judgement(NamedTuple):
-    """A judged population."""
-
-    cost: FloatArray  # (individuals,) E of Eq. 14; E_m where infeasible.
-    # (individuals,) whether the end-effector reaches its target within all limits
-    feasible: BoolArray
-    terms: FloatArray  # (4, individuals) the criteria, see NAMES
-    collision_queries: int = 0
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the criteria of one individual by name."""
-        return dict(zip(NAMES, self.terms[:, individual].tolist(), strict=True))
 
 
 class PlacementGa(PlannerDefaults, Component):
@@ -116,18 +99,15 @@ class PlacementGa(PlannerDefaults, Component):
         """Yield the initial population, then every generation."""
         return _Search(self, problem).blocks(rng)
 
-    def random_run(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block] | None:
-        """Return generations of random strings, see `PlannerDefaults`."""
-        return _RandomStrings(self, problem).blocks(rng) if self.ga.num_offspring else None
-
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random strings, (2, count)."""
         return np.floor(2.0**self.bits_per_gene * rng.random((GENES, count))).astype(np.int64)
 
-    def cost(self, problem: Problem, population: np.ndarray) -> Judgement:
+    def cost(self, problem: Problem, population: np.ndarray) -> JudgementArrays:
         """Judge a population of strings (2, individuals)."""
         criteria = self._judged(problem, population)[FIRST_CRITERION:]
-        return Judgement(criteria[0], criteria[-1] >= 0.0, criteria[1:-1])
+        terms = dict(zip(NAMES, criteria[1:-1], strict=True))
+        return JudgementArrays(criteria[0], criteria[-1] >= 0.0, 0, terms)
 
     def solution(self, problem: Problem, population: np.ndarray, individual: int) -> FloatArray:
         """Return θ1 and θ2 of an individual [deg]."""
@@ -185,32 +165,28 @@ class PlacementGa(PlannerDefaults, Component):
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of the tables of the generations of a call."""
-        return (PER_CALL + 2) * self._table_size
-
-    @property
-    def _table_size(self) -> int:
-        """Memory of the strings of a generation and what they are judged by [B]."""
-        return 8 * (GENES + ROWS) * self.ga.population_size
+        return 8 * (PER_CALL + 2) * (GENES + ROWS) * self.ga.population_size
 
     def shape(self, problem: Problem) -> tuple[tuple[()], ...]:
         """Return the documented shape of a solution: two numbers, θ1 and θ2."""
         return ((),) * GENES
 
 
-class _Strings(TableSearch):
-    """Generations of strings in a table."""
+class _Search(ScaledSearch):
+    """One run, and memory for its kernels."""
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
+        ga, size = planner.ga, planner.ga.population_size
+        super().__init__(ga, kernels.evolve, PER_CALL, BLOCK)
         self._planner, self._problem = planner, problem
         self._judging = planner.strings_of(problem), problem.model
-
-    def _take(self, size: int) -> None:
-        """Take memory for generations of a size."""
         self._table = Population(
             np.empty((self.num_places, GENES, size), dtype=np.int64),
             np.empty((self.num_places, ROWS, size)),
         )
         self.costs = self._table.rows[:, FIRST_CRITERION]
+        breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
+        self.arguments = breeding, *self._judging, self._table, self.chosen, self.summaries
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
@@ -228,43 +204,6 @@ class _Strings(TableSearch):
     def population(self, index: int) -> IntArray:
         """Return the strings."""
         return np.asarray(self._table.strings[index % self.num_places])
-
-
-class _Search(_Strings, ScaledSearch):
-    """One run, and memory for its kernels."""
-
-    def __init__(self, planner: PlacementGa, problem: Problem) -> None:
-        ga = planner.ga
-        ScaledSearch.__init__(self, ga, kernels.evolve, PER_CALL, BLOCK)
-        _Strings.__init__(self, planner, problem)
-        self._take(ga.population_size)
-        breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
-        self.arguments = breeding, *self._judging, self._table, self.chosen, self.summaries
-
-
-class _RandomStrings(_Strings):
-    """Generations of random strings: the random search of a placement search."""
-
-    def __init__(self, planner: PlacementGa, problem: Problem) -> None:
-        per_call = generations_per_call(DRAWN_PER_CALL, planner._table_size, MEMORY)
-        TableSearch.__init__(self, planner.ga, per_call)
-        _Strings.__init__(self, planner, problem)
-        self._take(planner.ga.population_size)
-
-    def begin(self, rng: np.random.Generator) -> None:
-        """Draw and judge the initial population."""
-        super().begin(rng)
-        self._ahead = DrawnAhead(rng, GENES * self._ga.num_offspring)
-
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Draw and judge generations."""
-        if first == 0:  # more strings are drawn at first than later
-            self._take(self._ga.num_offspring)
-        count, each = last - first, GENES * self._ga.num_offspring
-        uniforms = self._ahead.draw(count).reshape(count, each)
-        kernels.draw_generations(uniforms, first, *self._judging, self._table, self.summaries)
-        self.states = self._ahead.take([each] * count)
-        return last
 
 
 @lru_cache(maxsize=32)

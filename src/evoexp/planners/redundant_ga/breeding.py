@@ -57,17 +57,7 @@ def breed(
     parents: IntArray,
     out: FloatArray,
 ) -> None:
-    """Write offspring: selected, crossed and mutated.
-
-    Args:
-        draws: Random numbers.
-        spread: Of mutation, see `mutate_genes`.
-        breeding: Settings of the operators.
-        costs: (individuals,) of the parents' generation.
-        genomes: (genes, individuals) of the parents' generation.
-        parents: (offspring,) written.
-        out: (genes, ≥ offspring) written.
-    """
+    """Write offspring: selected, crossed and mutated."""
     # parents
     if breeding.selection == TOURNAMENT:
         choose_by_tournament(draws.choosing, costs, breeding.tournament_size, parents)

@@ -143,18 +143,7 @@ def draw(
     memory: Memory,
     checks: PathChecks,
 ) -> None:
-    """Draw the first `count` individuals, uniform within the limits or bit by bit, and judge them.
-
-    Args:
-        words: The random generator.
-        count: Number of individuals.
-        breeding: Coding and limits.
-        judging: Collision model and objective.
-        starts: See `evolve`.
-        table: Written.
-        memory: Scratch.
-        checks: Of the ellipses.
-    """
+    """Draw and judge the first `count` individuals, uniform within the limits or bit by bit."""
     num_genes, limits, numbers = breeding.num_genes, breeding.limits, np.empty(count)
     for gene in range(num_genes):
         fill_uniforms(words, numbers)
@@ -194,19 +183,7 @@ def advance(
     memory: Memory,
     checks: PathChecks,
 ) -> None:
-    """Write the population that follows generation `index`: offspring, then elites, best first.
-
-    Args:
-        draws: Random numbers.
-        index: Of the present generation.
-        breeding: Settings of the operators.
-        judging: Collision model and objective.
-        starts: See `evolve`.
-        population: Table of the present generation.
-        following: Written.
-        memory: Scratch.
-        checks: Of the ellipses.
-    """
+    """Write the population that follows generation `index`: offspring, then elites, best first."""
     elites, count, num_genes = memory.elites, len(memory.parents), breeding.num_genes
     costs = population[len(population) - RESULTS, : len(memory.hit)]
     choose_elites(costs, elites)
@@ -249,16 +226,7 @@ def judge_children(
 
     A child that ends outside the box, or is its own parent, is not tested for collisions.
 
-    Args:
-        starts: (joints, ≥ offspring), the same for all [rad].
-        angles: (joints, ≥ offspring) of the offspring [rad].
-        num_genes: Rows that make a child its own parent if they are equal; the child then costs as
-            much as the parent.
-        judging: Collision model and objective.
-        population: Table of the parents.
-        following: Table of the offspring; its last rows are written.
-        memory: The parents; scratch.
-        checks: Of the ellipses.
+    The first `num_genes` rows make a child its own parent if they are equal; it then costs as much.
     """
     row, count, parents, lanes = (
         len(population) - RESULTS,

@@ -15,53 +15,28 @@ that stays there, at the cost inf. The individuals of SP1 cost their objective o
 in a generation of SP1 costs inf.
 """
 
-from collections.abc import Generator, Iterator, Mapping
-from typing import Any, ClassVar, Literal, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
-from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
+from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
-from evoexp.planners.redundant_ga.sub_path import BestEnd, RunMemory, Search
-from evoexp.planners.redundant_ga.sub_path_costs import RESULTS, Judging, judge_paths
-from evoexp.records import Block, BoolArray, FloatArray
+from evoexp.planners.redundant_ga.sub_path import TERMS, Search
+from evoexp.planners.redundant_ga.sub_path_costs import Judging, judge_paths
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
 
-TERMS = (
-    ("of", ""),
-    ("position_error", ""),
-    ("joint_displacement", "_rad"),
-)  # of each sub-path, with unit
 CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellipses.Contact`
-
-
-class Judgement(NamedTuple):
-    """Judged plans."""
-
-    cost: FloatArray  # (individuals,) objective of SP2; inf where SP1 is not successful
-    accepted: BoolArray  # (individuals,) whether both sub-paths are successful
-    # of every sub-path cost, position error and joint displacement, (2, 3, individuals)
-    terms: FloatArray
-    collision_queries: int  # configurations judged
-
-    @property
-    def feasible(self) -> BoolArray:
-        """(individuals,) whether the paper's own rules accept each plan."""
-        return self.accepted
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the terms of one plan by name."""
-        return named_terms(self.terms[:, :, individual])
 
 
 class RedundantGa(PlannerDefaults, Component):
@@ -111,54 +86,22 @@ class RedundantGa(PlannerDefaults, Component):
             rng: Source of all random numbers.
             kind: What searches a sub-path: the genetic algorithm, or a control in its place.
         """
-        judgings = tuple(self._judging(problem, path) for path in range(2))
-        plans, proofs = _Plans(self, problem, judgings), None
-        memory = RunMemory(self.ga, problem.joint_limits, rng)
-        if self.answers_are_proven:
-            proofs = Proofs(self, problem)
-
-        def search_from(*start: FloatArray) -> Search:
-            """Return the search of SP1, or of SP2 behind a posture A."""
-
-            def is_proven(end: FloatArray) -> bool:
-                assert proofs is not None
-                return proofs.is_proven(np.concatenate([*start, *[end] * (3 - len(start))]))
-
-            path = len(start) - 1
-            stop_cost, accepts = self._stop_costs[path], is_proven if proofs else None
-            return kind(memory, judgings[path], start[-1], stop_cost, accepts)
-
+        search = kind(self, problem, rng)
         for _ in range(self.num_attempts):
-            plans.begin_attempt()
-            via = yield from self._search(search_from(problem.start), plans, 0)
+            via = yield from search.sub_path(problem.start)
             if self.successful(0, via.cost):
-                plans.via = via
-                search = search_from(problem.start, via.posture)
-                goal = yield from self._search(search, plans, 1)
+                goal = yield from search.sub_path(problem.start, via.posture)
                 if self.successful(1, goal.cost):
                     return
 
-    def _search(
-        self, search: Search, plans: "_Plans", path: int
-    ) -> Generator[Block, None, BestEnd]:
-        """Search the end of one sub-path (0: SP1, 1: SP2); yield generations, return the best."""
-        search.begin()
-        plans.begin(path)
-        yield plans.record(search, self.ga.population_size)
-        for index in range(self.ga.num_generations):
-            if search.lowest < self._stop_costs[path]:
-                break
-            search.advance(index)
-            yield plans.record(search, self.ga.num_offspring)
-        return search.best()
-
     @property
-    def _stop_costs(self) -> tuple[float, float]:
+    def stop_costs(self) -> tuple[float, float]:
+        """Costs of SP1 and SP2 below which their searches end."""
         return self.stop_cost_sp1, self.stop_cost_sp2
 
     def successful(self, path: int, cost: Any) -> Any:
         """Return whether costs of a sub-path (0: SP1, 1: SP2) are a success."""
-        return cost < (self._stop_costs[path] if self.success == "threshold" else np.inf)
+        return cost < (self.stop_costs[path] if self.success == "threshold" else np.inf)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures A and B, uniform within the joint limits, (2, joints, count)."""
@@ -168,30 +111,29 @@ class RedundantGa(PlannerDefaults, Component):
         postures += low[:, None]
         return postures
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge pairs of postures A and B (2, joints, individuals): what random search draws.
 
         A pair costs as much as its SP2 if its SP1 is successful, else inf, like a finished plan of
         the algorithm. It is one evaluation of random search and takes two of the objective.
         """
-        starts = np.broadcast_to(problem.start[:, None], population.shape[1:])
-        terms = np.array(
-            [self._judge(problem, 0, starts, population[0]), self._judge(problem, 1, *population)]
+        starts = np.repeat(problem.start[:, None], population.shape[2], axis=1)
+        first, second = np.ascontiguousarray(population)
+        terms = np.concatenate(
+            [
+                judge_paths(starts, first, self.judging(problem, 0)),
+                judge_paths(first, second, self.judging(problem, 1)),
+            ]
         )
-        cost = np.where(self.successful(0, terms[0, 0]), terms[1, 0], np.inf)
+        named = dict(zip(TERMS, terms, strict=True))
+        cost = np.where(self.successful(0, named["of_sp1"]), named["of_sp2"], np.inf)
         if self.answers_are_proven:
             Proofs(self, problem).settle(cost, lambda k: self.solution(problem, population, k))
         queries = 2 * problem.collision.queries * population.shape[2]
-        return Judgement(cost, np.asarray(self.successful(1, cost)), terms, queries)
+        return JudgementArrays(cost, np.asarray(self.successful(1, cost)), queries, named)
 
-    def _judge(
-        self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray
-    ) -> FloatArray:
-        """Return cost, position error and joint displacement of sub-paths, (3, individuals)."""
-        return _judge(self._judging(problem, path), starts, ends)
-
-    def _judging(self, problem: Problem, path: int) -> Judging:
-        """Return collision model and objective of a sub-path."""
+    def judging(self, problem: Problem, path: int) -> Judging:
+        """Return collision model and objective of a sub-path (0: SP1, 1: SP2)."""
         collision = problem.collision
         return Judging(
             collision.arm,
@@ -219,7 +161,8 @@ class RedundantGa(PlannerDefaults, Component):
             ValueError: If the solution has another size than 3 × joints.
         """
         postures = self._postures(problem, solution)
-        named = named_terms(self.judge_plan(problem, solution))
+        terms = self.judge_plan(problem, solution)
+        named = dict(zip(TERMS, terms.ravel().tolist(), strict=True))
         for k in range(2):
             contact = problem.collision.contact(*postures[k : k + 2]) or (0, 0, 0, False)
             for name, value in zip(CONTACT, contact, strict=True):
@@ -241,8 +184,10 @@ class RedundantGa(PlannerDefaults, Component):
 
     def judge_plan(self, problem: Problem, solution: FloatArray) -> FloatArray:
         """Return cost, position error and joint displacement of both sub-paths, (2, 3)."""
-        ends = self._postures(problem, solution)[:, :, None]
-        return np.array([self._judge(problem, k, *ends[k : k + 2])[:, 0] for k in range(2)])
+        start, via, goal = self._postures(problem, solution)[:, :, None].copy()
+        first = judge_paths(start, via, self.judging(problem, 0))
+        second = judge_paths(via, goal, self.judging(problem, 1))
+        return np.array([first[:, 0], second[:, 0]])
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of the postures of a search, coded in bits if they are."""
@@ -259,90 +204,3 @@ class RedundantGa(PlannerDefaults, Component):
         if solution.shape != (3 * num,):
             raise ValueError(f"a solution has {3 * num} values, was {solution.shape}")
         return solution.reshape(3, num)
-
-
-class _Plans:
-    """The best plan so far, and the records of generations.
-
-    Attributes:
-        via: The posture A that SP2 starts from.
-    """
-
-    def __init__(self, planner: RedundantGa, problem: Problem, judgings: Any) -> None:
-        self._planner, self._problem, self._keeper = planner, problem, Keeper()
-        self._judgings, self._queries = judgings, problem.collision.queries
-        self._attempts, self._path = 0, 0
-        self.via = BestEnd(np.inf, problem.start, np.empty(0))
-        self._via_cost = np.inf  # of the posture A that takes the place of a plan
-
-    def begin_attempt(self) -> None:
-        """Count an attempt."""
-        self._attempts += 1
-
-    def begin(self, path: int) -> None:
-        """Begin with a sub-path (0: SP1, 1: SP2)."""
-        self._path, keeper = path, self._keeper
-        keeper.best = keeper.best._replace(terms=keeper.best.terms | self._counts)
-
-    @property
-    def _counts(self) -> dict[str, float]:
-        return {"attempts": float(self._attempts), "sub_path": self._path + 1.0}
-
-    def record(self, search: Search, count: int) -> Block:
-        """Improve the best plan by a population of which `count` are new; return its record."""
-        keeper, path, costs = self._keeper, self._path, search.costs
-        if path == 0:
-            self._improve_via(search)
-        elif search.lowest < keeper.cost:
-            best = search.best()
-            terms = named_terms(np.array([self.via.terms, best.terms]))
-            self._keep(best.cost, self.via.posture, best.posture, terms)
-        return keeper.record(
-            search.statistics,
-            costs[None, :],
-            search.genomes,
-            lowest=np.inf if path == 0 else costs.item(search.statistics.best),
-            num_feasible=search.num_finite,
-            evaluations=count,
-            collision_queries=count * self._queries,
-        )
-
-    def _improve_via(self, search: Search) -> None:
-        """Without a plan of finite cost, keep the best posture A as a plan that stays there."""
-        keeper = self._keeper
-        if keeper.index < 0 or (keeper.cost == np.inf and search.lowest < self._via_cost):
-            best = search.best()
-            self._via_cost, start, end = best.cost, self._problem.start[:, None], best.posture
-            ends = (start, end[:, None]), (end[:, None], end[:, None])
-            pairs = zip(self._judgings, ends, strict=True)
-            terms = np.array([_judge(judging, *pair)[:, 0] for judging, pair in pairs])
-            self._keep(np.inf, end, end, named_terms(terms))
-
-    def _keep(
-        self, cost: float, via: FloatArray, goal: FloatArray, terms: dict[str, float]
-    ) -> None:
-        plan = np.concatenate([self._problem.start, via, goal])
-        solved = bool(self._planner.successful(1, cost))
-        self._keeper.keep(cost, Candidate(plan, terms | self._counts, solved))
-
-
-def _judge(judging: Judging, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Return cost, position error and joint displacement of sub-paths, (3, individuals).
-
-    Args:
-        judging: Collision model and objective.
-        starts: (joints, individuals) [rad].
-        ends: (joints, individuals) [rad].
-    """
-    count = starts.shape[1]
-    lanes, results = np.arange(count + LANES), np.empty((RESULTS, count))
-    starts, ends = np.ascontiguousarray(starts), np.ascontiguousarray(ends)
-    hit = np.zeros(count, dtype=np.bool_)
-    judge_paths(starts, ends, lanes, count, judging, results, hit)
-    return results
-
-
-def named_terms(terms: FloatArray) -> dict[str, float]:
-    """Return cost, position error and joint displacement of both sub-paths (2, 3) by name."""
-    names = (f"{name}_sp{path}{unit}" for path in (1, 2) for name, unit in TERMS)
-    return dict(zip(names, terms.ravel().tolist(), strict=True))

@@ -1,11 +1,13 @@
-"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001)."""
+"""Genetic searches for the end postures of sub-paths, one after the other, and the best plan.
 
-from collections.abc import Callable
-from typing import NamedTuple
+Lavoie & Boudreau 2001.
+"""
+
+from collections.abc import Generator
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.crossover import (
     CROSSOVERS,
     ONE_POINT,
@@ -20,65 +22,74 @@ from evoexp.evolution.mutation import (
     SCOPES,
     num_mutation_uniforms,
 )
+from evoexp.numeric.generator_state import STATE_SIZE, state_bytes
 from evoexp.numeric.pcg64 import Twin
 from evoexp.numeric.vectors import LANES
+from evoexp.planners.planner import Candidate
+from evoexp.planners.proofs import Proofs
+from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.breeding import Breeding
-from evoexp.planners.redundant_ga.kernels import SUMMARY, Generations, Memory
+from evoexp.planners.redundant_ga.kernels import Generations, Memory
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
-from evoexp.planners.redundant_ga.sub_path_costs import RESULTS, Judging
-from evoexp.records import FloatArray
+from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
+from evoexp.planners.table_search import TableSearch, generations_per_call
+from evoexp.records import Best, Block, FloatArray, IntArray
 
+TERMS = tuple(
+    f"{name}_sp{path}{unit}"
+    for path in (1, 2)
+    for name, unit in (("of", ""), ("position_error", ""), ("joint_displacement", "_rad"))
+)  # of both sub-paths, with unit
 SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
 STRETCH = 8  # generations computed per call, at most,
 MEMORY = 2**20  # [B] whose tables should not take more than this
 
 
 class BestEnd(NamedTuple):
-    """The best individual of a population."""
+    """The best end of a sub-path."""
 
     cost: float  # eq. 4.
     posture: FloatArray  # (joints,) [rad]
     terms: FloatArray  # (3,) cost, position error, joint displacement
 
 
-class RunMemory:
-    """Generator, settings and memory for generations that the searches of one run share.
+class Search(TableSearch):
+    """One run: searches for the ends of SP1 and SP2 in turn, in the same memory.
 
     Attributes:
-        ga: Settings.
-        twin: Of the run's generator.
-        breeding: The operators, as kernels take them.
-        num_places: Generations in memory.
-        generations: See `kernels.Generations`.
-        memory: See `kernels.Memory`.
-        costs: Of every place (individuals,), a view.
-        angles: Of every place (joints, individuals), a view [rad].
-        genomes: Of every place (genes, individuals), a view.
+        end: The best end of the present search.
     """
 
-    def __init__(self, ga: SelectiveSettings, limits: FloatArray, rng: np.random.Generator) -> None:
-        """Take the settings, and memory.
+    evolving = True
+    end: BestEnd
+
+    def __init__(self, planner: Any, problem: Problem, rng: np.random.Generator) -> None:
+        """Take memory.
 
         Args:
-            ga: Settings.
-            limits: (joints, 2) [rad].
+            planner: A `RedundantGa`.
+            problem: Its problem.
             rng: Source of all random numbers.
         """
+        ga, limits = planner.ga, problem.joint_limits
         breeding, size, count = _breeding(ga, limits), ga.population_size, ga.num_offspring
-        self.ga, self.twin, self.breeding = ga, Twin(rng), breeding
         first = breeding.num_genes if breeding.binary else 0
         rows, filled = first + len(limits) + RESULTS, -(-size // LANES) * LANES
-        stretch = max(1, min(STRETCH, MEMORY // (8 * rows * filled)))
-        self.num_places = min(stretch, ga.num_generations) + 1
-        self.generations = Generations(
+        per_call = generations_per_call(STRETCH, 8 * rows * filled, MEMORY)
+        super().__init__(ga, 1 if planner.answers_are_proven else per_call)
+        self._planner, self._problem, self._breeding = planner, problem, breeding
+        self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
+        self._rng, self._words = rng, Twin(rng).words
+        self._behind = state_bytes(rng.bit_generator)[STATE_SIZE:]  # the same in all states
+        self._generations = Generations(
             np.zeros((self.num_places, rows, filled)),
             np.empty((self.num_places, 2), dtype=np.uint64),
-            np.empty((self.num_places, SUMMARY)),
+            self.summaries,
         )
         choosing, crossing, mutating = _num_uniforms(ga, breeding)
         gaussian = breeding.mutation == GAUSSIAN
-        memory = Memory(
+        self._memory = Memory(
             np.empty(choosing + crossing + mutating),
             np.empty((breeding.num_genes if gaussian else 0, count)),
             np.empty(count, dtype=np.int64),
@@ -88,135 +99,164 @@ class RunMemory:
             choosing,
             crossing,
         )
-        self.memory = memory
-        tables = self.generations.tables[:, :, :size]
-        self.costs, self.angles = list(tables[:, -RESULTS]), list(tables[:, first:-RESULTS])
-        self.genomes = list(tables[:, : breeding.num_genes])
+        self._tables, self.queries_each = self._generations.tables, problem.collision.queries
+        self._angles = self._tables[:, first:-RESULTS]
+        self._attempts, self._path = 0, 0
+        self._via_cost = np.inf  # of the posture A that takes the place of a plan
 
-
-class Search:
-    """One run of the genetic algorithm over the ends of one sub-path.
-
-    Several generations are computed per call of a kernel, and shown one after the other.
-    """
-
-    evolving = True
-    # (genes, individuals) of the population, a copy: one array for all generations
-    genomes: FloatArray
-    costs: FloatArray  # (individuals,) a view
-    lowest: float  # the best individual's cost; elites keep it the best so far
-    statistics: CostStatistics  # mean and deviation of the costs
-    num_finite: int  # number of finite costs
-
-    def __init__(
-        self,
-        memory: RunMemory,
-        judging: Judging,
-        start: FloatArray,
-        stop_cost: float,
-        accepts: Callable[[FloatArray], bool] | None = None,
-    ) -> None:
-        """Begin a search.
+    def sub_path(self, *postures: FloatArray) -> Generator[Block, None, BestEnd]:
+        """Search the end of SP1, or of SP2 behind a posture A; return the best one.
 
         Args:
-            memory: Of the run, for one search after the other.
-            judging: Collision model and objective of the sub-path.
-            start: (joints,) where the sub-path begins [rad].
-            stop_cost: The search ends where the best costs less.
-            accepts: Whether a posture (joints,) may be the best one; None: any of finite cost.
+            postures: (joints,) the start, and the posture A if SP2 is searched [rad].
         """
-        self._memory, self._judging, self._accepts = memory, judging, accepts
-        self._starts = np.repeat(start[:, None], memory.ga.population_size, axis=1)
-        self.genomes = np.empty(memory.genomes[0].shape)
-        self._stop_cost, self._known, self._place = stop_cost, 0, 0
+        self._postures, self._path = postures, len(postures) - 1
+        if self._path == 0:
+            self._attempts += 1
+        else:
+            self._via = self.end
+        self._judging = self._planner.judging(self._problem, self._path)
+        self._starts = np.repeat(postures[-1][:, None], self._ga.population_size, axis=1)
+        self.costs = self._tables[:, None, -RESULTS, : self._ga.population_size]
+        self._shown = np.empty((self._breeding.num_genes, self._ga.population_size))
+        best = self.keeper.best
+        self.keeper.best = best._replace(terms=best.terms | self._counts)
+        yield from self.blocks(self._rng)
+        return self.end
 
-    def begin(self) -> None:
+    @property
+    def _counts(self) -> dict[str, float]:
+        return {"attempts": float(self._attempts), "sub_path": self._path + 1.0}
+
+    @property
+    def _stop_cost(self) -> float:
+        return float(self._planner.stop_costs[self._path])
+
+    @property
+    def is_done(self) -> bool:  # type: ignore[override]
+        """Whether the best end is good enough."""
+        return self.end.cost < self._stop_cost
+
+    def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        run = self._memory
-        run.twin.meet()
-        kernels.begin(
-            run.twin.words, run.breeding, self._judging, self._starts, run.generations, run.memory
+        arguments = self._breeding, self._judging, self._starts, self._generations, self._memory
+        kernels.begin(self._words, *arguments)
+        self._complete(0, 0)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Compute generations, as far as the best end is not good enough."""
+        reached = kernels.evolve(
+            self._words,
+            first,
+            last,
+            self._stop_cost,
+            self.evolving,
+            self._breeding,
+            self._judging,
+            self._starts,
+            self._generations,
+            self._memory,
         )
-        self._show(0)
+        self._complete(first + 1, reached)
+        return int(reached)
 
-    def advance(self, index: int) -> None:
-        """Go on from the population of generation `index` to the next one."""
-        run = self._memory
-        if index == self._known:
-            ahead = 1 if self._accepts is not None else run.num_places - 1
-            run.twin.meet()
-            self._known = kernels.evolve(
-                run.twin.words,
-                index,
-                min(index + ahead, run.ga.num_generations),
-                self._stop_cost,
-                self.evolving,
-                run.breeding,
-                self._judging,
-                self._starts,
-                run.generations,
-                run.memory,
-            )
-        self._show(index + 1)
-
-    def _show(self, index: int) -> None:
-        """Show a generation that is computed; the run's generator is where it was behind it."""
-        run = self._memory
-        self._place = place = index % run.num_places
-        run.twin.follow(run.generations.states[place])
-        self.costs = run.costs[place]
-        self._take(place)
-        np.copyto(self.genomes, run.genomes[place][:, : len(self.costs)])
-
-    def _take(self, place: int) -> None:
-        """Take over the summary of a generation; refused ends cost inf."""
-        costs, summary = self.costs, self._memory.generations.summaries[place]
-        best, mean, std, finite = summary.tolist()
-        self.lowest = costs.item(int(best))
-        while self._accepts is not None and np.isfinite(self.lowest):
-            if self._accepts(self._memory.angles[place][:, int(best)]):
+    def _complete(self, first: int, last: int) -> None:
+        """Take over the states of the generator; where proofs are asked for, refute ends."""
+        places = np.arange(first, last + 1) % self.num_places
+        halves = self._generations.states[places][:, ::-1]  # the low one first
+        self.states = [words.astype("<u8").tobytes() + self._behind for words in halves]
+        if self._proofs is None:
+            return
+        place = places.item(-1)
+        costs, summary = self.costs[place, 0], self.summaries[place]
+        while np.isfinite(costs[best := int(summary[0])]):
+            end = self._angles[place][:, best]
+            if self._proofs.is_proven(
+                np.concatenate([*self._postures, *[end] * (3 - len(self._postures))])
+            ):
                 break
-            costs[int(best)] = np.inf
+            costs[best] = np.inf
             kernels.summarise_costs(costs, summary)
-            best, mean, std, finite = summary.tolist()
-            self.lowest = costs.item(int(best))
-        self.statistics, self.num_finite = CostStatistics(int(best), mean, std), int(finite)
 
-    def best(self) -> BestEnd:
-        """Return a copy of the best individual."""
-        run, place, k = self._memory, self._place, self.statistics.best
-        posture = run.angles[place][:, k].copy()
-        return BestEnd(self.lowest, posture, run.generations.tables[place, -RESULTS:, k].copy())
+    def improve(self, places: IntArray) -> list[Best]:
+        """Keep the best plan of the generations at some places; return the bests of their block."""
+        bests = {0: self.keeper.standing}
+        for k, place in enumerate(places.tolist()):
+            self.end = self._best_end(place)
+            if self._improves():
+                bests[k] = self.keeper.standing._replace(place=k)
+        return [*bests.values()]
+
+    def _improves(self) -> bool:
+        """Keep the plan with the best end if it is better than the one that is kept.
+
+        Without a plan of finite cost, the best posture A is kept as a plan that stays there.
+        """
+        keeper, end = self.keeper, self.end
+        if self._path == 1:
+            if end.cost < keeper.cost:
+                self._keep(end.cost, self._via, end, np.array([self._via.terms, end.terms]))
+                return True
+        elif keeper.index < 0 or (keeper.cost == np.inf and end.cost < self._via_cost):
+            self._via_cost, problem = end.cost, self._problem
+            plan = np.concatenate([problem.start, end.posture, end.posture])
+            self._keep(np.inf, end, end, self._planner.judge_plan(problem, plan))
+            return True
+        return False
+
+    def _keep(self, cost: float, via: BestEnd, goal: BestEnd, terms: FloatArray) -> None:
+        plan = np.concatenate([self._problem.start, via.posture, goal.posture])
+        named = dict(zip(TERMS, terms.ravel().tolist(), strict=True)) | self._counts
+        solved = bool(self._planner.successful(1, cost))
+        self.keeper.keep(cost, Candidate(plan, named, solved))
+
+    def _best_end(self, place: int) -> BestEnd:
+        """Return the best individual of a generation; elites keep it the best so far."""
+        best = int(self.summaries[place, 0])
+        terms = self._tables[place, -RESULTS:, best].copy()
+        return BestEnd(terms.item(0), self._angles[place][:, best].copy(), terms)
+
+    def lowest(self, places: IntArray) -> FloatArray:
+        """Return the lowest costs of generations; inf in SP1, which has no whole plans."""
+        if self._path == 0:
+            return np.full(len(places), np.inf)
+        return np.asarray(self.costs[places, 0, self.summaries[places, 0].astype(np.int64)])
+
+    def population(self, index: int) -> FloatArray:
+        """Return the genomes of a generation, in the same array for all of a search."""
+        count, genes = self.costs.shape[2], self._breeding.num_genes
+        shown = self._shown[:, :count]
+        np.copyto(shown, self._tables[index % self.num_places, :genes, :count])
+        return shown
 
 
 class DrawnSearch(Search):
     """The same search without evolution: every generation is drawn as the initial population is.
 
     A generation draws as many individuals as the genetic algorithm breeds, and costs as many
-    evaluations. `genomes` and `costs` are those of the last draw; the best is that of all draws.
+    evaluations. The best end is that of all draws.
     """
 
     evolving = False
-    _best: BestEnd | None = None
 
-    def advance(self, index: int) -> None:
-        """Draw the next population; keep the best individual of all draws so far."""
-        if self._memory.ga.num_offspring:  # else all are elites: nothing is bred, and nothing drawn
-            super().advance(index)
+    @property
+    def is_done(self) -> bool:  # type: ignore[override]
+        """Whether the best end is good enough, or nothing is bred, and so nothing drawn."""
+        return super().is_done or not self._ga.num_offspring
 
-    def _take(self, place: int) -> None:
-        if self._best is not None:
-            count = self._memory.ga.num_offspring
-            self.genomes, self.costs = self.genomes[:, :count], self.costs[:count]
-        super()._take(place)
-        if self._best is None or self.lowest < self._best.cost:
-            self._best = super().best()
-        self.lowest = self._best.cost
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw the initial population; see `Search`."""
+        super().begin(rng)
+        self.end = super()._best_end(0)
 
-    def best(self) -> BestEnd:
-        """Return the best individual of all draws."""
-        assert self._best is not None
-        return self._best
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Draw generations; see `Search`."""
+        self.costs = self.costs[:, :, : self._ga.num_offspring]
+        return super().go_on(rng, first, last)
+
+    def _best_end(self, place: int) -> BestEnd:
+        drawn = super()._best_end(place)
+        return drawn if drawn.cost < self.end.cost else self.end
 
 
 def _num_uniforms(ga: SelectiveSettings, breeding: Breeding) -> tuple[int, int, int]:

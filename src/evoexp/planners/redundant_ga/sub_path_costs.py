@@ -9,9 +9,9 @@ from evoexp.collision.models.ellipse_kernels import (
     PathChecks,
     TestedPath,
     check_paths,
-    paths_collide,
+    prepare_checks,
 )
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import measure_reach
 from evoexp.records import BoolArray, FloatArray, IntArray
@@ -73,41 +73,20 @@ def drop_collisions(
 
 
 @kernel
-def judge_paths(
-    starts: FloatArray,
-    ends: FloatArray,
-    lanes: IntArray,
-    count: int,
-    judging: Judging,
-    results: FloatArray,
-    hit: BoolArray,
-) -> None:
-    """Write Eq. 4 and its parts for some individuals.
+def judge_paths(starts: FloatArray, ends: FloatArray, judging: Judging) -> FloatArray:
+    """Return Eq. 4 and its parts for some sub-paths, (3, individuals).
 
     An individual whose tip ends outside the box is not tested for collisions.
 
     Args:
         starts: (joints, individuals) [rad].
         ends: (joints, individuals) [rad].
-        lanes: (≥ count + LANES) indices of individuals, changed.
-        count: Number of individuals.
         judging: See `Judging`.
-        results: (3, individuals) written: cost, position error, joint displacement.
-        hit: (individuals,) scratch.
     """
-    starts, ends, lanes, judging, results, hit = borrowed(
-        (starts, ends, lanes, judging, results, hit)
-    )
-    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
-    cost, error, displacement = results[0], results[1], results[2]
-    measure_reach(starts, ends, lanes, count, arm, target, box, weights, cost, error, displacement)
-    # individuals inside the box
-    left = 0
-    for k in range(count):
-        individual = lanes[k]
-        lanes[left] = individual
-        left += cost[individual] < np.inf
-    paths_collide(starts, ends, lanes, left, arm, judging.ellipses, judging.path, hit)
-    for k in range(left):
-        individual = lanes[k]
-        cost[individual] = np.inf if hit[individual] else cost[individual]
+    count = starts.shape[1]
+    results, lanes = np.empty((RESULTS, count)), np.empty(count + LANES, dtype=np.int64)
+    measure(starts, ends, count, judging, results)
+    left, hit = list_inside(results, count, lanes), np.zeros(count, dtype=np.bool_)
+    checks = prepare_checks(judging.ellipses, len(starts), count)
+    drop_collisions(starts, ends, lanes, left, judging, results, hit, checks)
+    return results

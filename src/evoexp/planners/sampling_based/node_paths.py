@@ -1,17 +1,18 @@
-"""Answers of planners whose solution is a path of straight edges between configurations.
+"""Answers of planners whose solution is a path of straight edges, and searches in iterations.
 
 All arms together are one configuration (nq,) [deg]; angles are not wrapped. Random configurations
 are uniform within the joints' limits. A solution is flat: node by node, joint by joint (nodes × nq)
 [deg], start and goal included; the start alone: no path was found, and there is no motion.
 """
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape
@@ -24,22 +25,59 @@ from evoexp.planners.arm_tasks import (
     cover_shapes,
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import JudgementArrays, PlannerDefaults
+from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import distance, lengths_along
-from evoexp.planners.sampling_based.settings import EdgeSettings
+from evoexp.planners.sampling_based.settings import EdgeSettings, TreeGrowth
 from evoexp.planners.sampling_based.trees import EdgeTest
-from evoexp.records import FloatArray
+from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 
 MOST_STEPS = 10_000  # of a line through the whole space of configurations
 MOST_TESTED = 1_000_000  # configurations on such a line
 
 
-class NodePaths(PlannerDefaults, EdgeSettings):
-    """The usual answers of a planner of such paths, to be inherited before `Component`."""
+class TreePaths(PlannerDefaults):
+    """The answers that all planners of such paths share, whatever unit their solutions have."""
 
     component: ClassVar[str]
+    unit: ClassVar[float] = DEGREE  # [rad] of a solution
+
+    def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
+        """Refuse: trees are grown, paths are not drawn one by one.
+
+        Raises:
+            SettingError: Always.
+        """
+        raise SettingError("planner", "one that draws paths one by one", self.component)
+
+    def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
+        """Return one path of a population (nq, nodes, individuals) as a flat solution."""
+        return np.asarray(population[:, :, individual].T.ravel())
+
+    def motion(self, problem: Any, solution: FloatArray) -> Motion | None:
+        """Return the joint-space motion: straight, nodes in equal times; None without a path."""
+        path = self._path(problem, solution)
+        return Motion(np.ascontiguousarray(self.unit * path)) if len(path) > 1 else None
+
+    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
+        """Return the length, the cost of a path that is free."""
+        return terms["length_deg"]
+
+    def shape(self, problem: Any) -> tuple[Any, ...]:
+        """Return the documented shape of a solution: any number of nodes × nq."""
+        return ..., (len(problem.start),)
+
+    def _path(self, problem: Any, solution: FloatArray) -> FloatArray:
+        """Return a flat solution as a path (nodes, nq)."""
+        nq = len(problem.start)
+        if solution.ndim != 1 or len(solution) == 0 or len(solution) % nq:
+            raise ValueError(f"a solution has a multiple of {nq} values, was {solution.shape}")
+        return np.ascontiguousarray(solution.reshape(-1, nq))
+
+
+class NodePaths(TreePaths, EdgeSettings):
+    """The usual answers of a planner of paths in degrees, to be inherited before `Component`."""
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
         """Build the robot, and check that start and goal fit it and are free of collision.
@@ -76,37 +114,19 @@ class NodePaths(PlannerDefaults, EdgeSettings):
         proofs = Proofs(self, problem) if self.answers_are_proven else None
         return EdgeTest(problem.collision, self.resolution, proofs)
 
-    def sample(self, problem: ArmProblem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Refuse: trees are grown, paths are not drawn one by one.
-
-        Raises:
-            SettingError: Always.
-        """
-        raise SettingError("planner", "one that draws paths one by one", self.component)
-
     def cost(self, problem: ArmProblem, population: FloatArray) -> JudgementArrays:
         """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides.
 
         And, if so asked, where a path is not proven.
         """
         edges = self.edge_test(problem)
-        paths = [np.ascontiguousarray(path) for path in population.transpose(2, 1, 0)]
-        lengths = np.array([path_length(path) for path in paths])
-        collisions = np.array([edges.num_contacts(path) for path in paths])
-        feasible = (collisions == 0) & np.isfinite(lengths)
-        feasible[feasible] = [edges.is_proven(paths[k]) for k in np.flatnonzero(feasible)]
-        segments = np.full(len(paths), population.shape[1] - 1)
-        terms = {"length_deg": lengths, "segments": segments, "collisions": collisions}
-        return JudgementArrays(np.where(feasible, lengths, np.inf), feasible, edges.queries, terms)
-
-    def solution(self, problem: ArmProblem, population: FloatArray, individual: int) -> FloatArray:
-        """Return one path of a population (nq, nodes, individuals) as a flat solution."""
-        return np.asarray(population[:, :, individual].T.ravel())
-
-    def motion(self, problem: ArmProblem, solution: FloatArray) -> Motion | None:
-        """Return the joint-space motion: straight, nodes in equal times; None without a path."""
-        path = self._path(problem, solution)
-        return Motion(np.ascontiguousarray(DEGREE * path)) if len(path) > 1 else None
+        judged = judge_paths(edges, population.transpose(2, 1, 0))
+        feasible, segments = judged.feasible, np.full(len(judged.cost), population.shape[1] - 1)
+        for k in np.flatnonzero(feasible):
+            feasible[k] = edges.is_proven(np.ascontiguousarray(population[:, :, k].T))
+        cost, length = np.where(feasible, judged.cost, np.inf), judged.terms["length_deg"]
+        terms = {"length_deg": length, "segments": segments, **judged.terms}
+        return judged._replace(cost=cost, terms=terms)
 
     def parts(self, problem: ArmProblem, motion: Motion) -> tuple[Part, ...]:
         """Return the whole motion; arms and obstacles have margins of their own."""
@@ -124,10 +144,6 @@ class NodePaths(PlannerDefaults, EdgeSettings):
         ratio = {"length_ratio": terms["length_deg"] / straight} if straight > 0.0 else {}
         return terms | ratio
 
-    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
-        """Return the length, the cost of a path that is free."""
-        return terms["length_deg"]
-
     def departures(self, problem: ArmProblem, solution: FloatArray) -> list[str]:
         """Compare start and goal of every arm with the task's, and angles with their limits."""
         path, found = self._path(problem, solution), []
@@ -138,10 +154,6 @@ class NodePaths(PlannerDefaults, EdgeSettings):
                 name = f"the {end} of arm {arm + 1}"
                 found += of_place(name, path[row, a:b], wanted[a:b], "deg")
         return found + of_limits(joint_names(path.shape[1]), path.T, problem.limits, "deg")
-
-    def shape(self, problem: ArmProblem) -> tuple[Any, ...]:
-        """Return the documented shape of a solution: any number of nodes × nq."""
-        return ..., (len(problem.start),)
 
     def notes(self, problem: ArmProblem) -> list[str]:
         """Describe how densely edges are tested, the ranges of free joints, and the covers."""
@@ -164,12 +176,85 @@ class NodePaths(PlannerDefaults, EdgeSettings):
         most = UNLIMITED / DEGREE
         return low <= -most, high >= most
 
-    def _path(self, problem: ArmProblem, solution: FloatArray) -> FloatArray:
-        """Return a flat solution as a path (nodes, nq)."""
-        nq = len(problem.start)
-        if solution.ndim != 1 or len(solution) == 0 or len(solution) % nq:
-            raise ValueError(f"a solution has a multiple of {nq} values, was {solution.shape}")
-        return np.ascontiguousarray(solution.reshape(-1, nq))
+
+class InIterations:
+    """Counts the iterations of a search that goes on in batches of them, one per record."""
+
+    ga: TreeGrowth
+
+    @property
+    def most_iterations(self) -> int:
+        """Iterations of a run that finds all as late as it may."""
+        raise NotImplementedError
+
+    @property
+    def num_generations(self) -> int:
+        """Batches after the first, at most."""
+        batches = -(-self.most_iterations // self.ga.iterations_per_generation)
+        return min(self.ga.num_generations, batches - 1)
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the iterations of a generation, at most; a run may end within one."""
+        size = self.ga.iterations_per_generation
+        return max(0, min(size, self.most_iterations - index * size))
+
+    def batches(self, search: "IteratedSearch", rng: np.random.Generator) -> Iterator[Block]:
+        """Yield a record per batch of iterations, until the search comes to its end."""
+        keeper = Keeper()
+        for index in range(self.num_generations + 1):
+            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
+            count = 0
+            while count < len(costs) and not search.stop_reason:
+                cost = search.iterate(rng)
+                if cost is None:
+                    break
+                costs[count] = cost
+                count += 1
+            costs = costs[: max(1, count)]
+            keeper.keep(search.best_cost, search.candidate())
+            yield keeper.record(
+                cost_statistics(costs),
+                costs,
+                search.population,
+                lowest=float(costs.min()),
+                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
+                evaluations=len(costs),
+                collision_queries=search.edges.queries - asked,
+                stop_reason=search.stop_reason,
+            )
+            if search.stop_reason:
+                return
+
+
+class IteratedSearch(Protocol):
+    """The state of a run that goes on iteration by iteration."""
+
+    edges: EdgeTest  # tests edges and counts
+    best_cost: float  # length of the shortest path so far [deg], inf without one
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the run ends now; empty while it goes on."""
+
+    @property
+    def population(self) -> FloatArray:
+        """(nodes, nq) what a record shows."""
+
+    def iterate(self, rng: np.random.Generator) -> float | None:
+        """Go on by one iteration; return the length in hand [deg], None if all was done before."""
+
+    def candidate(self) -> Candidate:
+        """Return the shortest path as it is recorded."""
+
+
+def judge_paths(edges: EdgeTest, paths: FloatArray) -> JudgementArrays:
+    """Judge paths (paths, nodes, nq) [deg]: their length, inf where a tested edge collides."""
+    rows = [np.ascontiguousarray(path) for path in paths]
+    lengths = np.array([path_length(path) for path in rows])
+    collisions = np.array([edges.num_contacts(path) for path in rows])
+    feasible = (collisions == 0) & np.isfinite(lengths)
+    terms = {"length_deg": lengths, "collisions": collisions}
+    return JudgementArrays(np.where(feasible, lengths, np.inf), feasible, edges.queries, terms)
 
 
 def path_length(path: FloatArray) -> float:

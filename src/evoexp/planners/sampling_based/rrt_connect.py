@@ -14,60 +14,27 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.planners.arm_tasks import ArmProblem
-from evoexp.planners.planner import Candidate, Keeper
+from evoexp.planners.planner import Candidate
 from evoexp.planners.sampling_based.kernels import distance
-from evoexp.planners.sampling_based.node_paths import NodePaths
+from evoexp.planners.sampling_based.node_paths import InIterations, NodePaths
 from evoexp.planners.sampling_based.settings import RrtSettings
 from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import TreePair
-from evoexp.records import Block
+from evoexp.records import Block, FloatArray
 from evoexp.validation import Component
 
 NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
 
 
-class RrtConnect(NodePaths, RrtSettings, Component):
+class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
     """RRT-Connect and shortcuts."""
 
     component: ClassVar[str] = "rrt_connect"
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last path is shortened or given up."""
-        search, keeper = _Search(self, problem), Keeper()
-        for index in range(self.num_generations + 1):
-            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
-            count = 0
-            while count < len(costs) and not search.stop_reason:
-                search.iterate(rng)
-                costs[count] = search.cost
-                count += 1
-            costs = costs[:count]
-            keeper.keep(search.best_cost, search.candidate())
-            yield keeper.record(
-                cost_statistics(costs),
-                costs,
-                np.concatenate([tree.nodes for tree in search.pair.trees]),
-                lowest=float(costs.min()),
-                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
-                evaluations=count,
-                collision_queries=search.edges.queries - asked,
-                stop_reason=search.stop_reason,
-            )
-            if search.stop_reason:
-                return
-
-    @property
-    def num_generations(self) -> int:
-        """Batches after the first, at most."""
-        batches = -(-self._most_iterations // self.ga.iterations_per_generation)
-        return min(self.ga.num_generations, batches - 1)
-
-    def num_evaluations(self, index: int) -> int:
-        """Return the iterations of a generation, at most; a run may end within one."""
-        size = self.ga.iterations_per_generation
-        return max(0, min(size, self._most_iterations - index * size))
+        return self.batches(_Search(self, problem), rng)
 
     def memory(self, problem: ArmProblem) -> int:
         """Return the memory of both trees, of their copy as they grow, and of a record's copy."""
@@ -78,7 +45,7 @@ class RrtConnect(NodePaths, RrtSettings, Component):
         return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
 
     @property
-    def _most_iterations(self) -> int:
+    def most_iterations(self) -> int:
         """Iterations of a run that finds its paths last of all, shortcuts included."""
         return (1 + self.num_restarts) * (self.max_iterations + self.num_improvements)
 
@@ -103,19 +70,22 @@ class _Search:
         self._solution, self._shown = problem.start.copy(), problem.start
 
     @property
-    def cost(self) -> float:
-        """Length of the path in hand [deg], inf without one."""
-        return np.inf if self._path is None else self._path.length
-
-    @property
     def stop_reason(self) -> str:
         """Why the run ends now; empty while it goes on."""
         if not self._is_done() or self._starts <= self._planner.num_restarts:
             return ""
         return "solution" if np.isfinite(self.best_cost) else "no solution"
 
-    def iterate(self, rng: np.random.Generator) -> None:
-        """Grow the trees toward a random configuration, or try a shortcut of the path."""
+    @property
+    def population(self) -> FloatArray:
+        """(nodes, nq) all nodes of both trees [deg]."""
+        return np.concatenate([tree.nodes for tree in self.pair.trees])
+
+    def iterate(self, rng: np.random.Generator) -> float:
+        """Grow the trees toward a random configuration, or try a shortcut of the path.
+
+        Returns the length of the path in hand [deg], inf without one.
+        """
         if self._is_done():
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)
             self._path, self._starts = None, self._starts + 1
@@ -127,6 +97,7 @@ class _Search:
         if self._path is not None and shorter and self.edges.is_proven(self._path.nodes):
             self.best_cost, self._shown = self._path.length, self._path.nodes
             self._solution = self._shown.flatten()
+        return np.inf if self._path is None else self._path.length
 
     def candidate(self) -> Candidate:
         """Return the shortest path as it is recorded, the same array as long as it is the same."""

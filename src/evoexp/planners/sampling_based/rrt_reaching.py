@@ -11,22 +11,25 @@ the lengths of the plans that its iterations complete, inf elsewhere; its popula
 plan so far.
 """
 
-from collections.abc import Generator, Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Generator, Iterator
+from typing import ClassVar
 
 import numpy as np
 
 from evoexp.collision.models.ellipse_configurations import EllipseConfigurations
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
-from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
+from evoexp.planners.planner import Candidate, JudgementArrays
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.sampling_based.kernels import distance
-from evoexp.planners.sampling_based.node_paths import path_length
+from evoexp.planners.sampling_based.node_paths import (
+    InIterations,
+    TreePaths,
+    judge_paths,
+    path_length,
+)
 from evoexp.planners.sampling_based.settings import ReachingSettings
 from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
@@ -41,10 +44,11 @@ NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have 
 PLACES = "via point", "goal point"
 
 
-class RrtReaching(PlannerDefaults, ReachingSettings, Component):
+class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
     """RRT-Connect to postures that reach the via point, and then to some that reach the goal."""
 
     component: ClassVar[str] = "rrt_reaching"
+    unit: ClassVar[float] = 1.0
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
         """Build the robot and check that the start fits it and is free of collision.
@@ -62,54 +66,12 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last plan is complete or given up."""
-        search, keeper = _Search(self, problem), Keeper()
-        steps = search.steps(rng)
-        for index in range(self.num_generations + 1):
-            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
-            count, stop_reason = 0, ""
-            while count < len(costs) and not stop_reason:
-                costs[count] = next(steps, np.nan)
-                stop_reason = search.end if np.isnan(costs[count]) else ""
-                count += not stop_reason
-            costs = costs[: max(1, count)]
-            costs[np.isnan(costs)] = np.inf
-            keeper.keep(search.best_cost, search.candidate())
-            yield keeper.record(
-                cost_statistics(costs),
-                costs,
-                search.best,
-                lowest=float(costs.min()),
-                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
-                evaluations=len(costs),
-                collision_queries=search.edges.queries - asked,
-                stop_reason=stop_reason,
-            )
-            if stop_reason:
-                return
+        return self.batches(_Search(self, problem), rng)
 
     @property
-    def num_generations(self) -> int:
-        """Batches after the first, at most."""
-        batches = -(-self._most_iterations // self.ga.iterations_per_generation)
-        return min(self.ga.num_generations, batches - 1)
-
-    def num_evaluations(self, index: int) -> int:
-        """Return the iterations of a generation, at most; a run may end within one."""
-        size = self.ga.iterations_per_generation
-        return max(0, min(size, self._most_iterations - index * size))
-
-    @property
-    def _most_iterations(self) -> int:
+    def most_iterations(self) -> int:
         """Iterations of a run that finds all as late as it may, and one to find that it is done."""
         return (1 + self.num_restarts) * 2 * (2 * self.max_iterations + self.num_shortcuts) + 1
-
-    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Refuse: trees are grown, paths are not drawn one by one.
-
-        Raises:
-            SettingError: Always.
-        """
-        raise SettingError("planner", "one that draws paths one by one", self.component)
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge paths (joints, postures, individuals) [rad]: their length in degrees.
@@ -117,21 +79,7 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
         It is inf where a tested edge collides.
         """
         edges = EdgeTest(EllipseConfigurations(problem.collision), self.resolution)
-        paths = [np.ascontiguousarray(path) / DEGREE for path in population.transpose(2, 1, 0)]
-        lengths = np.array([path_length(path) for path in paths])
-        collisions = np.array([edges.num_contacts(path) for path in paths])
-        feasible = (collisions == 0) & np.isfinite(lengths)
-        terms = {"length_deg": lengths, "collisions": collisions}
-        return JudgementArrays(np.where(feasible, lengths, np.inf), feasible, edges.queries, terms)
-
-    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
-        """Return one path of a population (joints, postures, individuals) as a flat solution."""
-        return np.asarray(population[:, :, individual].T.ravel())
-
-    def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
-        """Return the joint-space motion: straight, postures in equal times; None without a path."""
-        path = self._path(problem, solution)
-        return Motion(path) if len(path) > 1 else None
+        return judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return length and contacts of a path, and how near its postures come to both places.
@@ -143,10 +91,6 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         via, goal = self._errors(problem, path)
         return terms | {"via_error": via, "goal_error": goal}
-
-    def cost_of_terms(self, terms: Mapping[str, float]) -> float:
-        """Return the length, the cost of a plan that is free."""
-        return terms["length_deg"]
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start, joint limits and the two places of the tip with the task's."""
@@ -161,10 +105,6 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
                 found.append(f"the tip misses the {place} by {error:.3g}")
         return found
 
-    def shape(self, problem: Problem) -> tuple[Any, ...]:
-        """Return the documented shape of a solution: any number of postures × joints."""
-        return ..., (len(problem.start),)
-
     def memory(self, problem: Problem) -> int:
         """Return the memory of both trees, of their copy as they grow, and of an edge's tests."""
         low, high = problem.joint_limits.T / DEGREE
@@ -178,13 +118,6 @@ class RrtReaching(PlannerDefaults, ReachingSettings, Component):
         via, goal = (np.sqrt(((tips - target) ** 2).sum(axis=1)) for target in problem.targets)
         return float(via.min()), float(goal[-1])
 
-    def _path(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        """Return a flat solution as a path (postures, joints) [rad]."""
-        num = len(problem.start)
-        if solution.ndim != 1 or len(solution) == 0 or len(solution) % num:
-            raise ValueError(f"a solution has a multiple of {num} values, was {solution.shape}")
-        return np.ascontiguousarray(solution.reshape(-1, num))
-
 
 class _Search:
     """The state of one run.
@@ -192,20 +125,25 @@ class _Search:
     Attributes:
         edges: Tests edges and counts.
         best_cost: Length of the shortest plan so far [deg], inf without one.
-        best: (postures, joints) the shortest plan [rad]; the start alone without one.
+        population: (postures, joints) the shortest plan [rad]; the start alone without one.
+        stop_reason: Why the run ends now; empty while it goes on.
     """
 
     def __init__(self, planner: RrtReaching, problem: Problem) -> None:
         self._planner, self._problem = planner, problem
         self.edges = EdgeTest(EllipseConfigurations(problem.collision), planner.resolution)
-        self.best_cost, self.best = np.inf, problem.start[None]
+        self.best_cost, self.population, self.stop_reason = np.inf, problem.start[None], ""
+        self._steps: Iterator[float] | None = None
         self._plans = self._iterations = 0
         self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
 
-    @property
-    def end(self) -> str:
-        """The reason why a run ends that has done all it may."""
-        return "solution" if np.isfinite(self.best_cost) else "no solution"
+    def iterate(self, rng: np.random.Generator) -> float | None:
+        """Go on by one iteration; return the length of the plan that it completes [deg], or inf."""
+        self._steps = self._steps or self.steps(rng)
+        length = next(self._steps, None)
+        if length is None:
+            self.stop_reason = "solution" if np.isfinite(self.best_cost) else "no solution"
+        return length
 
     def candidate(self) -> Candidate:
         """Return the shortest plan as it is recorded."""
@@ -214,7 +152,7 @@ class _Search:
             "iterations": float(self._iterations),
             "plans": float(self._plans),
         }
-        return Candidate(self.best.ravel(), terms, bool(np.isfinite(self.best_cost)))
+        return Candidate(self.population.ravel(), terms, bool(np.isfinite(self.best_cost)))
 
     def steps(self, rng: np.random.Generator) -> Iterator[float]:
         """Yield after every iteration: the length of the plan that it completes [deg], or inf."""
@@ -226,7 +164,7 @@ class _Search:
             self._plans += 1
             shorter = length < self.best_cost
             if shorter and (self._proofs is None or self._proofs.is_proven(plan.ravel())):
-                self.best_cost, self.best = length, plan
+                self.best_cost, self.population = length, plan
             yield length
 
     def _plan(self, rng: np.random.Generator) -> Generator[float, None, FloatArray | None]:

@@ -1,5 +1,6 @@
 """The script for Slurm runs an experiment, where `sbatch` starts its jobs on this machine."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -11,7 +12,10 @@ from evoexp import shipped
 from evoexp.store.run_directory import find_runs
 from evoexp.store.summaries import summary_table
 
-pytest.importorskip("dask_jobqueue", reason="needs dask-jobqueue, from evoexp[cluster]")
+pytestmark = pytest.mark.skipif(  # not by importing it: that replaces this process' SIGINT handler
+    importlib.util.find_spec("dask_jobqueue") is None,
+    reason="needs dask-jobqueue, from evoexp[cluster]",
+)
 SCRIPT = Path(__file__).parents[2] / "docs" / "slurm_cluster.py"
 SBATCH = """#!/bin/sh
 cp "$1" "$JOBS.sh"  # the file is gone as soon as this script ends, as with Slurm

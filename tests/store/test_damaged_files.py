@@ -342,8 +342,12 @@ def test_an_interrupted_writer_leaves_no_temporary_file(
         os.kill(os.getpid(), signal.SIGINT)
 
     monkeypatch.setattr(os, "fsync", slow_sync)
-    threading.Thread(target=interrupt).start()
-    with pytest.raises(KeyboardInterrupt):
-        write_files({tmp_path / f"{number}.mcap": b"log" for number in range(100)})
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Thread(target=interrupt).start()
+        with pytest.raises(KeyboardInterrupt):
+            write_files({tmp_path / f"{number}.mcap": b"log" for number in range(100)})
+    finally:
+        signal.signal(signal.SIGINT, before)
     time.sleep(0.4)
     assert list(tmp_path.iterdir()) == []

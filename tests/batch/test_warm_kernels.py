@@ -5,9 +5,14 @@ import time
 import pytest
 
 import evoexp.batch.warm_kernels as warm_kernels_module
+from evoexp.batch.jobs import Job
 from evoexp.batch.replicate_limits import ReplicateLimits
-from evoexp.batch.warm_kernels import warm_kernels
+from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.condition import Condition
+
+
+def _job(condition: Condition, replicate: int = 0) -> Job:
+    return Job(condition.id, condition.to_json(), replicate)
 
 
 def test_conditions_that_differ_in_numbers_are_one_kind(
@@ -19,8 +24,9 @@ def test_conditions_that_differ_in_numbers_are_one_kind(
         planner, "evolve", lambda *given: (searched.append(given), evolve(*given))[1]
     )
     others = [faulty._replace(seed=seed) for seed in range(1, 4)]
-    warm_kernels([faulty, *others], ReplicateLimits())
-    assert len(searched) == 1
+    kinds = one_of_each_kind(_job(each, index) for each in [faulty, *others] for index in range(3))
+    warm_kernels(kinds, ReplicateLimits())
+    assert len(kinds) == len(searched) == 1
 
 
 @pytest.mark.parametrize("fault", ["raise:0", "slow:0"])
@@ -30,5 +36,5 @@ def test_what_fails_or_takes_too_long_is_left_to_the_replicates(
     monkeypatch.setenv("FAULTY", fault)
     monkeypatch.setattr(warm_kernels_module, "COMPILING_S", 1.0)
     begun = time.monotonic()
-    warm_kernels([faulty], ReplicateLimits(timeout_s=0.1))
+    warm_kernels([_job(faulty)], ReplicateLimits(timeout_s=0.1))
     assert time.monotonic() - begun < 60.0

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -55,6 +56,19 @@ def test_a_task_whose_worker_dies_is_done_once_more(way: str, tmp_path: Path) ->
         with pytest.raises(WorkerError, match=DIED_TWICE):
             list(in_order(workers, end, [("kill",)]))
         assert list(in_order(workers, abs, [(-1,)])) == [1]
+
+
+def test_what_the_server_does_first_is_there_in_all_workers(tmp_path: Path) -> None:
+    with Workers(2) as workers:
+        workers.call_first(os.chdir, str(tmp_path))
+        assert set(in_order(workers, os.getcwd, [()] * 20)) == {str(tmp_path)}
+
+
+@pytest.mark.parametrize("call", [(refuse, "nobody"), (end, "kill"), (end, "exit")])
+def test_a_first_call_that_fails_or_ends_the_server_costs_no_result(call: tuple[Any, ...]) -> None:
+    with Workers(2) as workers:
+        workers.call_first(*call)
+        assert list(in_order(workers, abs, [(-1,), (-2,)])) == [1, 2]
 
 
 def test_a_server_that_dies_is_started_again(tmp_path: Path) -> None:

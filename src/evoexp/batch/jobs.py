@@ -88,8 +88,7 @@ def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | 
 
     start = time.perf_counter()
     try:
-        keep_all(job.files)
-        condition = _condition(job.condition_json)
+        condition = condition_of(job)
         condition.prepare()
         with limited(limits, in_worker=in_worker):
             content, summary = run_replicate(
@@ -109,6 +108,12 @@ def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | 
 
 def _heard(curves: Path | None, job: Job) -> Callable[[Block], None] | None:
     return None if curves is None else CurveFile(curves, *job.key).hear
+
+
+def condition_of(job: Job) -> Condition:
+    """Build the condition of a job, with its files."""
+    keep_all(job.files)
+    return _condition(job.condition_json)
 
 
 @functools.lru_cache(maxsize=64)

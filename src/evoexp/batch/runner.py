@@ -13,7 +13,7 @@ from evoexp.batch.jobs import Job, Outcome
 from evoexp.batch.memory_limit import GIGABYTE, allowed_memory, refuse_large
 from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.batch.warm_kernels import warm_kernels
+from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests
@@ -108,10 +108,11 @@ class Batch:
             try:
                 with self._workers() as workers:  # they end first of all, however the body ends
                     self._create_runs()
-                    if self._settings.address is None:  # else the workers are elsewhere
-                        missing = dict.fromkeys(job.condition_id for job in self.jobs)
-                        conditions = (self._wanted[key][0] for key in missing)
-                        warm_kernels(conditions, self._limits())
+                    kinds, limits = one_of_each_kind(self.jobs), self._limits()
+                    if workers is not None:
+                        workers.call_first(warm_kernels, kinds, limits)
+                    elif self._settings.address is None:  # else the workers are elsewhere
+                        warm_kernels(kinds, limits)
                     for outcomes in self._spread(workers):
                         yield from self._store(outcomes)
             except OSError:  # a full disk: the table can be built from the logs at any time

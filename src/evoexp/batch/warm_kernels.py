@@ -1,7 +1,7 @@
 """Compiles the kernels of conditions, or loads them, before their replicates are timed.
 
-Each kind of condition searches for two generations and judges a motion. The workers, which start
-meanwhile, find the compiled kernels in the user's cache.
+Each kind of condition searches for two generations and judges a motion. Where replicates run in
+worker processes, their server does this before it forks them: all of them find the kernels loaded.
 """
 
 import contextlib
@@ -9,27 +9,32 @@ import itertools
 import re
 from collections.abc import Iterable
 
+from evoexp.batch.jobs import Job, condition_of
 from evoexp.batch.replicate_limits import ReplicateLimits, limited
 from evoexp.condition import Condition
 from evoexp.records import generations
 
 COMPILING_S = 120.0  # [s] that a short call may take; replicates that compile would be late, too
-_NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+_NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
-def warm_kernels(conditions: Iterable[Condition], limits: ReplicateLimits) -> None:
-    """Run every kernel that some conditions need; errors are left to the replicates.
+def one_of_each_kind(jobs: Iterable[Job]) -> list[Job]:
+    """Return jobs that need all kernels that any needs: numbers make no difference."""
+    texts = {job.condition_json: job for job in jobs}
+    return list({_NUMBER.sub(b"0", text): job for text, job in texts.items()}.values())
+
+
+def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
+    """Run every kernel that the conditions of jobs need; errors are left to the replicates.
 
     Args:
-        conditions: They are run once per kind.
+        jobs: One of each kind.
         limits: Of a replicate; its time does not include compilation.
     """
     limits = limits._replace(timeout_s=max(limits.timeout_s or 0.0, COMPILING_S))
-    # conditions that differ in numbers only need the same kernels
-    kinds = {_NUMBER.sub("0", each.to_json().decode()): each for each in conditions}
-    for condition in kinds.values():
+    for job in jobs:
         with contextlib.suppress(Exception), limited(limits, in_worker=False):
-            _warm(condition)
+            _warm(condition_of(job))
 
 
 def _warm(condition: Condition) -> None:

@@ -1,7 +1,8 @@
 """The process that workers are forked from, and the loop of a worker.
 
-The server loads all libraries once, and has no threads. Each worker has a socket of its own and
-shares nothing with the others: whatever it holds when it dies, nobody waits for it.
+The server loads all libraries once, and the kernels of a batch, and has no threads. Each worker has
+a socket of its own and shares nothing with the others: whatever it holds when it dies, nobody waits
+for it.
 """
 
 import importlib
@@ -19,6 +20,7 @@ from typing import Any, NamedTuple
 from evoexp.errors import EvoexpError
 
 HEADER = struct.Struct("!Q")  # [B] length of the message behind it
+FORK, CALL = b"f", b"c"  # what the server is told: a socket comes along, or a call is behind it
 
 
 class Answer(NamedTuple):
@@ -29,7 +31,7 @@ class Answer(NamedTuple):
 
 
 def main() -> None:
-    """Load libraries, then fork a worker for every socket that arrives, until the parent ends.
+    """Load libraries, then make calls and fork a worker for every socket, until the parent ends.
 
     The words of the process are the number of its own socket, and names of modules to load.
     """
@@ -41,7 +43,14 @@ def main() -> None:
         parent.sendall(pickle.dumps(_sendable(error)))
         return
     # workers that have ended stay zombies: the parent may still send a signal to their numbers
-    while descriptors := socket.recv_fds(parent, 1, 1)[1]:
+    while (told := socket.recv_fds(parent, 1, 1))[0]:
+        word, descriptors, *_ = told
+        if word == CALL:
+            header = parent.recv(HEADER.size, socket.MSG_WAITALL)
+            if len(header) == HEADER.size:  # else the parent has ended
+                (size,) = HEADER.unpack(header)
+                _answer(parent.recv(size, socket.MSG_WAITALL))
+            continue
         with socket.socket(fileno=descriptors[0]) as own:
             try:
                 is_worker = os.fork() == 0

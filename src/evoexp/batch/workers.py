@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, NamedTuple, Protocol, Self
 
-from evoexp.batch.worker_server import HEADER, Answer, send
+from evoexp.batch.worker_server import CALL, FORK, HEADER, Answer, send
 from evoexp.errors import EvoexpError
 from evoexp.numeric.cache_folder import cache_root
 
@@ -134,6 +134,16 @@ class Workers:
         self._workers.clear()
         self._selector.close()
 
+    def call_first(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Let the server call a function before it forks workers, which find what that loaded.
+
+        What it returns or raises is lost, and where it ends the server, workers find nothing.
+        """
+        content = pickle.dumps((function, arguments), pickle.HIGHEST_PROTOCOL)
+        with contextlib.suppress(ConnectionError):
+            self._server_socket.sendall(CALL)
+            send(self._server_socket, content)
+
     def results(self, function: Callable[..., Any], work: Work) -> Iterator[Any]:
         """Do tasks as workers become free; yield results as they come.
 
@@ -213,7 +223,7 @@ class Workers:
             self._selector.register(ours, selectors.EVENT_READ, worker)
             with theirs:  # where the server dies now, it is the end of the worker's, too
                 try:
-                    socket.send_fds(self._server_socket, [b"w"], [theirs.fileno()])
+                    socket.send_fds(self._server_socket, [FORK], [theirs.fileno()])
                 except ConnectionError:
                     self._restart_server()
 

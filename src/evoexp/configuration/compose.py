@@ -54,6 +54,19 @@ from evoexp.shipped import Option
 
 _PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
+# how Hydra would run a job, which takes a fifth of the time to compose
+_NO_JOB = [
+    f"~hydra/{group}"
+    for group in (
+        "launcher",
+        "sweeper",
+        "output",
+        "help",
+        "hydra_help",
+        "hydra_logging",
+        "job_logging",
+    )
+]
 _COMPOSER = (HydraException, OmegaConfBaseException, yaml.YAMLError, ValueError, TypeError, OSError)
 
 
@@ -173,7 +186,7 @@ class Composer:
 
     def by_hydra(self, words: list[str]) -> Composed:
         """Have Hydra compose options, chosen by words of its own grammar."""
-        words = [*words, f"hydra.searchpath=[{self._path}]"]
+        words = [*words, *_NO_JOB, f"hydra.searchpath=[{self._path}]"]
         with hydra.initialize_config_dir(str(self.root), version_base="1.3"):
             composed = hydra.compose("config", overrides=words, return_hydra_config=True)
         taken = composed.hydra.runtime.choices

@@ -153,14 +153,6 @@ def component_names(config: Any) -> Iterator[str]:
             yield from component_names(value)
 
 
-def component_modules(config: Any) -> Iterator[str]:
-    """Yield the modules of all registered components that plain configuration data names."""
-    for name in component_names(config):
-        registration = registered(COMPONENTS, name)
-        if registration is not None:
-            yield registration.module
-
-
 @functools.lru_cache(maxsize=64)
 def guests(config_json: bytes) -> dict[str, str]:
     """Return component → `distribution version` of a condition's components that are not evoexp's.

@@ -16,7 +16,7 @@ from evoexp.errors import EvoexpError
 from evoexp.robots.robot_data import ROBOT_DATA, robot_file
 from evoexp.robots.urdf import Urdf
 from evoexp.store.log_reader import read_log
-from evoexp.testing.robot_gallery import (
+from robot_gallery import (
     POSTURES,
     ROBOTS,
     GalleryRobot,

@@ -72,25 +72,6 @@ def test_spheres_among_cylinders_and_half_spaces_agree_with_coal(
             assert found[sample] < 1e-9
 
 
-@pytest.mark.parametrize("limit", [-0.2, 0.0, 0.5, 2.0])
-def test_a_limit_skips_only_what_is_not_asked(limit: float) -> None:
-    assembly = ROBOT.build()
-    collision = MODEL.bind(assembly, CYLINDERS + HALF_SPACES)
-    rng = np.random.default_rng(1)
-    for q in (
-        rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 200)),
-        rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1))
-        + rng.normal(size=(assembly.model.nq, 200)),
-    ):
-        exact, limited = (
-            collision.clearance(q).to_obstacles,
-            collision.clearance(q, limit).to_obstacles,
-        )
-        below = exact < limit
-        assert np.array_equal(limited[below], exact[below])
-        assert np.all(limited[~below] >= limit - 1e-15)
-
-
 @pytest.mark.parametrize(
     ("x", "z", "expected"),
     [

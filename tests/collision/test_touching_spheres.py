@@ -92,15 +92,14 @@ def test_clearance_agrees_with_coal(robot: Robot) -> None:
             assert clearance.to_obstacles[sample] < 1e-9
 
 
-def test_planar_and_spatial_kernels_agree() -> None:
+def test_signs_agree_with_the_general_model() -> None:
     assembly = THREE_PLANAR.build()
-    planar = MODEL.bind(assembly, OBSTACLES)
-    spatial = planar._replace(
-        assembly=assembly._replace(table=assembly.table._replace(planar=False))
-    )
+    collision = MODEL.bind(assembly, OBSTACLES)
     q = np.random.default_rng(1).uniform(-720.0, 720.0, size=(assembly.model.nq, 333))
-    for fast, general in zip(planar.clearance(q), spatial.clearance(q), strict=True):
-        assert np.abs(fast - general).max() < 1e-12
+    exact, general = collision.clearance(q), collision.general.clearance(np.deg2rad(q))
+    assert np.abs(exact.between_arms - general.between_arms).max() < 1e-12
+    assert np.abs(exact.to_obstacles - general.to_obstacles).max() < 1e-12
+    assert np.array_equal(collision.collides(q), exact.least < 0.0)
 
 
 def test_circles_stand_joint_to_joint_and_shared_ones_count_once() -> None:
@@ -150,24 +149,3 @@ def test_a_wrong_number_of_joints_is_refused() -> None:
     collision = MODEL.bind(TWO_PLANAR.build(), ())
     with pytest.raises(ValueError, match=r"q must have shape \(4, configurations\)"):
         collision.clearance(np.zeros((3, 5)))
-
-
-@pytest.mark.examples(1)
-@pytest.mark.parametrize("limit", [-0.3, 0.0, 0.4, 3.0])
-@pytest.mark.parametrize(
-    "robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"]
-)
-def test_a_limit_skips_only_what_is_not_asked(robot: Robot, limit: float) -> None:
-    assembly = robot.build()
-    collision = MODEL.bind(assembly, OBSTACLES)
-    rng = np.random.default_rng(5)
-    near = rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1)) + rng.normal(
-        size=(assembly.model.nq, 640)
-    )
-    for q in (near, rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 640))):
-        for exact, limited in zip(
-            collision.clearance(q), collision.clearance(q, limit), strict=True
-        ):
-            below = exact < limit
-            assert np.array_equal(limited[below], exact[below])
-            assert np.all(limited[~below] >= limit - 1e-15)

@@ -12,15 +12,10 @@ from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.vectors import LANES, Vector, load, spread, store
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import (
-    PLANAR_ROWS,
-    SPATIAL_ROWS,
-    KinematicChain,
-    U,
-)
+from evoexp.robots.kinematics import SPATIAL_ROWS, KinematicChain, U
 
 VECTOR = U(LANES)
-PLANAR_FRAME, SPATIAL_FRAME = U(PLANAR_ROWS * LANES), U(SPATIAL_ROWS * LANES)
+SPATIAL_FRAME = U(SPATIAL_ROWS * LANES)
 """Numbers of a frame of eight configurations."""
 
 
@@ -126,28 +121,3 @@ def spatial_frames(chain: KinematicChain, eight: Eight, unit: float, frames: Flo
             store(frames, own + row + VECTOR, y)
             store(frames, own + row + U(2) * VECTOR, z)
             store(frames, own + at, origin)
-
-
-@inlined
-def planar_frames(chain: KinematicChain, eight: Eight, unit: float, frames: FloatArray) -> None:
-    """Compute the frames of a planar table: each is a turn about z and a point of the plane.
-
-    Arguments are those of `spatial_frames`; a frame (PLANAR_FRAME) is the sine and the cosine of
-    the angle from the world's x axis, then x and y.
-    """
-    for k in range(len(chain.parent)):
-        own, before = U(k) * PLANAR_FRAME, U(chain.parent[k]) * PLANAR_FRAME
-        dx, dy = chain.translation[k, 0], chain.translation[k, 1]
-        c0, s0 = chain.rotation[k, 0], chain.rotation[k, 3]
-        s, c = sincos(coordinate(eight, chain.index_q[k]) * unit)
-        s, c = s0 * c + c0 * s, c0 * c - s0 * s
-        x, y = spread(dx), spread(dy)
-        if chain.parent[k] >= 0:  # angles add up; the origin stands in the parent's frame
-            sb, cb = load(frames, before), load(frames, before + VECTOR)
-            x = load(frames, before + U(2) * VECTOR) + (cb * dx - sb * dy)
-            y = load(frames, before + U(3) * VECTOR) + (sb * dx + cb * dy)
-            s, c = sb * c + cb * s, cb * c - sb * s
-        store(frames, own, s)
-        store(frames, own + VECTOR, c)
-        store(frames, own + U(2) * VECTOR, x)
-        store(frames, own + U(3) * VECTOR, y)

@@ -21,9 +21,6 @@ SPATIAL_ROWS = 12
 
 MAX_JOINTS = 100  # the memory of Pinocchio's data grows with their cube: 70 MB
 
-PLANAR_ROWS = 4
-"""Rows of a joint's frame in the plane: sine, cosine, x, y."""
-
 
 class UnsupportedJoint(EvoexpError):
     """A joint that the kinematic table cannot represent."""

@@ -320,6 +320,6 @@ def _measure(scene: Scene, memory: Memory, one: int, two: int, least: Vector) ->
         i, end = U(runs[a, 0]), U(runs[a, 1])
         for b in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
             first, stop = U(runs[b, 0]), U(runs[b, 1])
-            square = nearest(True, memory.centers, i, end, first, stop, spread(np.inf))
+            square = nearest(memory.centers, i, end, first, stop, spread(np.inf))
             least = lower(least, root(square) - (spheres[i, 3] + spheres[first, 3]))
     return least

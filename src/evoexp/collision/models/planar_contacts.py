@@ -5,26 +5,20 @@ given circle of the other follows by rounding its place on the other's line. So 
 and one of m take min(n, m) steps instead of n · m. The angles of a chain are summed, not its
 rotations multiplied, in quarter turns. Joints and lines are placed for several vectors of eight
 configurations before the next, so that constants stay in registers and neighbouring operations wait
-for no result of each other.
+for no result of each other: this takes a third of what `primitive_kernels` takes for two arms.
 
-Answers that rounding errors could change are left to the kernel `clearances`, and so are robots in
-space or among obstacles: the answer is the sign of its clearance.
+Answers that rounding errors could change are left to `primitive_clearances`, and so are robots in
+space or among obstacles.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.collision.models.obstacle_kernels import MARGIN
-from evoexp.collision.models.sphere_kernels import (
-    Memory,
-    SphereTables,
-    memory_for,
-    named_tables,
-    write_clearances,
-)
+from evoexp.collision.models.primitive_kernels import primitive_clearances
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
 from evoexp.numeric.vectors import (
     LANES,
@@ -65,51 +59,110 @@ X, Y, STEP_X, STEP_Y, STEPS, LENGTH, HALF = range(7)
 """Columns of `LinkLines.line`."""
 
 
+class LinkLines(NamedTuple):
+    """Circles of every link of a planar robot as equal steps along a line."""
+
+    joint: IntArray  # (links,) index into the kinematic table of the joint that moves each
+    # (links, 7) x and y of the middle; x and y of the step from one centre to the next, (1, 0)
+    # where there is none; number of steps; length of a step; half the length of all, a little more
+    line: FloatArray
+    arm_links: IntArray  # (arms, 2) first and one-past-last link of each arm
+    turn: FloatArray  # (joints,) angle of the placement of each joint [quarter turns]
+    radius: float  # of every circle [length unit]
+    # bound of all coordinates [length unit]; inf where these are no equal steps in one plane
+    scale: float
+
+
+class CircleTables(NamedTuple):
+    """Tables of a robot of touching circles or spheres."""
+
+    chain: KinematicChain  # the joints
+    lines: LinkLines  # what this kernel reads
+    general: tuple[Any, ...]  # tables of `primitive_clearances`, for all other cases
+
+
+def link_lines(
+    chain: KinematicChain,
+    joint: IntArray,
+    local: FloatArray,
+    radius: float,
+    links: IntArray,
+    arm_links: IntArray,
+) -> LinkLines:
+    """Return the circles of every link as equal steps along a line.
+
+    Args:
+        chain: The joints.
+        joint: (circles,) index into the kinematic table.
+        local: (circles, 3) centres in the table's frames [length unit].
+        radius: Of every circle.
+        links: (links, 2) first and one-past-last circle of each link.
+        arm_links: (arms, 2) first and one-past-last link of each arm.
+    """
+    rows = np.zeros((len(links), HALF + 1))
+    reach = np.sqrt((chain.translation**2).sum(axis=1)).sum() + 2.0 * radius
+    reach += np.sqrt((local**2).sum(axis=1)).max()
+    scale = 2.0 * float(reach)
+    for row, (first, stop) in zip(rows, links, strict=True):
+        own = local[first:stop]
+        steps = len(own) - 1 if (own[-1] != own[0]).any() else 0
+        step = (own[-1] - own[0]) / steps if steps else np.array([1.0, 0.0, 0.0])
+        length = np.sqrt((step**2).sum())
+        row[:2], row[2:4] = (own[0] + 0.5 * steps * step)[:2], step[:2]
+        row[4:] = steps, length, 0.5 * steps * length * MARGIN
+        places = np.arange(len(own)) if steps else np.zeros(len(own))
+        if np.abs(own - (own[0] + np.outer(places, step))).max() > 1e-14 * scale:
+            scale = np.inf  # nothing is sure then
+    if local[:, 2].any() or chain.translation[:, 2].any():
+        scale = np.inf
+    turn = np.array([atan2(row[3], row[0]) / QUARTER_TURN for row in chain.rotation])
+    return LinkLines(joint[links[:, 0]], rows, arm_links, turn, radius, scale)
+
+
 @kernel
-def contacts(tables: tuple[Any, ...], q: FloatArray, start: int, out: FloatArray) -> None:
+def contacts(tables: CircleTables, q: FloatArray, start: int, out: FloatArray) -> None:
     """Decide which configurations collide.
 
     Args:
-        tables: See `clearances`.
+        tables: The tables.
         q: (nq, configurations) [deg], contiguous.
         start: The first one that is asked for.
-        out: (configurations − start,) written: negative where spheres overlap.
+        out: (configurations − start,) written: negative where circles overlap.
     """
-    named = named_tables(tables)
-    memory, count, flat = memory_for(named), q.shape[1], q.reshape(-1)
-    if named.space is None and len(named.obstacles.kind) == 0 and named.lines.scale < np.inf:
-        frames = np.empty(U(len(named.chain.parent)) * OF_JOINT)
-        lines = np.empty(U(len(named.bounds.joint)) * OF_LINE)
-        _contacts(named, flat, count, start, out, memory, frames, lines, np.empty(BLOCK * LANES))
+    lines, count = tables.lines, q.shape[1]
+    if lines.scale < np.inf:
+        padded = np.empty(U(q.shape[0]) * VECTOR)
+        frames = np.empty(U(len(tables.chain.parent)) * OF_JOINT)
+        placed = np.empty(U(len(lines.joint)) * OF_LINE)
+        total = np.empty(BLOCK * LANES)
+        _contacts(tables, q, q.reshape(-1), start, out, padded, frames, placed, total)
     else:
-        _exact_contacts(named, flat, count, start, count, out, memory)
+        _general_contacts(tables, q, start, count, out)
 
 
 @kernel
 def _contacts(
-    tables: SphereTables,
+    tables: CircleTables,
     q: FloatArray,
-    count: int,
+    flat: FloatArray,
     start: int,
     out: FloatArray,
-    memory: Memory,
+    padded: FloatArray,
     frames: FloatArray,
     lines: FloatArray,
     total: FloatArray,
 ) -> None:
     """Do the work of `contacts` in given memory, so that inner loops count no references."""
-    tables, q, out, memory, frames, lines, total = borrowed(
-        (tables, q, out, memory, frames, lines, total)
-    )
-    limit = 4.0 * tables.spheres.radius * tables.spheres.radius
-    slack = ROUNDING * tables.lines.scale * tables.lines.scale
-    arm_links, line = tables.bounds.arm_links, tables.lines.line
+    tables, q, flat, out = borrowed((tables, q, flat, out))
+    padded, frames, lines, total = borrowed((padded, frames, lines, total))
+    joint, line, arm_links, turn, radius, scale = tables.lines
+    limit, slack, count = 4.0 * radius * radius, ROUNDING * scale * scale, q.shape[1]
     first = start
     while first < count:
         vectors = min(BLOCK, max((count - first) // LANES, 1))
-        eight = eight_of(q, first, count, memory.q)
-        _place_joints(tables.chain, tables.lines.turn, eight, vectors, frames, total)
-        _place_lines(tables.bounds.joint, line, vectors, frames, lines)
+        eight = eight_of(flat, first, count, padded)
+        _place_joints(tables.chain, turn, eight, vectors, frames, total)
+        _place_lines(joint, line, vectors, frames, lines)
         for v in range(vectors):
             begin, sound = first + v * LANES, load(total, U(v) * VECTOR) < LARGEST_Q
             # the squared distance of the arms, as far as it is below the limit, or in doubt
@@ -118,27 +171,24 @@ def _contacts(
             sure = select(spread(slack) < magnitude(least - limit), spread(1.0), spread(0.0))
             if any_lane(sure < 1.0) or begin + LANES > count:
                 stop = min(begin + LANES, count)
-                _exact_contacts(tables, q, count, begin, stop, out[begin - start :], memory)
+                _general_contacts(tables, q, begin, stop, out[begin - start :])
             else:
                 store(out, U(begin - start), least - limit)
         first += vectors * LANES
 
 
 @kernel
-def _exact_contacts(
-    tables: SphereTables,
-    q: FloatArray,
-    count: int,
-    start: int,
-    stop: int,
-    out: FloatArray,
-    memory: Memory,
+def _general_contacts(
+    tables: CircleTables, q: FloatArray, start: int, stop: int, out: FloatArray
 ) -> None:
-    """Write the clearances of configurations start … stop − 1, as far as they are below 0."""
-    both = np.empty(2 * (stop - start))
-    write_clearances(tables, 0.0, False, q, count, start, stop, both, memory)
+    """Write to `out` a negative number where one of configurations start … stop − 1 collides."""
+    angles, rows = np.empty((q.shape[0], stop - start)), np.empty((3, stop - start))
+    for k in range(q.shape[0]):
+        for n in range(stop - start):
+            angles[k, n] = DEGREE * q[k, start + n]
+    primitive_clearances(tables.general, 0.0, True, angles, rows)
     for n in range(stop - start):
-        out[n] = min(both[n], both[stop - start + n])
+        out[n] = min(rows[0, n], min(rows[1, n], rows[2, n]))
 
 
 @inlined

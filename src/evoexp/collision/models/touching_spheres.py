@@ -1,7 +1,8 @@
 """Links as strings of touching circles or spheres (Rana & Zalzala 1995, Fig. 3).
 
-Any number of arms, in the plane or in space, among static obstacles; the kernels are in
-`sphere_kernels`.
+Any number of arms, in the plane or in space, among static obstacles. Yes and no come from
+`planar_contacts` or `primitives`; clearances, which are asked for at the ends of a search, from
+the centres here.
 """
 
 import itertools
@@ -10,25 +11,23 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.models.obstacle_kernels import MARGIN, LinkBalls
-from evoexp.collision.models.planar_contacts import contacts
-from evoexp.collision.models.sphere_kernels import (
-    LINE_COLUMNS,
-    LinkLines,
-    Space,
-    Spheres,
-    SphereTables,
-    any_contact,
-    clearances,
-    flat_spheres,
-)
+from evoexp.collision.models.planar_contacts import CircleTables, contacts, link_lines
+from evoexp.collision.models.primitive_tables import Shapes
+from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.errors import SettingError
-from evoexp.numeric.elementary import atan2
-from evoexp.numeric.quarter_turns import QUARTER_TURN
+from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
-from evoexp.robots.kinematics import KinematicChain
-from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
+from evoexp.robots.poses import frame_poses
+from evoexp.scenarios.obstacles import (
+    CAPSULE,
+    CYLINDER,
+    HALF_SPACE,
+    SPHERE,
+    ObstacleTable,
+    obstacle_table,
+)
 from evoexp.validation import Component, LayoutCount, Positive
 
 MOST_PER_LINK = 1000  # spheres; every one is tested against those of the other arms
@@ -62,7 +61,7 @@ class TouchingSpheres(Component):
                 "without tools: circles of one size cannot show them",
                 "tool_radius above 0",
             )
-        spheres = [
+        every = [
             sphere
             for link in assembly.links
             if link.joint > 0
@@ -70,33 +69,34 @@ class TouchingSpheres(Component):
         ]
         kept = [
             s
-            for k, s in enumerate(spheres)
-            if s.center.any() or not any(map(s.repeats, spheres[:k]))
+            for k, s in enumerate(every)
+            if s.center.any() or not any(map(s.repeats, every[:k]))
         ]
-        joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)
-        local = np.array([assembly.table.local(sphere.joint, sphere.center) for sphere in kept])
+        moving = np.array([sphere.joint for sphere in kept], dtype=np.int64)
+        centers = np.array([sphere.center for sphere in kept])
         arms = np.array([sphere.arm for sphere in kept])
-        links = np.cumsum(np.diff(joint, prepend=joint[0]) != 0)
-        link_arms = np.array([arms[np.argmax(links == k)] for k in range(links[-1] + 1)])
-        of_links, of_arms = _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)
-        fixed, table = Spheres(joint, local, self.sphere_radius), assembly.table
+        radii, table = np.full(len(kept), self.sphere_radius), assembly.table
+        local = np.array([table.local(sphere.joint, sphere.center) for sphere in kept])
+        spheres, of_arms = Spheres(moving - 1, local, self.sphere_radius), _ranges(arms)
+        # the general model: bodies of different arms against each other, and against obstacles
+        arm_of = dict(zip(moving.tolist(), arms.tolist(), strict=True))
+        between = [(j, k) for j, k in itertools.combinations(arm_of, 2) if arm_of[j] != arm_of[k]]
+        arm_of_joints = [arm_of.get(joint, -1) for joint in range(assembly.model.njoints)]
         around = obstacle_table(obstacles).without_ellipses()
-        space: Space = None if table.planar else True
-        balls = _balls(joint, local, of_links, of_arms)
-        lines = sphere_lines(table.chain, fixed, of_links)
-        return SphereCollision(
-            assembly,
-            fixed,
-            _ranges(arms, assembly.num_arms),
-            around,
-            flat_spheres(SphereTables(table.chain, space, fixed, balls, around, lines)),
-            sphere_geometry(
-                assembly,
-                np.array([sphere.center for sphere in kept]),
-                np.array([sphere.joint for sphere in kept]),
-                np.full(len(kept), self.sphere_radius),
-            ),
+        shapes = Shapes(moving, centers, centers, radii)
+        general = PrimitiveCollision.build(
+            assembly.model, shapes, around, between, (), arm_of_joints, table
         )
+        # the planar one, of links as lines of circles
+        links = np.cumsum(np.diff(moving, prepend=moving[0]) != 0)
+        of_links = _ranges(links)
+        arm_links = _ranges(arms[of_links[:, 0]])
+        lines = link_lines(table.chain, *spheres, of_links, arm_links)
+        if not table.planar or len(around.kind):
+            lines = lines._replace(scale=np.inf)
+        tables = CircleTables(table.chain, lines, general.tables)
+        geometry = sphere_geometry(assembly, centers, moving, radii)
+        return SphereCollision(assembly, spheres, of_arms, around, general, tables, geometry)
 
     def _of_link(self, assembly: Assembly, link: Any) -> list["_Sphere"]:
         fractions = (
@@ -122,44 +122,22 @@ class _Sphere(NamedTuple):
         return bool(np.array_equal(model.jointPlacements[self.joint].translation, other.center))
 
 
-def _balls(joint: IntArray, local: FloatArray, spheres: IntArray, arm_links: IntArray) -> LinkBalls:
-    """Return a ball around the centres of every link's spheres."""
-    middle = np.array([0.5 * (local[a:b].min(axis=0) + local[a:b].max(axis=0)) for a, b in spheres])
-    squares = [
-        ((local[a:b] - center) ** 2).sum(axis=1).max()
-        for (a, b), center in zip(spheres, middle, strict=True)
-    ]
-    return LinkBalls(joint[spheres[:, 0]], middle, np.sqrt(squares), spheres, arm_links)
-
-
-def sphere_lines(chain: KinematicChain, spheres: Spheres, of_links: IntArray) -> LinkLines:
-    """Return the spheres of every link as equal steps along a line."""
-    rows = np.zeros((len(of_links), LINE_COLUMNS))
-    reach = np.sqrt((chain.translation**2).sum(axis=1)).sum() + 2.0 * spheres.radius
-    reach += np.sqrt((spheres.local**2).sum(axis=1)).max()
-    scale = 2.0 * float(reach)
-    for row, (first, stop) in zip(rows, of_links, strict=True):
-        own = spheres.local[first:stop]
-        steps = len(own) - 1 if (own[-1] != own[0]).any() else 0
-        step = (own[-1] - own[0]) / steps if steps else np.array([1.0, 0.0, 0.0])
-        length = np.sqrt((step**2).sum())
-        row[:2], row[2:4] = (own[0] + 0.5 * steps * step)[:2], step[:2]
-        row[4:] = steps, length, 0.5 * steps * length * MARGIN
-        places = np.arange(len(own)) if steps else np.zeros(len(own))
-        if np.abs(own - (own[0] + np.outer(places, step))).max() > 1e-14 * scale:
-            scale = np.inf  # nothing is sure then
-    turn = np.array([atan2(row[3], row[0]) / QUARTER_TURN for row in chain.rotation])
-    return LinkLines(rows, turn, scale)
-
-
-def _ranges(owners: np.ndarray, count: int) -> np.ndarray:
-    """Return (count, 2): where each owner's run begins and ends in a sorted list of owners."""
+def _ranges(owners: IntArray) -> IntArray:
+    """Return (owners, 2): where each owner's run begins and ends in a sorted list of owners."""
     return np.array(
         [
             [np.searchsorted(owners, k), np.searchsorted(owners, k, side="right")]
-            for k in range(count)
+            for k in range(owners[-1] + 1)
         ]
     )
+
+
+class Spheres(NamedTuple):
+    """Spheres of one size, fixed to joints."""
+
+    joint: IntArray  # (spheres,) index into the kinematic table, arm by arm
+    local: FloatArray  # (spheres, 3) centres in the table's frames [length unit]
+    radius: float  # of every sphere [length unit]
 
 
 class Clearance(NamedTuple):
@@ -183,7 +161,8 @@ class SphereCollision(NamedTuple):
     spheres: Spheres  # the spheres
     arm_spheres: IntArray  # (arms, 2) first and one-past-last sphere of each arm
     obstacles: ObstacleTable  # the obstacle table
-    tables: tuple[Any, ...]  # `SphereTables` in two arrays, for kernels; see `flat_spheres`
+    general: PrimitiveCollision  # the same spheres in the model of spheres and capsules
+    tables: CircleTables  # for the kernel `contacts`
     geometry: Any  # the same spheres as a `pin.GeometryModel` of coal spheres
 
     @property
@@ -193,22 +172,31 @@ class SphereCollision(NamedTuple):
         between = sum(a * b for a, b in itertools.combinations(own, 2))
         return between + sum(own) * len(self.obstacles.kind)
 
-    def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearance:
-        """Return the clearances of a batch of configurations.
+    @property
+    def radius(self) -> float:
+        """Radius of every sphere [length unit]."""
+        return self.spheres.radius
 
-        Args:
-            q: (nq, configurations) [deg].
-            limit: Above it nothing is measured: a clearance is exact where it is less, elsewhere
-                some value not below it. With 0 the signs are right, and bodies far apart are
-                skipped.
+    def clearance(self, q: FloatArray) -> Clearance:
+        """Return the clearances of a batch of configurations (nq, configurations) [deg].
 
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        q = self._checked(q)
-        out = np.empty((2, q.shape[1]))
-        clearances(self.tables, limit, q, out)
-        return Clearance(out[0], out[1])
+        centers = self._centers(DEGREE * self._checked(q))
+        squares = np.full(q.shape[1], np.inf)
+        for (first, stop), (begin, end) in itertools.combinations(self.arm_spheres, 2):
+            for center in centers[first:stop]:
+                x, y, z = (center - centers[begin:end]).transpose(1, 0, 2)
+                squares = np.minimum(squares, (x * x + y * y + z * z).min(axis=0))
+        outside = np.full(q.shape[1], np.inf)
+        for kind, middle, rotation, size in zip(*self.obstacles, strict=True):
+            points = centers.transpose(0, 2, 1) - middle
+            distances = _signed_distances(
+                kind, size, matrix_product(points, rotation.reshape(3, 3))
+            )
+            outside = np.minimum(outside, distances.min(axis=0))
+        return Clearance(np.sqrt(squares) - 2.0 * self.radius, outside - self.radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,): where `clearance` is negative.
@@ -219,7 +207,7 @@ class SphereCollision(NamedTuple):
         q = self._checked(q)
         out = np.empty(q.shape[1])
         contacts(self.tables, q, 0, out)
-        return out < 0.0
+        return np.asarray(~(out >= 0.0))
 
     def any_collides(self, q: FloatArray) -> bool:
         """Return whether any configuration of a batch collides, as the edges of a planner's graph.
@@ -230,7 +218,16 @@ class SphereCollision(NamedTuple):
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        return any_contact(self.tables, self._checked(q))
+        return self.general.any_collides(DEGREE * self._checked(q))
+
+    def _centers(self, q: FloatArray) -> FloatArray:
+        """Return the centres (spheres, 3, configurations) at q (nq, configurations) [rad]."""
+        chain, pose = self.assembly.table.chain, np.empty((12, q.shape[1]))
+        centers = np.empty((len(self.spheres.joint), 3, q.shape[1]))
+        for k, (joint, local) in enumerate(zip(*self.spheres[:2], strict=True)):
+            frame_poses(chain, joint, np.append(np.eye(3), local), q, pose)
+            centers[k] = pose[9:]
+        return centers
 
     def _checked(self, q: FloatArray) -> FloatArray:
         nq = self.assembly.table.num_coordinates
@@ -239,7 +236,18 @@ class SphereCollision(NamedTuple):
             raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
         return q
 
-    @property
-    def radius(self) -> float:
-        """Radius of every sphere [length unit]."""
-        return self.spheres.radius
+
+def _signed_distances(kind: int, size: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the signed distances of points (…, 3) in an obstacle's frame from its surface, (…)."""
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    if kind == HALF_SPACE:
+        return z
+    if kind in (SPHERE, CAPSULE):
+        along = z - np.clip(z, -size[1], size[1])
+        return np.asarray(np.sqrt(x * x + y * y + along * along) - size[0])
+    beyond = [np.abs(x) - size[0], np.abs(y) - size[1], np.abs(z) - size[2]]
+    if kind == CYLINDER:
+        beyond = [np.sqrt(x * x + y * y) - size[0], np.abs(z) - size[1]]
+    within = np.minimum(np.maximum.reduce(beyond), 0.0)
+    squares = [np.maximum(off, 0.0) * np.maximum(off, 0.0) for off in beyond]
+    return np.asarray(np.sqrt(sum(squares[1:], squares[0])) + within)

@@ -61,7 +61,7 @@ class Judging(NamedTuple):
 
     substeps: int  # configurations tested per segment
     weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7.
-    tables: tuple[Any, ...]  # of the collision model; see `contacts`
+    tables: Any  # `CircleTables` of the collision model; not read where bodies are covered
 
 
 class Settings(NamedTuple):

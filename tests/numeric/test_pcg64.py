@@ -10,7 +10,6 @@ from evoexp.numeric.pcg64 import (
     Twin,
     fill_normals,
     fill_uniforms,
-    skip_words,
 )
 
 
@@ -74,12 +73,3 @@ def test_half_a_number_that_a_generator_keeps_stays_kept() -> None:
 def test_another_generator_is_refused() -> None:
     with pytest.raises(TypeError, match="must be a PCG64, was a MT19937"):
         Twin(np.random.Generator(np.random.MT19937(0)))
-
-
-@given(st.integers(0, 2**64), st.one_of(st.integers(0, 40), st.integers(0, 2**62)))
-def test_words_are_skipped_as_numpy_advances(seed: int, count: int) -> None:
-    own, numpys = rng(seed), np.random.PCG64(seed)
-    twin = Twin(own)
-    skip_words(twin.words, count)
-    twin.follow(twin.words[:2])
-    assert own.bit_generator.state == numpys.advance(count).state

@@ -175,34 +175,6 @@ def fill_words(words: Words, out: Words) -> None:
 
 
 @kernel
-def skip_words(words: Words, count: int) -> None:
-    """Let a generator go on by so many steps at once, as if that many words were drawn.
-
-    Steps are composed: those of every power of two are one step of another factor and addend
-    (Brown 1994, "Random number generation with arbitrary strides").
-
-    Args:
-        words: The generator.
-        count: Of steps.
-    """
-    high, low, none = words[0], words[1], np.uint64(0)
-    factor_high, factor_low, add_high, add_low = HIGH_FACTOR, LOW_FACTOR, words[2], words[3]
-    left = count
-    while left > 0:
-        if left & 1:
-            high, low = step_state(high, low, factor_high, factor_low, add_high, add_low)
-        # twice as many steps: a · (a · x + c) + c
-        add_high, add_low = step_state(
-            add_high, add_low, factor_high, factor_low, add_high, add_low
-        )
-        factor_high, factor_low = step_state(
-            factor_high, factor_low, factor_high, factor_low, none, none
-        )
-        left >>= 1
-    words[0], words[1] = high, low
-
-
-@kernel
 def fill_normals(words: Words, out: NDArray[np.float64]) -> None:
     """Fill out (n,) with standard normal deviates, as `elementary.standard_normal` does.
 

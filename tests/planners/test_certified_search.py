@@ -11,8 +11,8 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.proofs import judge_motion
-from evoexp.planners.via_point_ga.string_proofs import Prover
+from evoexp.planners.proofs import Proofs, judge_motion
+from evoexp.planners.via_point_ga.search import settle
 from evoexp.records import generations
 from evoexp.store.log_reader import read_log
 
@@ -35,30 +35,30 @@ def test_the_cheapest_free_strings_are_judged_until_one_is_proven(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     planner, problem = condition("planner.acceptance=certified").prepare()
-    prover, asked = Prover(planner, problem), []
+    proofs, asked = Proofs(planner, problem), []
 
-    def proven(string: Any) -> bool:
-        asked.append(int(string[0, 0]))
+    def proven(solution: Any) -> bool:
+        asked.append(int(solution[0]))
         return asked[-1] in (1, 5)
 
-    monkeypatch.setattr(prover, "is_proven", proven)
+    monkeypatch.setattr(proofs, "is_proven", proven)
     strings = np.broadcast_to(np.arange(6.0), (4, 21, 6))
     costs = np.array([3.0, 9.0, 1.0, 2.0, 4.0, 10.0])
     hits = np.array([0.0, 0.0, 2.0, 0.0, 1.0, 0.0])
-    assert prover.settle(strings, costs, hits) == 1
+    assert settle(proofs, strings, costs, hits) == 1
     assert asked == [3, 0, 1]
     assert costs.tolist() == [103.0, 9.0, 1.0, 102.0, 4.0, 10.0]
     assert hits.tolist() == [1.0, 0.0, 2.0, 1.0, 1.0, 0.0]
-    assert prover.settle(strings, costs, hits, below=9.0) is None
+    assert settle(proofs, strings, costs, hits, below=9.0) is None
     assert asked == [3, 0, 1]
 
 
 def test_a_verdict_is_asked_for_once() -> None:
     planner, problem = condition("planner.acceptance=certified").prepare()
-    string = planner.sample(problem, np.random.default_rng(0), 1)[:, :, 0]
-    prover = Prover(planner, problem)
-    assert prover.is_proven(string) == prover.is_proven(string.copy())
-    assert prover.num_certificates == 1
+    solution = planner.solution(problem, planner.sample(problem, np.random.default_rng(0), 1), 0)
+    proofs = Proofs(planner, problem)
+    assert proofs.is_proven(solution) == proofs.is_proven(solution.copy())
+    assert proofs.num_certificates == 1
 
 
 @pytest.mark.parametrize(

@@ -70,20 +70,15 @@ def differs(given: Any, fault: str = "") -> bool:
         ),
         ("corsepius_pick_and_place", ()),
         ("corsepius_ball", ("ga.num_generations=0",)),
+        (
+            "corsepius_pick_and_place",
+            ("ga.initial_size=30", "ga.num_immigrants=2", "ga.mutation=gaussian"),
+        ),
     ],
     ids=str,
 )
 def test_generations_are_those_of_the_slow_search(name: str, overrides: tuple[str, ...]) -> None:
     assert not differs(condition(name, *overrides))
-
-
-@pytest.mark.parametrize("stretch", [1, 3])
-def test_cycles_are_the_same_however_many_are_done_per_call(
-    stretch: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("evoexp.planners.posture_es.cycles.STRETCH", stretch)
-    words = ("ga.initial_size=30", "ga.num_immigrants=2", "ga.mutation=gaussian")
-    assert not differs(condition("corsepius_pick_and_place", *words))
 
 
 @pytest.mark.parametrize("fault", ["no selection", "no mutation", "no crossover"])

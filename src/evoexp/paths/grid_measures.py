@@ -63,15 +63,6 @@ class Tolls(NamedTuple):
 
 
 @inlined
-def length_and_mean(count: int, moves: int, toll: int) -> tuple[float, float]:
-    """Return D and S of `measure_path` of a path of so many nodes by sums of its `Tolls`."""
-    diagonal, spatial = moves & DIAGONAL, moves >> KIND_BITS
-    lateral = count - 1 - diagonal - spatial
-    length = lateral + diagonal * np.sqrt(2.0) + spatial * np.sqrt(3.0)
-    return length, np.float64(toll) / count
-
-
-@inlined
 def measure_by_tolls(path: NodeArray, tolls: Tolls) -> tuple[float, float]:
     """Return D and S of `measure_path`, by whole numbers.
 
@@ -85,4 +76,7 @@ def measure_by_tolls(path: NodeArray, tolls: Tolls) -> tuple[float, float]:
         moves = (moves + tolls.of_move[np.uint64(abs(node - before))]) & POSITIVE
         toll = (toll + tolls.of_node[np.uint64(node)]) & POSITIVE
         before = node
-    return length_and_mean(int(count), int(moves), int(toll))
+    diagonal, spatial = moves & DIAGONAL, moves >> KIND_BITS
+    lateral = count - 1 - diagonal - spatial
+    length = lateral + diagonal * np.sqrt(2.0) + spatial * np.sqrt(3.0)
+    return length, np.float64(toll) / count

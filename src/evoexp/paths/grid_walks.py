@@ -64,32 +64,6 @@ def walk(
         follow_exits(place, ends, path)
 
 
-@kernel
-def walk_to_exits(
-    draws: Block,
-    choices: Choices,
-    ends: tuple[int, int],
-    exits: NodeArray,
-) -> None:
-    """Walk as `walk` does by a table of choices, and keep the last exit of every node only.
-
-    Args:
-        draws: Uniform numbers, one per step.
-        choices: One row toward the target.
-        ends: Indices of the first node and of the target.
-        exits: (nodes,) written, see `follow_exits`.
-    """
-    uniforms, taken = draws.uniforms, draws.taken
-    node, target = np.uint64(ends[0]), np.uint64(ends[1])
-    at, num = taken[0], len(uniforms)
-    while node != target and at < num:
-        following = chosen_node(uniforms[at], choices, node)
-        exits[node] = following
-        node = following
-        at += 1
-    taken[0] = at if node == target else num + 1
-
-
 @inlined
 def chosen_node(uniform: float, choices: Choices, node: np.uint64) -> np.uint64:
     """Return where a uniform number leads by a table of choices; a node is an index, unsigned."""

@@ -4,7 +4,8 @@ Planners that take a robot from one configuration to another share this problem:
 within limits and free of contact, the collision model that a search tests, the exact bodies.
 """
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -41,7 +42,8 @@ ArmTask = ArmMotion | LinkMotion | MoveitTask | GridMotion
 """Scenarios in which robots go from one configuration to another."""
 
 
-class ArmProblem(NamedTuple):
+@dataclass(frozen=True)
+class ArmProblem:
     """A robot and its scenario, prepared."""
 
     assembly: Assembly  # the robot, built

@@ -39,6 +39,8 @@ class Proofs:
     """Judges whole motions for a search that accepts proven ones only, each solution once.
 
     Attributes:
+        planner: The planner.
+        problem: Its problem.
         num_certificates: Motions judged so far.
     """
 
@@ -49,7 +51,7 @@ class Proofs:
             planner: A planner whose field `acceptance` is not `model`.
             problem: Its problem.
         """
-        self._planner, self._problem = planner, problem
+        self.planner, self.problem = planner, problem
         self._known: dict[bytes, Verdict] = {}
         self.num_certificates = 0
 
@@ -60,24 +62,28 @@ class Proofs:
             if len(self._known) >= KEPT:
                 self._known.clear()
             self.num_certificates += 1
-            motion = self._planner.motion(self._problem, solution)
-            found = judge_motion(self._planner, self._problem, motion)
-            asked = self._planner.acceptance == "margin"
+            motion = self.planner.motion(self.problem, solution)
+            found = judge_motion(self.planner, self.problem, motion)
+            asked = self.planner.acceptance == "margin"
             proven = found.certified_margin if asked else found.certified
             self._known[key] = Verdict(proven is True, found.refuted_pair)
         return self._known[key]
 
-    def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> None:
+    def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
         """Judge individuals, the cheapest first, until one is proven; refuted ones cost inf.
 
         Args:
             costs: (individuals,), changed; what costs inf is not judged.
             solution: Makes a flat solution of an individual.
+
+        Returns:
+            The proven individual; None if none is.
         """
         while np.isfinite(costs[k := int(np.argmin(costs))]):
             if self.is_proven(solution(k)):
-                return
+                return k
             costs[k] = np.inf
+        return None
 
     def is_proven(self, solution: FloatArray) -> bool:
         """Whether the certifier proves the motion of a flat solution."""

@@ -53,28 +53,18 @@ class Table(NamedTuple):
 
 @kernel
 def evolve(
-    uniforms: FloatArray,
-    rates: FloatArray,
-    first: int,
+    uniforms: FloatArray,  # numbers for all of them, in the order in which they are used
+    rates: FloatArray,  # (generations,) of mutation, on the way to each of them
+    first: int,  # the present generation
+    # see `evaluate_lines`: from `starts` to `collision_weight`
     task: tuple[FloatArray, FloatArray, FloatArray, tuple[float, float, float], float],
     heredity: Heredity,
-    table: Table,
-    num_teams: IntArray,
-    summaries: FloatArray,
-    taken: IntArray,
+    table: Table,  # see `Table`, written
+    num_teams: IntArray,  # (1,) teams that the hall holds, changed
+    summaries: FloatArray,  # (places, 4) written: see `TableSearch`
+    taken: IntArray,  # (generations,) written: how many numbers each of them took
 ) -> bool:
     """Go on from one generation of lines to others.
-
-    Args:
-        uniforms: Numbers for all of them, in the order in which they are used.
-        rates: (generations,) of mutation, on the way to each of them.
-        first: The present generation.
-        task: See `evaluate_lines`: from `starts` to `collision_weight`.
-        heredity: See `Heredity`.
-        table: See `Table`, written.
-        num_teams: (1,) teams that the hall holds, changed.
-        summaries: (places, 4) written: see `TableSearch`.
-        taken: (generations,) written: how many numbers each of them took.
 
     Returns:
         False if a coordinate is not finite.
@@ -109,24 +99,15 @@ def at_place(judged: Evaluated, place: int) -> Evaluated:
 
 @kernel
 def follow(
-    uniforms: FloatArray,
-    rate: float,
-    heredity: Heredity,
-    table: Table,
-    own: int,
-    other: int,
-    num_teams: IntArray,
+    uniforms: FloatArray,  # at least as many as it takes
+    rate: float,  # of mutation
+    heredity: Heredity,  # what follows
+    table: Table,  # of generations
+    own: int,  # place of the present one
+    other: int,  # place of the next one, written
+    num_teams: IntArray,  # (1,) changed
 ) -> int:
     """Renew the hall of fame, and breed the generation that follows one.
-
-    Args:
-        uniforms: At least as many as it takes.
-        rate: Of mutation.
-        heredity: What follows.
-        table: Of generations.
-        own: Place of the present one.
-        other: Place of the next one, written.
-        num_teams: (1,) changed.
 
     Returns:
         How many numbers it took.

@@ -52,26 +52,17 @@ def num_uniforms(count: int) -> int:
 
 @kernel
 def breed(
+    # (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation
     uniforms: FloatArray,
-    mutation_rate: float,
-    populations: FloatArray,
-    costs: FloatArray,
+    mutation_rate: float,  # probability that an allele of an individual is mutated (Eq. 10).
+    populations: FloatArray,  # (robots, genes, individuals)
+    costs: FloatArray,  # (robots, individuals)
+    # (teams, robots) members of the hall; written: their places in the next populations
     teams: IntArray,
     heredity: Heredity,
-    bred: FloatArray,
+    bred: FloatArray,  # like populations, written
 ) -> None:
-    """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
-
-    Args:
-        uniforms: (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then
-            mutation.
-        mutation_rate: Probability that an allele of an individual is mutated (Eq. 10).
-        populations: (robots, genes, individuals).
-        costs: (robots, individuals).
-        teams: (teams, robots) members of the hall; written: their places in the next populations.
-        heredity: See `Heredity`.
-        bred: Like populations, written.
-    """
+    """Write the next populations: offspring, then elites, then members of the hall, unchanged."""
     size, num_elites = populations.shape[2], heredity.num_elites
     count = size - num_elites - len(teams)
     last = count + 2 * (count // 2)  # behind the numbers of cross-over
@@ -120,28 +111,19 @@ def copy_members(before: FloatArray, members: IntArray, genes: FloatArray, first
 
 @kernel
 def renew(
-    populations: FloatArray,
-    criteria: FloatArray,
+    populations: FloatArray,  # (robots, genes, individuals)
+    criteria: FloatArray,  # (robots, criteria, individuals), all minimised
     collisions: CollisionCounts,
     own: FloatArray,
-    best: IntArray,
-    num_teams: int,
-    heredity: Heredity,
+    best: IntArray,  # (robots,) the best team; −1 if there is none
+    num_teams: int,  # teams of the hall at present
+    heredity: Heredity,  # the hall and its rules
 ) -> int:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
 
     Members of the fronts are offered with their best collaborators. With distinct genomes the best
     team of the generation is offered as it is, so that it is never lost; and a robot that stands
     still, which has one genome, may be in all teams.
-
-    Args:
-        populations: (robots, genes, individuals).
-        criteria: (robots, criteria, individuals), all minimised.
-        collisions: See `best_team`.
-        own: See `best_team`.
-        best: (robots,) the best team; −1 if there is none.
-        num_teams: Teams of the hall at present.
-        heredity: The hall and its rules.
 
     Returns:
         Number of teams that the hall holds then.
@@ -234,29 +216,18 @@ def same_genome(genes: FloatArray, one: int, other: int) -> bool:
 
 @kernel
 def measure(
-    populations: FloatArray,
-    starts: FloatArray,
-    goals: FloatArray,
-    arms: FloatArray,
-    weights: tuple[float, float, float],
+    populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
+    starts: FloatArray,  # (robots, 2) [rad]
+    goals: FloatArray,  # (robots, 2) [rad]
+    arms: FloatArray,  # (robots, 4) base x, base y, lengths of both links [length unit]
+    weights: tuple[float, float, float],  # of C2, C3, C4
+    # (robots, K + 2, 2, individuals) written: link angles, start and goal included
     paths: FloatArray,
-    points: FloatArray,
-    criteria: FloatArray,
-    own: FloatArray,
+    points: FloatArray,  # (robots, K + 2, 4, individuals) written: elbow x, y, tip x, y
+    criteria: FloatArray,  # (robots, 4, individuals), C2, C3, C4 written
+    own: FloatArray,  # (robots, individuals) written: their weighted sum
 ) -> None:
-    """Lay out all paths, and measure their costs whoever their collaborators are.
-
-    Args:
-        populations: (robots, 2 K, individuals) link angles [rad].
-        starts: (robots, 2) [rad].
-        goals: (robots, 2) [rad].
-        arms: (robots, 4) base x, base y, lengths of both links [length unit].
-        weights: Of C2, C3, C4.
-        paths: (robots, K + 2, 2, individuals) written: link angles, start and goal included.
-        points: (robots, K + 2, 4, individuals) written: elbow x, y, tip x, y.
-        criteria: (robots, 4, individuals), C2, C3, C4 written.
-        own: (robots, individuals) written: their weighted sum.
-    """
+    """Lay out all paths, and measure their costs whoever their collaborators are."""
     last = paths.shape[1] - 1
     for r in range(len(populations)):
         path, genes = paths[r], populations[r]
@@ -272,27 +243,18 @@ def measure(
 
 @kernel
 def evaluate_lines(
-    populations: FloatArray,
-    starts: FloatArray,
-    goals: FloatArray,
-    arms: FloatArray,
-    weights: tuple[float, float, float],
-    collision_weight: float,
-    found: Evaluated,
+    populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
+    starts: FloatArray,  # (robots, 2) [rad]
+    goals: FloatArray,  # (robots, 2) [rad]
+    arms: FloatArray,  # (robots, 4) base x, base y, lengths of both links [length unit]
+    weights: tuple[float, float, float],  # of C2, C3, C4
+    collision_weight: float,  # of C1
+    found: Evaluated,  # written, all but `blocked`: there are no obstacles
 ) -> bool:
     """Evaluate everybody against everybody of the other robots, where robots are lines (Eq. 4).
 
     One call does what `Coevolution.evaluated` does step by step with other models; between the
     steps Python would take a third of the time. The first arguments are those of `measure`.
-
-    Args:
-        populations: (robots, 2 K, individuals) link angles [rad].
-        starts: (robots, 2) [rad].
-        goals: (robots, 2) [rad].
-        arms: (robots, 4) base x, base y, lengths of both links [length unit].
-        weights: Of C2, C3, C4.
-        collision_weight: Of C1.
-        found: Written, all but `blocked`: there are no obstacles.
 
     Returns:
         False if a coordinate is not finite.

@@ -76,32 +76,21 @@ def measure_all(
 
 @kernel
 def evolve(
-    draws: Block,
-    first: int,
-    last: int,
-    world: World,
-    weights: tuple[float, float],
-    breeding: Breeding,
+    draws: Block,  # uniform numbers
+    first: int,  # the present generation
+    last: int,  # the generation to reach
+    world: World,  # grid and fields
+    weights: tuple[float, float],  # ε and λ of Eq. 1.
+    breeding: Breeding,  # settings of the operators
+    # two generations or more; number g is at place g modulo the number of places
     table: Population,
-    chosen: SelectionMemory,
-    scratch: Scratch,
+    chosen: SelectionMemory,  # parents and elites, written
+    scratch: Scratch,  # of the operators
+    # what is recorded of some generations, see `note`; likewise at places of its own
     found: Population,
-    summaries: FloatArray,
+    summaries: FloatArray,  # (places, 4) likewise
 ) -> int:
     """Go on from one generation to another.
-
-    Args:
-        draws: Uniform numbers.
-        first: The present generation.
-        last: The generation to reach.
-        world: Grid and fields.
-        weights: ε and λ of Eq. 1.
-        breeding: Settings of the operators.
-        table: Two generations or more; number g is at place g modulo the number of places.
-        chosen: Parents and elites, written.
-        scratch: Of the operators.
-        found: What is recorded of some generations, see `note`; likewise at places of its own.
-        summaries: (places, 4) likewise.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on
@@ -186,28 +175,17 @@ def advance(
 
 @kernel
 def climb(
-    draws: Block,
-    first: int,
-    last: int,
-    world: World,
-    weights: tuple[float, float],
-    erase: bool,
-    population: Population,
-    candidate: Population,
-    scratch: Scratch,
+    draws: Block,  # uniform numbers
+    first: int,  # number of the first trial: trial k changes path k modulo the number of paths
+    last: int,  # number behind the last trial
+    world: World,  # grid and fields
+    weights: tuple[float, float],  # ε and λ of Eq. 1.
+    erase: bool,  # whether loops are erased
+    population: Population,  # paths and their results, changed
+    candidate: Population,  # scratch of one path
+    scratch: Scratch,  # of the operators
 ) -> int:
     """Regenerate a piece of one path after the other as mutation does; keep what costs no more.
-
-    Args:
-        draws: Uniform numbers.
-        first: Number of the first trial: trial k changes path k modulo the number of paths.
-        last: Number behind the last trial.
-        world: Grid and fields.
-        weights: ε and λ of Eq. 1.
-        erase: Whether loops are erased.
-        population: Paths and their results, changed.
-        candidate: Scratch of one path.
-        scratch: Of the operators.
 
     Returns:
         The number of the next trial: less than `last` if the draws did not suffice.

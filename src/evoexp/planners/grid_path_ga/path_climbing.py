@@ -5,7 +5,6 @@ if it costs no more. So a comparison with the genetic algorithm tells what selec
 add to this operator.
 """
 
-import functools
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -15,7 +14,6 @@ from evoexp.errors import SettingError
 from evoexp.numeric.random_stream import Draws
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga import kernels
-from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_generations
 from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population, candidate_of
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import BLOCK, GridPathGa, Problem, trimmed
@@ -60,13 +58,11 @@ class PathClimbing(WrappedPlanner):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the random walks, then the climbing paths after every generation's trials."""
         assert isinstance(self.planner, GridPathGa), "prepare refuses other planners"
-        by_pieces = not self.planner.revisits and Ledger.is_fit(problem.world)
-        kind = _ByPieces if by_pieces else _Climbing
-        return kind(self.planner, problem, self.num_paths).blocks(rng)
+        return _Climbing(self.planner, problem, self.num_paths).blocks(rng)
 
 
 class _Climbing(TableSearch):
-    """One run, and memory for its kernels; whole paths are measured.
+    """One run, and memory for its kernels.
 
     A block ends with the last generation for which the numbers drawn before it suffice: each
     generation is recorded with the generator as it is behind that generation.
@@ -82,6 +78,8 @@ class _Climbing(TableSearch):
             np.empty((self.num_places, RESULTS, num_paths)),
         )
         self.costs = self._found.results[:, COST]
+        candidate = Population(np.empty((1, width), dtype=np.int32), np.empty((RESULTS, 1)))
+        self._scratch = candidate, Scratch.of(width - 1)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the random walks; keep the best of them, in a table as wide as any path."""
@@ -116,12 +114,6 @@ class _Climbing(TableSearch):
             self._note(generation % self.num_places)
         return last
 
-    @functools.cached_property
-    def _scratch(self) -> tuple[Population, Scratch]:
-        nodes = self._problem.fields.grid.num_nodes
-        one = Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1)))
-        return one, Scratch.of(nodes)
-
     def _note(self, place: int) -> None:
         """Write to a place how the paths are now."""
         kernels.note(self._paths, place, self._found, self.summaries)
@@ -136,29 +128,3 @@ class _Climbing(TableSearch):
         paths = self._paths.paths
         is_there = index == self.reached and self._trial == index * self._ga.num_offspring
         return trimmed(paths) if is_there else paths[:0]
-
-
-class _ByPieces(_Climbing):
-    """One run whose paths are measured piece by piece, some generations per call."""
-
-    def begin(self, rng: np.random.Generator) -> None:
-        """Draw the random walks, and add up along the best of them."""
-        super().begin(rng)
-        self._ledger = Ledger.of(self._paths.paths, self._problem.world)
-
-    def _climb(self, first: int, last: int) -> int:
-        """Make trials as far as the numbers suffice; return the last generation that is done."""
-        trials = self._ga.num_offspring
-        self._trial = climb_generations(
-            self._draws.block,
-            self._trial,
-            (first, last),
-            trials,
-            self._problem.world,
-            self._planner.objective.weights,
-            self._paths,
-            self._ledger,
-            self._found,
-            self.summaries,
-        )
-        return self._trial // trials if self._trial < last * trials else last

@@ -42,28 +42,17 @@ class Population(NamedTuple):
 
 @kernel
 def evolve(
-    draws: Block,
-    first: int,
-    last: int,
-    breeding: Breeding,
-    coding: Coding,
-    model: Model,
-    table: Population,
-    chosen: SelectionMemory,
-    summaries: FloatArray,
+    draws: Block,  # uniform numbers
+    first: int,  # the present generation
+    last: int,  # the generation to reach
+    breeding: Breeding,  # settings of the operators
+    coding: Coding,  # the meaning of strings
+    model: Model,  # task, weights and limits of the criteria
+    table: Population,  # some generations; number g is at place g modulo the number of places
+    chosen: SelectionMemory,  # parents and elites, written
+    summaries: FloatArray,  # (places, 4) written, see `summarise_rows`
 ) -> int:
     """Go on from one generation to another.
-
-    Args:
-        draws: Uniform numbers.
-        first: The present generation.
-        last: The generation to reach.
-        breeding: Settings of the operators.
-        coding: The meaning of strings.
-        model: Task, weights and limits of the criteria.
-        table: Some generations; number g is at place g modulo the number of places.
-        chosen: Parents and elites, written.
-        summaries: (places, 4) written, see `summarise_rows`.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on

@@ -1,83 +1,66 @@
 """The evolution strategy on postures, cycle by cycle (Corsépius 2001, section 4.2)."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.numeric.pcg64 import Twin, fill_normals, fill_uniforms
+from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import (
     COST,
     EQUAL,
     GAUSSIAN,
     NORMAL,
-    ROWS,
     UNIFORM,
     Members,
     Memory,
     Strategy,
 )
-from evoexp.planners.posture_es.phase_kernels import (
-    Cycles,
-    Nodes,
-    Parents,
-    Scratch,
-    line_of,
-    run_cycles,
-    settle,
-)
+from evoexp.planners.posture_es.phases import Problem, Stage
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.records import FloatArray, IntArray
 
-ROOM = 256  # nodes of the ancestry that memory is first made for
-STRETCH = 8  # cycles per call, at most,
-MEMORY = 2**20  # [B] whose offspring and terms should not take more than this
-
 
 class Ancestry:
-    """Postures that became parents, and of each its own parent: the paths of all individuals.
-
-    Attributes:
-        nodes: As the kernels append to them.
-    """
+    """Postures that became parents, and of each its own parent: the paths of all individuals."""
 
     def __init__(self, start: FloatArray) -> None:
         """Begin with the start (nq,) as node 0."""
-        self.nodes = Nodes(
-            np.empty((ROOM, len(start))), np.empty(ROOM, dtype=np.int64), np.ones(1, dtype=np.int64)
-        )
-        self.nodes.postures[0], self.nodes.parents[0] = start, -1
+        self._postures, self._parents = [start], [-1]
 
-    def make_room(self, num: int) -> None:
-        """Make room for more nodes."""
-        postures, parents, count = self.nodes
-        while count[0] + num > len(parents):
-            postures = np.concatenate([postures, np.empty_like(postures)])
-            parents = np.concatenate([parents, np.empty_like(parents)])
-        self.nodes = Nodes(postures, parents, count)
+    def append(self, posture: FloatArray, parent: int) -> int:
+        """Append the child (nq,) of a node; return its own node."""
+        self._postures.append(posture)
+        self._parents.append(parent)
+        return len(self._parents) - 1
 
     def posture(self, node: int) -> FloatArray:
         """Return the posture of a node, (nq,)."""
-        return np.asarray(self.nodes.postures[node])
+        return self._postures[node]
 
     def path(self, node: int) -> FloatArray:
         """Return the postures from the first ancestor to a node, (postures, nq)."""
-        return line_of(self.nodes.postures, self.nodes.parents, node)
+        line = []
+        while node >= 0:
+            line.append(self._postures[node])
+            node = self._parents[node]
+        return np.array(line[::-1])
 
 
 class Search:
-    """One phase being searched; several cycles are done per call, and shown one after the other.
+    """One phase being searched.
 
     Attributes:
-        offspring: (nq, individuals) of the last cycle, a copy: one array for all of a size [rad].
-        costs: (individuals,) of the last cycle; a view.
-        summary: Least cost of any so far; lowest of the cycle, feasible or not; mean and deviation
-            of the feasible.
+        offspring: (nq, individuals) of the last cycle, one array for all cycles of a size [rad].
+        costs: (individuals,) of the last cycle.
+        least: Least cost of any feasible individual so far.
+        lowest: Lowest cost of the cycle, feasible or not.
+        mean: Mean cost of the feasible.
+        std: Standard deviation of these costs.
         num_feasible: Feasible individuals of the cycle.
         best: Node of the best so far: the winner once there is one.
-        best_row: (ROWS,) its terms and cost; a view.
+        best_row: (ROWS,) its terms and cost.
         cycles: Cycles so far.
         idle: Cycles since the last improvement.
         won: Whether somebody meets the goal.
@@ -86,12 +69,11 @@ class Search:
     def __init__(
         self,
         ga: StrategySettings,
-        problem: Any,
-        stage: Any,
+        problem: Problem,
+        stage: Stage,
         edge_check: int,
         ancestry: Ancestry,
         node: int,
-        twin: Twin,
         accepts: Callable[[FloatArray, FloatArray], bool] | None = None,
     ) -> None:
         """Begin a phase.
@@ -103,12 +85,9 @@ class Search:
             edge_check: As in `kernels.Strategy`.
             ancestry: Of all phases.
             node: Where the phase begins.
-            twin: Of the generator, the source of all random numbers.
             accepts: Whether a parent (nq,) may have a child (nq,); None: any.
         """
-        self._accepts, self._twin = accepts, twin
-        self.ga, self._judging, self.ancestry = ga, stage.judging, ancestry
-        nq, room = len(problem.scope), ga.num_parents
+        self.ga, self._judging, self.ancestry, self._accepts = ga, stage.judging, ancestry, accepts
         self._strategy = Strategy(
             problem.scope * stage.phase.scope_share,
             problem.limits,
@@ -120,116 +99,87 @@ class Search:
             ga.selection == "plus",
             edge_check,
         )
-        self._parents = Parents(
-            np.empty((nq, room)),
-            np.empty(room),
-            np.full(room, node),
-            np.ones(1, dtype=np.int64),
-        )
         # the posture that the phase begins with is judged, and is the first parent
-        self._done, memory = Cycles.of(nq, 1, 1), Memory.of(nq, 1)
         self.offspring = ancestry.posture(node)[:, None].copy()
-        self._parents.postures[:, 0] = self.offspring[:, 0]
-        kernels.judge(self.offspring, self._judging, *memory[2:])
-        costs, feasible = memory.rows[COST], memory.feasible
-        usable = cost_statistics(np.where(feasible, costs, np.inf))
-        self._parents.costs[0] = costs[0]
-        self._done.rows[0], self._done.best_rows[0] = memory.rows, memory.rows[:, 0]
-        self._done.counts[0] = node, 0, memory.met[0], feasible[0]
-        self._done.costs[0] = costs[0], costs[0], usable.mean, usable.std
-        self._known = self.cycles = 0
-        self._show(0)
+        judged = stage.judge(self.offspring)
+        costs = np.full(ga.num_parents, judged.cost[0])
+        self._members = Members(np.repeat(self.offspring, ga.num_parents, axis=1), costs, 1)
+        self._nodes = [node]  # of the parents
+        self.costs, self.best_row, self.best = judged.cost, judged.rows[:, 0], node
+        self.least = self.lowest = float(judged.cost[0])
+        self.cycles, self.idle, self.won = 0, 0, bool(judged.met[0])
+        self._count(np.where(judged.feasible, judged.cost, np.inf))
 
-    def advance(self) -> None:
+    def advance(self, rng: np.random.Generator) -> None:
         """Go on to the next cycle."""
-        if self.cycles == self._known:
-            self._known = self._go_on()
-        self.cycles += 1
-        place = self.cycles % len(self._done.counts)
-        self._twin.follow(self._done.states[place])
-        np.copyto(self.offspring, self._done.offspring[place])
-        self._show(place)
-
-    def _show(self, place: int) -> None:
-        """Show a cycle that is done."""
-        done = self._done
-        self.costs, self.best_row = done.rows[place, COST], done.best_rows[place]
-        self.summary: list[float] = done.costs[place].tolist()
-        self.best, self.idle, won, self.num_feasible = done.counts[place].tolist()
-        self.won = won > 0
-
-    def _go_on(self) -> int:
-        """Do the next cycles; return the last one that was done."""
-        ga, first = self.ga, self.cycles
-        bred = ga.num_offspring if first else ga.initial_size
-        room = 8 * (len(self.offspring) + ROWS) * (bred + ga.num_immigrants)
-        stretch = max(1, min(STRETCH, MEMORY // room))
-        if self._accepts is not None or (first == 0 and ga.initial_size != ga.num_offspring):
-            stretch = 1
-        if first == 0 or self.offspring.shape[1] != bred + ga.num_immigrants:
-            self._enter(bred, min(stretch, ga.num_generations - first) + 1)
-        last = min(first + min(stretch, len(self._done.counts) - 1), ga.num_generations)
-        self.ancestry.make_room((last - first) * (ga.num_parents + 1))
-        self._twin.meet()
-        if self._accepts is not None:
-            self._do_one(bred, self._accepts)
-            return last
-        arrays = self._parents, self.ancestry.nodes, self._done, self._scratch
-        limits, words = (first, last, bred, ga.patience), self._twin.words
-        return run_cycles(words, *limits, self._strategy, self._judging, *arrays)
-
-    def _enter(self, bred: int, num_places: int) -> None:
-        """Take memory for cycles of another size, and the present cycle's records along."""
-        ga, nq, before = self.ga, len(self.offspring), self._done
+        ga, nq, members = self.ga, len(self.offspring), self._members
+        bred = ga.num_offspring if self.cycles else ga.initial_size
         count = bred + ga.num_immigrants
-        self._done, self.offspring = Cycles.of(nq, count, num_places), np.empty((nq, count))
-        own, other = self.cycles % num_places, self.cycles % len(before.counts)
-        self._done.counts[own], self._done.costs[own] = before.counts[other], before.costs[other]
-        self._done.best_rows[own] = before.best_rows[other]
+        if self.cycles == 0 or self.offspring.shape[1] != count:
+            self._memory = Memory.of(nq, count)
+            self.offspring = self._memory.offspring
+        # all uniform numbers of the cycle are drawn first, then all normal ones
         gaussian, normal = ga.mutation == "gaussian", ga.parent_choice == "gaussian"
         per_child = (0 if gaussian else nq) + (2 + nq if ga.crossover_rate > 0.0 else 0)
-        self._scratch = Scratch(
-            np.empty(bred * per_child + ga.num_immigrants * nq),
-            np.empty(bred * ((nq if gaussian else 0) + normal)),
-            np.empty(count, dtype=np.int64),
-            np.empty(count, dtype=np.bool_),
-        )
-
-    def _do_one(self, bred: int, accepts: Callable[[FloatArray, FloatArray], bool]) -> None:
-        """Do one cycle whose parents must be accepted."""
-        done, (uniforms, normals, origin, met) = self._done, self._scratch
-        place, words = (self.cycles + 1) % len(done.counts), self._twin.words
-        fill_uniforms(words, uniforms)
-        fill_normals(words, normals)
-        memory = Memory(done.offspring[place], origin, done.rows[place], done.feasible[place], met)
-        postures, costs, _, size = self._parents
-        members = Members(postures, costs, int(size[0]))
+        uniforms = rng.random(bred * per_child + ga.num_immigrants * nq)
+        normals = standard_normal(rng, bred * ((nq if gaussian else 0) + normal))
         chosen, winner = kernels.advance(
-            uniforms, normals, bred, self._strategy, self._judging, members, memory
+            uniforms, normals, bred, self._strategy, self._judging, members, self._memory
         )
-        chosen, winner = self._accepted(chosen, int(winner), members, memory, accepts)
-        arrays = self._parents, self.ancestry.nodes, done
-        settle(chosen, winner, self.cycles, memory, *arrays)
-        done.states[place] = words[:2]
+        if self._accepts is not None:
+            chosen, winner = self._accepted(chosen, winner, self._accepts)
+        self.cycles += 1
+        self._settle(chosen, winner)
+
+    def _settle(self, chosen: IntArray, winner: int) -> None:
+        """Take over the selected parents, and the winner or else the best if it is better.
+
+        Args:
+            chosen: Of `kernels.select`: below n offspring, from n on parents.
+            winner: The offspring that meets the goal at the least cost; −1: nobody does.
+        """
+        memory, nodes, origin = self._memory, self._nodes, self._memory.origin
+        offspring, count = memory.offspring, memory.offspring.shape[1]
+        self.costs, self.won = memory.rows[COST].copy(), winner >= 0
+        usable = np.where(memory.feasible, self.costs, np.inf)
+        self._count(usable)
+        # nodes of new parents and of the best; without a feasible offspring all parents stay
+        least = int(np.argmin(usable))
+        improved = bool(usable[least] < self.least)
+        best, new = winner if winner >= 0 else least, set(chosen[chosen < count].tolist())
+        new |= {best} if improved or winner >= 0 else set()
+        born = {n: self.ancestry.append(offspring[:, n].copy(), nodes[origin[n]]) for n in new}
+        if len(chosen):
+            postures, costs, _ = self._members
+            size = len(chosen)
+            postures[:, :size] = np.hstack([offspring, postures])[:, chosen]
+            costs[:size] = np.concatenate([self.costs, costs])[chosen]
+            self._members = self._members._replace(size=size)
+            self._nodes = [born[n] if n < count else nodes[n - count] for n in chosen.tolist()]
+        # records
+        self.idle = 0 if improved else self.idle + 1
+        self.least, self.lowest = min(self.least, float(usable[least])), float(self.costs.min())
+        if improved or winner >= 0:
+            self.best, self.best_row = born[best], memory.rows[:, best].copy()
+
+    def _count(self, usable: FloatArray) -> None:
+        """Count the individuals of finite cost (individuals,), and take mean and deviation."""
+        _, self.mean, self.std = cost_statistics(usable)
+        self.num_feasible = int(np.count_nonzero(np.isfinite(usable)))
 
     def _accepted(
-        self,
-        chosen: IntArray,
-        winner: int,
-        members: Members,
-        memory: Memory,
-        accepts: Callable[[FloatArray, FloatArray], bool],
+        self, chosen: IntArray, winner: int, accepts: Callable[[FloatArray, FloatArray], bool]
     ) -> tuple[IntArray, int]:
         """Select again until everybody selected is accepted; who is refused is not feasible."""
-        offspring, origin, parents = memory.offspring, memory.origin, members.postures
-        known: set[int] = set()
+        members, memory, offspring = self._members, self._memory, self.offspring
+        parents, known, count = members.postures, set[int](), offspring.shape[1]
         while True:
-            count = offspring.shape[1]
             asked = {n for n in (*chosen.tolist(), winner) if 0 <= n < count} - known
             known |= asked
+            origin = memory.origin
             refused = [n for n in asked if not accepts(parents[:, origin[n]], offspring[:, n])]
             if not refused:
-                return chosen, int(winner)
+                return chosen, winner
             memory.feasible[refused] = False
             chosen, winner = kernels.select(self._strategy, members, memory)
 

@@ -180,25 +180,17 @@ def judge_edges(parents: FloatArray, num_between: int, judging: Judging, memory:
 
 @kernel
 def breed(
-    uniforms: FloatArray,
-    normals: FloatArray,
-    num_bred: int,
-    strategy: Strategy,
-    members: Members,
-    memory: Memory,
+    uniforms: FloatArray,  # (uniforms,) in [0, 1), taken in order
+    normals: FloatArray,  # (normals,) standard normal deviates, taken in order
+    num_bred: int,  # children of parents
+    strategy: Strategy,  # settings of the operators
+    members: Members,  # the parents
+    memory: Memory,  # `offspring` and `origin` are written
 ) -> None:
     """Write offspring, within the limits, and the parent of each.
 
     A child copies a parent, is perhaps crossed with another one, and is mutated. The columns behind
     `num_bred` are immigrants, uniform within the limits; the nearest parent counts as theirs.
-
-    Args:
-        uniforms: (uniforms,) in [0, 1), taken in order.
-        normals: (normals,) standard normal deviates, taken in order.
-        num_bred: Children of parents.
-        strategy: Settings of the operators.
-        members: The parents.
-        memory: `offspring` and `origin` are written.
     """
     scope, limits, rate = strategy.scope, strategy.limits, strategy.crossover_rate
     parents, num_parents = members.postures, members.size
@@ -270,22 +262,13 @@ def nearest_parent(
 def advance(
     uniforms: FloatArray,
     normals: FloatArray,
-    num_bred: int,
-    strategy: Strategy,
-    judging: Judging,
-    members: Members,
-    memory: Memory,
+    num_bred: int,  # children of parents; the rest are immigrants
+    strategy: Strategy,  # settings of the operators
+    judging: Judging,  # terms and limits
+    members: Members,  # the parents
+    memory: Memory,  # written
 ) -> tuple[IntArray, int]:
     """Breed, judge and select one cycle.
-
-    Args:
-        uniforms: See `breed`.
-        normals: See `breed`.
-        num_bred: Children of parents; the rest are immigrants.
-        strategy: Settings of the operators.
-        judging: Terms and limits.
-        members: The parents.
-        memory: Written.
 
     Returns:
         Indices of the next parents, the best first: below n offspring, from n on parents (none: all

@@ -28,7 +28,6 @@ from evoexp.collision.models.body_models import CollisionModel
 from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.pcg64 import Twin
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
@@ -38,7 +37,6 @@ from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
-from evoexp.planners.posture_es.phase_kernels import rate_steps
 from evoexp.planners.posture_es.phases import Problem, Span, Stage
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.planners.proofs import Acceptance, Proofs
@@ -102,12 +100,12 @@ class PostureEs(PlannerDefaults, Component):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
         paths = _Paths(self, problem)
-        ancestry, twin, node = Ancestry(problem.start), Twin(rng), 0
+        ancestry, node = Ancestry(problem.start), 0
         situation = problem.first_situation
         for index in range(len(problem.phases)):
             stage = problem.begin(index, ancestry.posture(node), situation)
             accepts = self._proves(problem, stage) if self.answers_are_proven else None
-            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node, twin, accepts)
+            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node, accepts)
             last = index == len(problem.phases) - 1
             while True:
                 reason = search.stop_reason
@@ -115,7 +113,7 @@ class PostureEs(PlannerDefaults, Component):
                 yield paths.record(search, index, reason if ends else "")
                 if reason:
                     break
-                search.advance()
+                search.advance(rng)
             if not search.won:
                 return
             node = search.best
@@ -275,16 +273,15 @@ class _Paths:
         counts = {"phase": phase + 1.0, "cycles": float(self._cycles)}
         terms = named(search.best_row, self._chosen) | self._path | counts
         terms["idle_cycles"] = float(search.idle)
-        least, lowest, mean, std = search.summary
         best = Candidate(solution, terms, search.won and last)
-        keeper.keep(least if last else np.inf, best)
+        keeper.keep(search.least if last else np.inf, best)
         # the generation
         costs, count = search.costs, search.offspring.shape[1]
         return keeper.record(
-            CostStatistics(0, mean, std),
+            CostStatistics(0, search.mean, search.std),
             costs[None, :] if several else costs,
             search.offspring,
-            lowest=lowest if last else np.inf,
+            lowest=search.lowest if last else np.inf,
             num_feasible=search.num_feasible,
             evaluations=count,
             collision_queries=count * (1 + (planner.edge_check if search.cycles else 0)),
@@ -300,11 +297,11 @@ def named(row: FloatArray, chosen: tuple[int, ...]) -> dict[str, float]:
 
 def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
     """Return the terms of a path (postures, nq): its steps in units of the scope."""
-    longest, oversized = rate_steps(postures, scope, OVERSIZED)
+    steps = (np.abs(np.diff(postures, axis=0)) / scope).max(axis=1, initial=0.0)
     return {
         "postures": float(len(postures)),
-        "longest_step_scopes": longest,
-        "oversized_steps": float(oversized),
+        "longest_step_scopes": float(steps.max(initial=0.0)),
+        "oversized_steps": float(np.count_nonzero(steps > OVERSIZED)),
     }
 
 

@@ -51,31 +51,20 @@ class Memory(NamedTuple):
 
 @kernel
 def evolve(
-    words: Words,
-    first: int,
-    last: int,
-    stop_cost: float,
+    words: Words,  # the random generator, see `numeric.pcg64`
+    first: int,  # the present generation
+    last: int,  # the last one to be computed
+    stop_cost: float,  # the first generation whose best costs less ends the search
+    # whether generations are bred; if not, each is drawn as the initial one is, as many individuals
+    # as would be bred
     evolving: bool,
     breeding: Breeding,
     judging: Judging,
-    starts: FloatArray,
+    starts: FloatArray,  # (joints, ≥ individuals) start of the sub-path, the same for all [rad]
     generations: Generations,
     memory: Memory,
 ) -> int:
     """Compute the generations behind one up to another, or up to the first that is good enough.
-
-    Args:
-        words: The random generator, see `numeric.pcg64`.
-        first: The present generation.
-        last: The last one to be computed.
-        stop_cost: The first generation whose best costs less ends the search.
-        evolving: Whether generations are bred; if not, each is drawn as the initial one is, as many
-            individuals as would be bred.
-        breeding: See `Breeding`.
-        judging: See `Judging`.
-        starts: (joints, ≥ individuals) start of the sub-path, the same for all [rad].
-        generations: See `Generations`.
-        memory: See `Memory`.
 
     Returns:
         The last generation that was computed.

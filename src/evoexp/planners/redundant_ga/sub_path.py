@@ -167,16 +167,12 @@ class Search(TableSearch):
         self.states = [words.astype("<u8").tobytes() + self._behind for words in halves]
         if self._proofs is None:
             return
-        place = places.item(-1)
-        costs, summary = self.costs[place, 0], self.summaries[place]
-        while np.isfinite(costs[best := int(summary[0])]):
-            end = self._angles[place][:, best]
-            if self._proofs.is_proven(
-                np.concatenate([*self._postures, *[end] * (3 - len(self._postures))])
-            ):
-                break
-            costs[best] = np.inf
-            kernels.summarise_costs(costs, summary)
+        place, postures = places.item(-1), self._postures
+        costs, ends = self.costs[place, 0], self._angles[place]
+        self._proofs.settle(
+            costs, lambda k: np.concatenate([*postures, *[ends[:, k]] * (3 - len(postures))])
+        )
+        kernels.summarise_costs(costs, self.summaries[place])
 
     def improve(self, places: IntArray) -> list[Best]:
         """Keep the best plan of the generations at some places; return the bests of their block."""

@@ -91,27 +91,17 @@ class Scratch(NamedTuple):
 
 @kernel
 def evolve(
+    # (generations, numbers) those of every generation, in the order in which they are used
     uniforms: FloatArray,
-    first: int,
-    arm_slices: IntArray,
+    first: int,  # the present generation
+    arm_slices: IntArray,  # (arms, 2) rows of each arm
     settings: Settings,
+    # see `Population`: some generations; number g is at place g modulo the number of places
     table: Population,
     scratch: Scratch,
-    summaries: FloatArray,
+    summaries: FloatArray,  # (places, 4) written, see `summarise_strings`
 ) -> None:
-    """Go on from one generation to others.
-
-    Args:
-        uniforms: (generations, numbers) those of every generation, in the order in which they are
-            used.
-        first: The present generation.
-        arm_slices: (arms, 2) rows of each arm.
-        settings: See `Settings`.
-        table: See `Population`: some generations; number g is at place g modulo the
-            number of places.
-        scratch: See `Scratch`.
-        summaries: (places, 4) written, see `summarise_strings`.
-    """
+    """Go on from one generation to others."""
     settings, table, scratch, summaries = borrowed((settings, table, scratch, summaries))
     strings, costs, collisions = table
     for step in range(len(uniforms)):
@@ -124,23 +114,14 @@ def evolve(
 
 @kernel
 def advance(
-    uniforms: FloatArray,
-    arm_slices: IntArray,
-    settings: Settings,
-    population: Population,
-    following: Population,
-    scratch: Scratch,
+    uniforms: FloatArray,  # random numbers of the generation, in the order in which they are used
+    arm_slices: IntArray,  # (arms, 2) rows of each arm
+    settings: Settings,  # of a generation
+    population: Population,  # the present one
+    following: Population,  # written
+    scratch: Scratch,  # written
 ) -> None:
-    """Write the population that follows another: its offspring, then the elites, best first.
-
-    Args:
-        uniforms: Random numbers of the generation, in the order in which they are used.
-        arm_slices: (arms, 2) rows of each arm.
-        settings: Of a generation.
-        population: The present one.
-        following: Written.
-        scratch: Written.
-    """
+    """Write the population that follows another: its offspring, then the elites, best first."""
     counts, (offspring, terms, elites) = settings.counts, scratch
     # elites: the lowest costs
     choose_elites(population.costs, elites)
@@ -188,24 +169,14 @@ def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray
 @kernel
 def breed(
     uniforms: FloatArray,
-    counts: Counts,
-    arm_slices: IntArray,
-    breeding: Breeding,
-    population: FloatArray,
-    costs: FloatArray,
-    offspring: FloatArray,
+    counts: Counts,  # sizes
+    arm_slices: IntArray,  # (arms, 2) rows of each arm
+    breeding: Breeding,  # settings
+    population: FloatArray,  # the parents' generation
+    costs: FloatArray,  # (individuals,) of the parents
+    offspring: FloatArray,  # written
 ) -> None:
-    """Write offspring: reproduced, crossed and mutated (section 3.4 a, b, d).
-
-    Args:
-        uniforms: See `advance`.
-        counts: Sizes.
-        arm_slices: (arms, 2) rows of each arm.
-        breeding: Settings.
-        population: The parents' generation.
-        costs: (individuals,) of the parents.
-        offspring: Written.
-    """
+    """Write offspring: reproduced, crossed and mutated (section 3.4 a, b, d)."""
     count, new = counts.offspring, counts.new
     # (a) weighted roulette wheel; neighbours in the order drawn are the random pairs of (b)
     wheel, parents = np.empty(len(costs)), np.empty(count, dtype=np.int64)

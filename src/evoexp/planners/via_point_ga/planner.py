@@ -31,10 +31,10 @@ from evoexp.planners.arm_tasks import (
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
+from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
-from evoexp.planners.via_point_ga.search import ProvenSearch, Search
+from evoexp.planners.via_point_ga.search import ProvenSearch, Search, settle
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
@@ -65,9 +65,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         spline = prepare_redistribution(
             self.num_via_points, joints, self.spline_end, self.samples_per_segment
         )
-        ends, margins = (found.start, found.goal), (found.security_margin, found.obstacle_margin)
-        bodies = found.assembly, found.collision
-        return Problem(*bodies, *ends, spline, found.scene, *margins, found.length_unit)
+        return Problem(**vars(found), spline=spline)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
@@ -85,7 +83,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         judged = strings.judge(padded, population.shape[2])
         if self.answers_are_proven:
             hits = judged.terms.collisions[: population.shape[2]]
-            Prover(self, problem).settle(padded, judged.cost, hits)
+            settle(Proofs(self, problem), padded, judged.cost, hits)
         return judged
 
     def bounds(self, problem: Problem) -> tuple[FloatArray, FloatArray]:

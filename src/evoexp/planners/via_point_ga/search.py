@@ -6,9 +6,9 @@ import numpy as np
 
 from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.planner import Candidate
+from evoexp.planners.proofs import Proofs
 from evoexp.planners.table_search import TableSearch
 from evoexp.planners.via_point_ga import kernels
-from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.planners.via_point_ga.strings import Problem, Strings
 from evoexp.records import Best, FloatArray, IntArray
 
@@ -76,22 +76,46 @@ class ProvenSearch(Search):
     def __init__(self, planner: Any, problem: Problem, strings: Strings) -> None:
         """Begin a run, see `Search`, without any verdict."""
         super().__init__(planner, problem, strings, per_call=1)
-        self._prover = Prover(planner, problem)
+        self._proofs = Proofs(planner, problem)
 
     def improve(self, places: IntArray) -> list[Best]:
         """Keep a proven string that costs less than the one kept, if the generation has one."""
         (place,), keeper = places.tolist(), self.keeper
         strings, costs, hits = (array[place] for array in self._table)
-        k = self._prover.settle(strings, costs, hits, keeper.cost)
+        k = settle(self._proofs, strings, costs, hits, keeper.cost)
         proven = np.zeros(len(costs), bool)
         if k is not None:
             proven[k] = True
 
         def candidate(k: int, solved: bool) -> Candidate:
             found = super(ProvenSearch, self).candidate(place, k)
-            found.terms["certificates"] = float(self._prover.num_certificates)
+            found.terms["certificates"] = float(self._proofs.num_certificates)
             return found._replace(solved=solved)
 
         keeper.keep_proven(costs, proven, candidate)
         self._summarise(place)
         return [keeper.standing]
+
+
+def settle(
+    proofs: Proofs, strings: FloatArray, costs: FloatArray, hits: FloatArray, below: float = np.inf
+) -> int | None:
+    """Judge free strings, the cheapest first, until one is proven; return it, None if none is.
+
+    Each one that is refuted counts as colliding at one instant more, and costs as much.
+
+    Args:
+        proofs: Of a `ViaPointGa` and its problem.
+        strings: (nq, N + 1, ≥ individuals).
+        costs: (individuals,), changed.
+        hits: (individuals,) colliding instants, changed.
+        below: Costs from which on nothing is judged: as low a one is proven already.
+    """
+    planner, problem = proofs.planner, proofs.problem
+    open_costs = np.where((hits == 0.0) & (costs < below), costs, np.inf)
+    settled = open_costs.copy()
+    proven = proofs.settle(settled, lambda k: planner.solution(problem, strings, k))
+    refuted = settled != open_costs
+    hits[refuted] += 1.0
+    costs[refuted] += planner.objective.collision_weight
+    return proven

@@ -1,54 +1,34 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.touching_spheres import SphereCollision
-from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.paths.workspace import Redistribution
-from evoexp.planners.arm_tasks import margins
+from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.table_search import generations_per_call
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.robots.assembly import Assembly
+from evoexp.records import BoolArray, FloatArray
 
 LANES = 8  # individuals are padded to whole vectors
 PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
 CACHED = 1 << 19  # [B] and as many as take so much memory
 
 
-class Problem(NamedTuple):
+@dataclass(frozen=True)
+class Problem(ArmProblem):
     """A robot and its scenario, prepared."""
 
-    assembly: Assembly  # the robot, built
-    # the paper's collision model on it, or its covered bodies
-    collision: SphereCollision | CoveredCollision
-    start: FloatArray  # (nq,) [deg]
-    goal: FloatArray  # (nq,) [deg]
     spline: Redistribution  # factor and memory of the redistribution; for one thread at a time
-    scene: Scene  # the bodies themselves, for the exact verdict on a motion
-    security_margin: float  # clearance that the task requires between two arms [length unit]
-    obstacle_margin: float  # the same between a link and an obstacle
-    length_unit: str  # name of the scene's unit of length
-
-    @property
-    def arm_slices(self) -> IntArray:
-        """(arms, 2) rows of each arm."""
-        return self.assembly.arm_slices
-
-    @property
-    def margins(self) -> FloatArray:
-        """(pairs of the scene,) clearance that the task requires of each [length unit]."""
-        return margins(self.assembly, self.scene, self.security_margin, self.obstacle_margin)
 
     @property
     def sphere_radius(self) -> float:

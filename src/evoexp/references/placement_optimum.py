@@ -106,7 +106,7 @@ def minima_of(costs: FloatArray, in_reach: BoolArray, turns: BoolArray) -> BoolA
         in_reach: (n, n).
         turns: (2,) whether the first value of θ1 and of θ2 follows the last one.
     """
-    modes = ["wrap" if whole else "constant" for whole in turns]
+    modes: Any = ["wrap" if whole else "constant" for whole in turns]
     around = ndimage.minimum_filter(costs, (1, 3, 3), mode=["nearest", *modes], cval=np.inf)
     at_edge = ndimage.minimum_filter(in_reach.astype(np.int8), (3, 3), mode=modes, cval=1) == 0
     marked: BoolArray = (costs <= around) & (~at_edge | (costs <= around[::-1]))

@@ -99,7 +99,8 @@ class Directions(NamedTuple):
                 share = 1.0 if k + 1 < link else place * (k + 1 == link)
                 dx, dy = dx + share * across[k], dy + share * up[k]
             costs = costs + gamma / np.maximum(dx * dx + dy * dy, SMALLEST)
-        return costs
+        found: FloatArray = costs
+        return found
 
 
 def dot(one: FloatArray, two: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 With derivatives by complex steps.
 
-The slow and obvious versions of what `references.placement_*` compiles.
+The slow and obvious versions of what `references.placement_*` measures.
 
 All functions take x (3, …) = (φ1, φ2, φ3) [rad], complex numbers, too: a complex step gives
 derivatives without any cancellation.
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.references.placement_model import Directions
+from evoexp.references.placement_programme import Directions
 
 STEP = 1e-30  # of the complex step: its square vanishes beside anything
 

@@ -11,8 +11,9 @@ import pytest
 import scipy
 
 from evoexp.errors import SettingError
-from evoexp.references.grid_frontier import GridFrontier, best_walk, frontier, walk_costs
-from evoexp.references.grid_networks import arrivals_of, network_of
+from evoexp.references.grid_frontier import GridFrontier, best_walk, frontier
+from evoexp.references.grid_networks import arrivals_of, best_walks, network_of
+from evoexp.references.grid_relaxation import relaxed
 from planners.grid_samples import planner, robot, scenario, solvable
 from references.all_paths import all_simple_paths, path_cost
 from shipped_conditions import expanded
@@ -117,10 +118,9 @@ def test_walks_of_the_last_number_of_nodes_count(most: int) -> None:
     walks, walk = best_walk(network, *weights, 1e3, most)
     assert walks[-1] == pytest.approx((most, expected[-1]))
     assert len(walk) == most
-    rows, _ = GridFrontier(planner=own, **SETTINGS | {"max_nodes": most})._bounds(
-        network, 1e3, walks
-    )
-    assert rows[-1] == pytest.approx((most, expected[-1]))
+    reference = GridFrontier(planner=own, **SETTINGS | {"max_nodes": most})
+    floors, _ = reference.floors(network, 1e3, walks)
+    assert (len(floors), floors[-1]) == (most + 1, pytest.approx(expected[-1]))
 
 
 def test_the_bound_holds_for_paths_through_every_node() -> None:
@@ -140,11 +140,13 @@ def test_the_bound_holds_for_paths_through_every_node() -> None:
     # where no path is known, the bound is that of numbers of nodes alone
     reference = GridFrontier(planner=own, **SETTINGS)
     walks, _ = best_walk(network, *weights, 1e3, SETTINGS["max_nodes"])
-    rows, bound = reference._bounds(network, 1e3, walks)
-    assert rows[:, 0].tolist() == list(range(2, 10))
-    for number, floor in rows:
-        assert floor <= least[int(number)] + 1e-12
-    assert 0.9 * least[9] < bound <= least[9] + 1e-12
+    floors, beyond = reference.floors(network, 1e3, walks)
+    assert (len(floors), beyond) == (10, np.inf)
+    arrivals = arrivals_of(network, weights[0])
+    relaxed(arrivals, weights[1], 1e3, 1e3, floors, SETTINGS["bound_steps"])
+    for number, floor in enumerate(floors[2:], 2):
+        assert floor <= least[number] + 1e-12
+    assert 0.9 * least[9] < floors[2:].min() <= least[9] + 1e-12
 
 
 def slow_walk_costs(network: Any, epsilon: float, mu: float, most: int) -> list[float]:
@@ -165,14 +167,14 @@ def slow_walk_costs(network: Any, epsilon: float, mu: float, most: int) -> list[
     return costs
 
 
-@pytest.mark.parametrize("num_weights", [1, 16, 19])
 @pytest.mark.parametrize("size", [(7, 6), (4, 4, 3)])
-def test_walks_for_many_weights_are_those_for_each(size: tuple[int, ...], num_weights: int) -> None:
+def test_walks_of_all_numbers_of_nodes_are_those_of_each(size: tuple[int, ...]) -> None:
     network, epsilon = network_of(solvable(size, 0.3, 1, planner())), 0.3
-    weights = np.linspace(0.1, 2.0, num_weights)
-    found = walk_costs(arrivals_of(network, epsilon), weights, 20)
-    expected = np.array([slow_walk_costs(network, epsilon, mu, 20) for mu in weights]).T
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    for mu in (0.1, 0.7, 2.0):
+        arrivals = arrivals_of(network, epsilon)
+        found, walk = best_walks(arrivals, mu * network.unsafeness, 20)
+        np.testing.assert_allclose(found, slow_walk_costs(network, epsilon, mu, 20), rtol=1e-12)
+        assert (len(walk), walk[0], walk[-1]) == (20, *network.ends)
 
 
 def test_walks_too_short_to_arrive_are_refused() -> None:

@@ -9,12 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.objectives.placement_kernels import Model
-from evoexp.references.placement_model import Directions, directions_of
-from evoexp.references.placement_polish import descend, polish
-from evoexp.references.placement_programme import HEIGHT, MARGINS, OBJECTIVE, Programme, measure
-from evoexp.references.placement_search import lowest, mark_minima, search
-from evoexp.references.placement_subgradient import LANES, costs_of, slide
+from evoexp.references.placement_conventional import slide
+from evoexp.references.placement_optimum import lowest, minima_of, polish
+from evoexp.references.placement_programme import (
+    HEIGHT,
+    MARGINS,
+    OBJECTIVE,
+    TORQUE_BOUNDS,
+    Directions,
+    Programme,
+    directions_of,
+    measure,
+)
 from references import placement_complex as slow
 from references.placement_samples import LABELS, problem
 
@@ -51,7 +57,7 @@ def test_the_programme_and_its_derivatives_are_those_of_complex_steps(
     function = functools.partial(slow.programme, model)
     for z in rng.uniform(-3.0, 3.0, (40, 3 + programme.minimax)):
         values, slopes = programme.measured(z)
-        assert len(values) == MARGINS + programme.num_margins
+        assert len(values) == MARGINS + TORQUE_BOUNDS * programme.minimax + len(model.bounds())
         np.testing.assert_allclose(values, function(z), rtol=1e-11, atol=1e-13)
         expected = slow.gradient(function, z)
         np.testing.assert_allclose(slopes, expected, rtol=1e-9, atol=1e-11 * np.abs(expected).max())
@@ -99,26 +105,26 @@ def test_many_costs_at_once_are_the_planners(case: str) -> None:
         ]
     ).T
     assert x.shape[1] > 60
-    np.testing.assert_allclose(many_costs(model, x), costs[kept], rtol=1e-9)
+    np.testing.assert_allclose(model.costs(*model.links(x)), costs[kept], rtol=1e-9)
     assert np.abs(slow.height(model, x)).max() < 1e-12
     everything = model._replace(avoided=POINTS)
-    np.testing.assert_allclose(many_costs(everything, x), slow.cost(everything, x), rtol=1e-11)
+    np.testing.assert_allclose(
+        everything.costs(*everything.links(x)), slow.cost(everything, x), rtol=1e-11
+    )
 
 
-def many_costs(model: Directions, x: np.ndarray) -> np.ndarray:
-    costs, across, up = np.empty(x.shape[1]), np.empty(x.shape), np.empty(x.shape)
-    costs_of(np.ascontiguousarray(x), model, across, up, costs)
-    return costs
+def starts_of(case: str, model: Directions, count: int) -> list[np.ndarray]:
+    """Return directions of the lowest minima of a coarse search."""
+    rows = lowest(problem(case).model, AROUND, 60, count)
+    return [model.reaching(np.radians(row[:2]), row[2] == 1.0) for row in rows]
 
 
 @pytest.mark.parametrize("case", ["torque_norm", "obstacle_link", "manipulability"])
 def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
     model = directions(case)
-    starts = lowest(model, AROUND, 60, 250.0, 6)
+    starts = starts_of(case, model, 6)
     steps = 0.3 / np.sqrt(np.arange(1.0, 41.0))
-    x = np.resize(np.array(starts), (LANES, 3)).T.copy()
-    ends, costs = np.empty(x.shape), np.empty(LANES)
-    slide(x, steps, model, ends, costs)
+    ends, costs = slide(np.array(2 * starts).T, steps, model)
     for k, start in enumerate(starts):
         end, least = slow.slide(model, start, steps)
         assert costs[k] == pytest.approx(
@@ -128,46 +134,13 @@ def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
         np.testing.assert_array_equal(ends[:, k], ends[:, k + len(starts)])
 
 
-@pytest.mark.parametrize("case", LABELS)
-def test_the_dense_search_has_the_planners_costs(case: str) -> None:
-    own = problem(case)
-    one, two = np.meshgrid(
-        np.arange(-180.0, 180.0, 4.0), np.arange(-180.0, 180.0, 4.0), indexing="ij"
-    )
-    expected, theta_3 = own.model.measure_branches(np.stack([one.ravel(), two.ravel()]))
-    costs, sines = search(directions(case), np.radians(np.stack([one[:, 0], two[0]])))
-    expected = np.where(np.isnan(theta_3), np.inf, expected).reshape(costs.shape)
-    np.testing.assert_array_equal(np.isinf(costs), np.isinf(expected))
-    np.testing.assert_array_equal(np.abs(sines) <= 1.0, np.isfinite(costs[0]))
-    np.testing.assert_allclose(
-        np.minimum(costs, np.where(np.isinf(costs), np.inf, 250.0)), expected, rtol=1e-8
-    )
-
-
-def test_the_dense_search_keeps_to_limits() -> None:
-    own, limits = problem("torque_norm"), np.array([[-170.0, 95.0], [-60.0, 151.0], [-101.0, 77.0]])
-    torques = np.array([[-8.1, 6.2], [-np.inf, 5.6], [-1.3, np.inf]])
-    model = Model(
-        own.model.task, own.model.weights, own.model.avoided, np.concatenate([limits, torques])
-    )
-    one, two = np.meshgrid(
-        np.arange(-180.0, 180.0, 2.0), np.arange(-180.0, 180.0, 2.0), indexing="ij"
-    )
-    expected, _ = model.measure_branches(np.stack([one.ravel(), two.ravel()]))
-    costs, _ = search(directions_of(model, AROUND), np.radians(np.stack([one[:, 0], two[0]])))
-    feasible = expected.reshape(costs.shape) < 250.0
-    assert 100 < np.count_nonzero(feasible) < 5000
-    np.testing.assert_array_equal(np.isfinite(costs), feasible)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_minima_are_marked_as_by_rolling(seed: int) -> None:
     rng = np.random.default_rng(seed)
     costs = rng.integers(0, 6, (2, 17, 17)).astype(float)  # with ties
     in_reach = rng.random((17, 17)) < 0.9
     costs[:, ~in_reach] = np.inf
-    least = np.zeros(costs.shape, dtype=bool)
-    mark_minima(costs, in_reach, np.array([True, True]), 5.0, least)
+    least = minima_of(costs, in_reach, np.array([True, True])) & (costs < 5.0)
     np.testing.assert_array_equal(least, slow.minima(costs, in_reach, 5.0))
 
 
@@ -175,15 +148,14 @@ def test_a_range_that_is_no_turn_has_ends() -> None:
     costs = np.full((2, 9, 9), 3.0)
     costs[0, 0, 4], costs[0, 8, 4] = 2.0, 1.0
     for turns, expected in ((True, 1), (False, 2)):
-        least = np.zeros(costs.shape, dtype=bool)
-        mark_minima(costs, np.ones((9, 9), dtype=bool), np.array([turns, True]), 2.5, least)
-        assert np.count_nonzero(least) == expected
+        least = minima_of(costs, np.ones((9, 9), dtype=bool), np.array([turns, True]))
+        assert np.count_nonzero(least & (costs < 2.5)) == expected
 
 
 def test_a_polished_minimum_meets_its_conditions_and_others_are_refused() -> None:
     model = directions("minimax")
-    programme, start = Programme(model), lowest(model, AROUND, 60, 250.0, 1)[0]
-    end = descend(programme, start)
+    programme, start = Programme(model), starts_of("minimax", model, 1)[0]
+    end = programme.descend(start)
     found = polish(programme, end.x)
     assert found is not None
     torques = np.abs(slow.weighted_torques(model, found.x))

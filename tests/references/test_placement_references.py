@@ -8,7 +8,7 @@ import functools
 import numpy as np
 import pytest
 
-from evoexp.references.placement_model import directions_of
+from evoexp.references.placement_programme import directions_of
 from references import placement_complex as slow
 from references.placement_numpy import dense_least
 from references.placement_samples import conditions, found

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.paths.grids import Moves, NodeArray, StepArray
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import BoolArray, FloatArray
 
 MOST_SLOTS = 256  # of a node
 MOST_NODES = 2**15  # whose differences are 16 bits
@@ -20,7 +19,6 @@ TOTAL_BITS = 9  # of an entry: the number of slots
 TOTAL = np.uint32(2**TOTAL_BITS - 1)
 SHIFT = np.uint32(TOTAL_BITS)
 BYTES = 8  # of a word
-SCATTER = np.uint64(0x9E3779B97F4A7C15)  # odd; 2⁶⁴ over the golden ratio (Knuth 1998)
 
 
 class Choices(NamedTuple):
@@ -36,17 +34,6 @@ class Choices(NamedTuple):
     slots: NDArray[np.int16]
 
 
-class _Patterns(NamedTuple):
-    """Weights of the moves of one node, each combination once."""
-
-    # (patterns + 1, words) a byte for the weight of each move, the lowest first; the last row is
-    # scratch
-    words: NDArray[np.uint64]
-    # (patterns + 1,) place of the first slot of each; behind the last one, of the next
-    first: IntArray
-    known: IntArray  # (a power of two,) where each is found by its hash; −1: nowhere
-
-
 def choices_of(
     neighbours: NodeArray, potentials: FloatArray, fronts: StepArray, most_patterns: int
 ) -> Choices:
@@ -58,32 +45,41 @@ def choices_of(
     Args:
         neighbours: See `grids.Moves`, as for `potentials`.
         fronts: (targets, nodes) steps to every node from each target.
-        most_patterns: Patterns of weights for which there is memory.
+        most_patterns: Most combinations of the weights of a node's moves.
     """
     nodes, moves = neighbours.shape
     none = Choices(np.empty((0, nodes), dtype=np.uint32), np.zeros(1, dtype=np.int16))
-    if nodes > MOST_NODES:
+    if nodes > MOST_NODES or not len(fronts):
         return none
-    patterns = _Patterns(
-        np.zeros((most_patterns + 1, -(-moves // BYTES)), dtype=np.uint64),
-        np.zeros(most_patterns + 1, dtype=np.int64),
-        np.full(4 << most_patterns.bit_length(), -1, dtype=np.int64),
-    )
-    entries, potential = np.empty(fronts.shape, dtype=np.uint32), np.empty(nodes)
-    has_moves = np.asarray((neighbours >= 0).any(axis=1))
-    count = _find_patterns(neighbours, has_moves, potentials, fronts, potential, patterns, entries)
-    if count < 0:
+    # a byte for the weight of each move, words of them for each node
+    weights = np.zeros((*fronts.shape, BYTES * -(-moves // BYTES)), dtype=np.uint8)
+    permitted = neighbours >= 0
+    for target, steps in enumerate(fronts):
+        whole = _weights(neighbours, permitted, potentials[steps])
+        if whole is None:
+            return none
+        weights[target, :, :moves] = whole
+    # each combination of weights once, and which of them a node has
+    words = weights.reshape(-1, weights.shape[2]).view(np.uint64)
+    _, pattern = np.unique(words[:, 0], return_inverse=True)
+    for word in words.T[1:]:
+        _, column = np.unique(word, return_inverse=True)
+        _, pattern = np.unique(pattern * (column.max() + 1) + column, return_inverse=True)
+    count = int(pattern.max()) + 1
+    if count >= most_patterns:
         return none
+    example = np.empty(count, dtype=np.int64)
+    example[pattern] = np.arange(len(pattern))
+    repeats = weights.reshape(len(words), -1)[example, :moves].astype(np.int64)
     # a move leads to the same difference of indices from every node that has it
-    origins = np.arange(nodes, dtype=np.int32)[:, None]
-    differences = np.where(neighbours >= 0, neighbours - origins, 0)
+    differences = np.where(permitted, neighbours - np.arange(nodes, dtype=np.int32)[:, None], 0)
     shifts = differences[np.abs(differences).argmax(axis=0), np.arange(moves)]
-    word, place = np.divmod(np.arange(moves), BYTES)
-    weights = patterns.words[:count, word] >> (BYTES * place).astype(np.uint64) & np.uint64(255)
-    repeats = weights.astype(np.int64)
     stays = (~repeats.any(axis=1)).astype(np.int64)  # without a neighbour a walk stays
-    counts = np.column_stack([repeats, stays]).ravel()
-    return Choices(entries, np.repeat(np.tile([*shifts, 0], count), counts).astype(np.int16))
+    counts = np.column_stack([repeats, stays])
+    first, totals = np.cumsum(counts.sum(axis=1)) - counts.sum(axis=1), repeats.sum(axis=1)
+    entries = (first << TOTAL_BITS | totals).astype(np.uint32)[pattern].reshape(fronts.shape)
+    slots = np.repeat(np.tile([*shifts, 0], count), counts.ravel()).astype(np.int16)
+    return Choices(entries, slots)
 
 
 def choice_table(moves: Moves) -> Choices:
@@ -96,109 +92,20 @@ def choice_table(moves: Moves) -> Choices:
     return choices_of(moves.neighbours, moves.potentials, fronts, len(moves.neighbours))
 
 
-@kernel
-def _find_patterns(
-    neighbours: NodeArray,
-    has_moves: BoolArray,
-    potentials: FloatArray,
-    fronts: StepArray,
-    potential: FloatArray,
-    patterns: _Patterns,
-    entries: NDArray[np.uint32],
-) -> int:
-    """Write the entries of all nodes toward all targets, and the patterns that they need.
+def _weights(
+    neighbours: NodeArray, permitted: BoolArray, potential: FloatArray
+) -> FloatArray | None:
+    """Return the weights of the moves from every node (nodes, moves), see `grid_walks.walk`.
 
-    Args:
-        neighbours: See `choices_of`, as for `potentials` and `fronts`.
-        has_moves: (nodes,) whether a node has a neighbour.
-        potential: (nodes,) scratch.
-        patterns: Written.
-        entries: (targets, nodes) written.
-
-    Returns:
-        The number of patterns; −1 if the choices do not fit.
-    """
-    neighbours, has_moves, potentials, fronts = borrowed(
-        (neighbours, has_moves, potentials, fronts)
-    )
-    potential, patterns, entries = borrowed((potential, patterns, entries))
-    words, first = patterns.words, patterns.first
-    # of nodes without a neighbour: one slot
-    count = 1
-    if len(first) < 2:
-        return -1
-    first[1] = 1
-    _same_or_new(0, patterns)
-    for target in range(len(fronts)):
-        for node in range(len(potential)):
-            potential[node] = potentials[fronts[target, node]]
-        for node in range(len(neighbours)):
-            if not has_moves[node]:
-                entries[target, node] = 0
-                continue
-            total = _weigh(neighbours, potential, node, words[count])
-            if total < 0:
-                return -1
-            # one that is known, or a new one
-            found = _same_or_new(count, patterns)
-            if found == count:
-                count += 1
-                if count == len(first):
-                    return -1
-                first[count] = first[found] + total
-            entries[target, node] = first[found] << TOTAL_BITS | total
-    return count
-
-
-@inlined
-def _weigh(
-    neighbours: NodeArray, potential: FloatArray, node: int, words: NDArray[np.uint64]
-) -> int:
-    """Write the weights of a node's moves, see `grid_walks.walk`; return their sum.
+    There are none if a node has more than `MOST_SLOTS`, or if a weight is no whole number.
 
     Args:
         neighbours: See `choices_of`.
-        potential: (nodes,).
-        node: The node.
-        words: (words,) written.
-
-    Returns:
-        The sum; −1 if it is more than `MOST_SLOTS`, or if a weight is no whole number.
+        permitted: (nodes, moves) whether there is a neighbour.
+        potential: (nodes,) toward the target.
     """
-    greatest, total, moves = 0.0, 0, neighbours.shape[1]
-    for move in range(moves):
-        other = neighbours[node, move]
-        greatest = max(greatest, potential[other] if other >= 0 else 0.0)
-    for k in range(len(words)):
-        word = np.uint64(0)
-        for move in range(BYTES * k, min(BYTES * (k + 1), moves)):
-            other = neighbours[node, move]
-            weight = greatest - potential[other] + 1.0 if other >= 0 else 0.0
-            if weight > MOST_SLOTS or weight != np.floor(weight):
-                return -1
-            total += int(weight)
-            word |= np.uint64(int(weight)) << np.uint64(BYTES * (move - BYTES * k))
-        words[k] = word
-    return total if total <= MOST_SLOTS else -1
-
-
-@inlined
-def _same_or_new(count: int, patterns: _Patterns) -> int:
-    """Return the number of the pattern with the weights of number `count`; `count` if it is new."""
-    words, known = patterns.words, patterns.known
-    mixed = np.uint64(0)
-    for k in range(words.shape[1]):
-        mixed = (mixed ^ words[count, k]) * SCATTER
-    place = np.int64(mixed >> np.uint64(32))
-    while True:
-        place = place & (len(known) - 1)
-        other: int = known[place]
-        if other < 0:
-            known[place] = count
-            return count
-        alike = True
-        for k in range(words.shape[1]):
-            alike &= words[count, k] == words[other, k]
-        if alike:
-            return other
-        place += 1
+    around = np.where(permitted, potential[neighbours], 0.0)
+    greatest = around.max(axis=1, keepdims=True)
+    weights = np.where(permitted, greatest - around + 1.0, 0.0)
+    fit = weights.sum(axis=1).max() <= MOST_SLOTS and (weights == np.floor(weights)).all()
+    return weights if fit else None

@@ -3,38 +3,56 @@
 The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no shortest-path
 algorithm minimises it. The truth is enclosed:
 
-- from above, by valid paths: the frontier of D + μ ΣS over all μ, each of its paths improved by
+- from above, by valid paths: the frontier of D + μ ΣS over all μ, the best of its paths improved by
   exchanges of a few nodes (`grid_exchanges`);
 - from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
   ε D + (λ / N) ΣS is additive, so dynamic programming over 1 … N nodes finds the best walk, for
   every N. That is the exact optimum where nodes may be passed again. Where they may not,
-  multipliers that punish further visits raise the bound (`grid_relaxation`).
+  multipliers that punish further visits raise the bound, and the walks without their loops are
+  further paths (`grid_relaxation`).
+
+Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`): every path
+of the frontier was improved, and the bounds are those of walks that never go straight back.
+`scripts/update-grid-truths` finds both.
 """
 
-from typing import Annotated, Any, ClassVar
+import hashlib
+import json
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.compilation import kernel
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from evoexp.records import FloatArray, IntArray
-from evoexp.references.grid_exchanges import Terrain, improve
-from evoexp.references.grid_networks import (
-    Arrivals,
-    Network,
-    arrivals_of,
-    network_of,
-)
-from evoexp.references.grid_relaxation import relaxed_bounds
+from evoexp.records import FloatArray
+from evoexp.references.grid_exchanges import Exchanges
+from evoexp.references.grid_networks import Network, arrivals_of, best_walks, network_of
+from evoexp.references.grid_relaxation import relaxed
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import LayoutCount, NonNegativeCount, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
-LANES = 32  # numbers of nodes whose walks are looked for together
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS that decides among equally short paths only
 REACHED = 1e-9  # of a cost: a bound so close to it is reached
+
+
+class Known(NamedTuple):
+    """Better paths of a map than those of the frontier, and higher bounds than those of walks."""
+
+    of: str  # experiment and label of a condition with this map
+    paths: list[list[int]]  # nodes of each
+    improved: list[int]  # (paths of the frontier,) the better path of each
+    bounds: list[float]  # (numbers of nodes from 2 on,) below the paths of so many nodes
+
+
+@cache
+def known_maps() -> dict[str, Known]:
+    """Return the better paths and bounds of the shipped maps, by `GridFrontier.key`."""
+    content = resources.files("evoexp").joinpath("assets/grid_truths.json").read_bytes()
+    return {key: Known(**found) for key, found in json.loads(content).items()}
 
 
 class GridFrontier(Reference):
@@ -53,8 +71,8 @@ class GridFrontier(Reference):
     max_nodes: LayoutCount
     # no exchange of at most so many nodes improves the best path known
     exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
-    # exchanges of at most so many nodes are made though they cost more, to improve the path
-    # from there
+    # of the shipped maps' paths, see `scripts/update-grid-truths`: exchanges of at most so many
+    # nodes are made though they cost more, to improve the path from there
     forced_nodes: Annotated[int, Field(ge=0, le=4)]
     # the bound is raised until it is within this part of the best cost known, by every number
     # of nodes [-]
@@ -68,25 +86,40 @@ class GridFrontier(Reference):
         Its terms: `lower_bound`, below which no path costs; `walk_cost` and `walk_nodes` of the
         best walk; `bound_is_reached`, whether a path was found that costs as little as the bound.
         Its arrays: `frontier` (μ, D, S, nodes, cost), one row per distinct path; `improved`, the
-        same rows after the exchanges; `walks` (nodes, cost), one row per number of nodes searched;
-        `bounds` (nodes, cost) by every number of nodes that the best path can have; `walk`, nodes
-        of the best one; `goal_field` (NaN where no path can be) and `unsafeness`, (nodes along x,
-        along y[, along z]).
+        same rows of the better paths that are known; `walks` (nodes, cost), one row per number of
+        nodes searched; `bounds` (nodes, cost) by every number of nodes that the best path can have;
+        `walk`, nodes of the best one; `goal_field` (NaN where no path can be) and `unsafeness`,
+        (nodes along x, along y[, along z]).
         """
         network, lam = network_of(problem), self.planner.objective.unsafeness_weight
-        paths = frontier(network, self._weights() if lam else np.array([SAFEST_OF_SHORTEST]))
-        better = self._improved(problem, paths)
+        paths = frontier(network, self.weights() if lam else np.array([SAFEST_OF_SHORTEST]))
+        known_map = known_maps().get(self.key(problem))
+        better = paths
+        if known_map is not None:
+            nodes = [np.array(path) for path in known_map.paths]
+            better = [(mu, nodes[k]) for (mu, _), k in zip(paths, known_map.improved, strict=True)]
         rows, improved = self._rows(problem, paths), self._rows(problem, better)
         best, known = better[int(improved[:, 4].argmin())][1], float(improved[:, 4].min())
         if lam == 0.0:  # Dijkstra's path is exact
             walks, walk = np.array([[len(best), known]]), best
             bounds, bound = walks, known
         else:
-            walks, walk = self._best_walk(network, float(rows[:, 4].min()))
-            simple = len(set(walk.tolist())) == len(walk)
-            if (simple or self.planner.revisits) and self._judged(problem, walk)[3] <= known:
-                best, known = walk, self._judged(problem, walk)[3]
-            bounds, bound = self._bounds(network, known, walks)
+            walks, walk = best_walk(
+                network, *self.planner.objective.weights, float(rows[:, 4].min()), self.max_nodes
+            )
+            if self.planner.revisits or len(set(walk.tolist())) == len(walk):
+                best, known = self._better(problem, [walk], best, known)
+            if known_map is None and not self.planner.revisits:
+                exchanges = Exchanges(network, self.planner.objective.weights, self.exchanged_nodes)
+                best, known = self._better(problem, [exchanges.descend(best)], best, known)
+            floors, beyond = self.floors(network, known, walks)
+            if known_map is not None:
+                floors[2:] = known_map.bounds
+            elif not self.planner.revisits:
+                paths_besides = self._relaxed(network, known, floors)
+                best, known = self._better(problem, paths_besides, best, known)
+            bounds = np.column_stack([np.arange(2.0, len(floors)), floors[2:]])
+            bound = float(min(floors[2:].min(initial=np.inf), beyond, known))
         terms = {
             "lower_bound": bound,
             "walk_cost": float(walks[:, 1].min()),
@@ -106,30 +139,23 @@ class GridFrontier(Reference):
         solution = self._solution(problem, best)
         return Truth(solution, known, True, len(paths) + len(walks), terms, arrays)
 
-    def _weights(self) -> FloatArray:
+    def weights(self) -> FloatArray:
+        """Return the values of μ (weights,) [cell] of the frontier."""
         ratios = np.geomspace(self.least_weight, self.greatest_weight, self.num_weights)
         return np.array([SAFEST_OF_SHORTEST, *ratios])
 
-    def _improved(
-        self, problem: Any, paths: list[tuple[float, np.ndarray]]
-    ) -> list[tuple[float, np.ndarray]]:
-        """Return the paths after the exchanges; the same where these cannot help."""
-        epsilon, lam = self.planner.objective.weights
-        if lam == 0.0 or self.planner.revisits:
-            return paths
-        terrain = Terrain.of(problem.fields.grid, problem.fields.unsafeness, (epsilon, lam))
-        better = improve(
-            terrain, [path for _, path in paths], self.exchanged_nodes, self.forced_nodes
-        )
-        return [(mu, path) for (mu, _), path in zip(paths, better, strict=True)]
+    def key(self, problem: Any) -> str:
+        """Return a hash of map, ends, weights and settings, by which a map is known."""
+        network, settings = network_of(problem), self.model_dump(mode="json", exclude={"planner"})
+        numbers = [*self.planner.objective.weights, float(self.planner.revisits)]
+        hashed = hashlib.sha256(json.dumps([settings, numbers], sort_keys=True).encode())
+        for values in network:
+            kind = np.float64 if np.asarray(values).dtype.kind == "f" else np.int64
+            hashed.update(np.ascontiguousarray(values, dtype=kind).tobytes())
+        return hashed.hexdigest()[:32]
 
-    def _best_walk(self, network: Network, known: float) -> tuple[FloatArray, np.ndarray]:
-        return best_walk(network, *self.planner.objective.weights, known, self.max_nodes)
-
-    def _bounds(
-        self, network: Network, known: float, walks: FloatArray
-    ) -> tuple[FloatArray, float]:
-        """Return bounds below all paths: by numbers of nodes (numbers, 2), and of all.
+    def floors(self, network: Network, known: float, walks: FloatArray) -> tuple[FloatArray, float]:
+        """Return bounds by walks below the paths of 0, 1, … nodes, and below those of more nodes.
 
         Args:
             network: The moves.
@@ -149,20 +175,30 @@ class GridFrontier(Reference):
         floors = np.full(most + 1, walks[:, 1].min())
         inside = walks[:, 0] <= most
         floors[walks[inside, 0].astype(np.int64)] = walks[inside, 1]
-        if not self.planner.revisits:
-            floors = relaxed_bounds(
-                arrivals_of(network, epsilon),
-                lam,
-                known,
-                (1.0 - self.bound_gap) * known,
-                floors,
-                self.bound_steps,
-            )
-        rows = np.column_stack([np.arange(2.0, most + 1.0), floors[2:]])
-        return rows, float(min(floors[2:].min(initial=np.inf), beyond, known))
+        return floors, beyond
+
+    def _relaxed(self, network: Network, known: float, floors: FloatArray) -> list[np.ndarray]:
+        """Raise the bounds in place; return the paths that were found besides."""
+        epsilon, lam = self.planner.objective.weights
+        enough = (1.0 - self.bound_gap) * known
+        return relaxed(arrivals_of(network, epsilon), lam, known, enough, floors, self.bound_steps)
+
+    def _better(
+        self, problem: Any, paths: list[np.ndarray], best: np.ndarray, known: float
+    ) -> tuple[np.ndarray, float]:
+        """Return the best of some paths and of the one known, and its cost."""
+        for path in paths:
+            cost = self.path_cost(problem, path)
+            if cost <= known:
+                best, known = path, cost
+        return best, known
 
     def _rows(self, problem: Any, paths: list[tuple[float, np.ndarray]]) -> FloatArray:
         return np.array([(mu, *self._judged(problem, path)) for mu, path in paths])
+
+    def path_cost(self, problem: Any, path: np.ndarray) -> float:
+        """Return the planner's cost of a path (nodes,)."""
+        return self._judged(problem, path)[3]
 
     def _judged(self, problem: Any, path: np.ndarray) -> tuple[float, float, float, float]:
         """Return D, S, number of nodes and cost of a path."""
@@ -220,29 +256,30 @@ def best_walk(
         SettingError: If no walk has as few nodes.
     """
     most = most_nodes(network, epsilon, lam, known, max_nodes)
-    arrivals = arrivals_of(network, epsilon)
-    costs = np.full(most + 1, np.inf)
+    arrivals, costs = arrivals_of(network, epsilon), np.full(most + 1, np.inf)
+
+    def costs_at(weight: int, count: int) -> FloatArray:
+        return best_walks(arrivals, lam / weight * arrivals.unsafeness, count)[0]
+
     # bounds by blocks of numbers: λ / N is at least that of the block's last number
-    lasts = np.arange(BLOCK, most + BLOCK, BLOCK)
-    below = walk_costs(arrivals, lam / lasts, most)
-    whole = np.flatnonzero(lasts <= most)
-    costs[lasts[whole]] = below[lasts[whole], whole]
-    others = np.setdiff1d(np.arange(2, most + 1), lasts)
-    bounds = below[others, others // BLOCK]
-    others, bounds = others[bounds < costs.min()], bounds[bounds < costs.min()]
+    bounds = np.full(most + 1, np.inf)
+    for last in range(BLOCK, most + BLOCK, BLOCK):
+        block = slice(last - BLOCK, min(last, most + 1))
+        below = costs_at(last, min(last, most))
+        bounds[block] = below[block]
+        costs[last : last + 1] = below[last : last + 1]
     # exact costs of the numbers that their bounds do not exclude
-    for k in range(0, len(others), LANES):
-        counts = others[k : k + LANES]
-        exact = walk_costs(arrivals, lam / counts, int(counts[-1]))[counts, np.arange(len(counts))]
-        for count, bound, cost in zip(counts, bounds[k : k + LANES], exact, strict=True):
-            if bound < costs.min():  # which may be less by now
-                costs[count] = cost
+    least = costs.min()
+    for count in range(2, most + 1):
+        if count % BLOCK and bounds[count] < least:
+            costs[count] = costs_at(count, count)[count]
+            least = min(least, costs[count])
     if not np.isfinite(costs.min()):
         raise SettingError(
             "reference.max_nodes", "as many as a path from start to goal has", max_nodes
         )
     best = int(costs.argmin())
-    walk = _best_walk(arrivals, lam / best, best)
+    _, walk = best_walks(arrivals, lam / best * arrivals.unsafeness, best)
     numbers = np.flatnonzero(np.isfinite(costs))
     return np.column_stack([numbers.astype(np.float64), costs[numbers]]), walk
 
@@ -255,75 +292,3 @@ def most_nodes(network: Network, epsilon: float, lam: float, known: float, max_n
 
 def _least_unsafeness(network: Network) -> float:
     return float(network.unsafeness[np.unique(network.tails)].min())
-
-
-def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:
-    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, (count + 1, weights)."""
-    costs = np.full((count + 1, len(weights)), np.inf)
-    present = np.full((len(arrivals.tails), len(weights)), np.inf)
-    present[arrivals.ends[0]] = weights * arrivals.unsafeness[arrivals.ends[0]]
-    _walk_costs(arrivals, weights, costs, present, np.full_like(present, np.inf))
-    return costs
-
-
-@kernel
-def _walk_costs(
-    arrivals: Arrivals,
-    weights: FloatArray,
-    costs: FloatArray,
-    present: FloatArray,
-    following: FloatArray,
-) -> None:
-    """Compute `walk_costs` for all weights together.
-
-    Args:
-        arrivals: The moves.
-        weights: (weights,) values of μ.
-        costs: (numbers of nodes, weights) inf; written from two nodes on.
-        present: (nodes, weights) cost of the walk of one node, inf at all other nodes; overwritten.
-        following: (nodes, weights) inf; overwritten.
-    """
-    tails, lengths, unsafeness, ends = arrivals
-    num, lanes = len(unsafeness), len(weights)
-    for k in range(2, len(costs)):
-        for node in range(num):
-            if lengths[node, 0] == np.inf:
-                continue  # no move ends here: infinite at all times
-            own = following[node]
-            own[:] = np.inf
-            for move in range(tails.shape[1]):
-                before, length = present[tails[node, move]], lengths[node, move]
-                for lane in range(lanes):
-                    cost = before[lane] + length
-                    own[lane] = cost if cost < own[lane] else own[lane]
-            for lane in range(lanes):
-                own[lane] += weights[lane] * unsafeness[node]
-        present, following = following, present
-        for lane in range(lanes):
-            costs[k, lane] = present[ends[1], lane]
-
-
-@kernel
-def _best_walk(arrivals: Arrivals, mu: float, count: int) -> IntArray:
-    """Return the walk of `count` nodes that has the least ε D + μ ΣS, (count,)."""
-    tails, lengths, unsafeness, ends = arrivals
-    num = len(unsafeness)
-    before = np.zeros((count + 1, num), dtype=np.int64)
-    present, following = np.full(num, np.inf), np.full(num, np.inf)
-    present[ends[0]] = mu * unsafeness[ends[0]]
-    # the best way to every node by k nodes, and the node before on it
-    for k in range(2, count + 1):
-        for node in range(num):
-            least = np.inf
-            for move in range(tails.shape[1]):
-                cost = present[tails[node, move]] + lengths[node, move]
-                if cost < least:
-                    least, before[k, node] = cost, tails[node, move]
-            following[node] = least + mu * unsafeness[node]
-        present, following = following, present
-    # the walk, from the goal back
-    walk = np.empty(count, dtype=np.int64)
-    walk[count - 1] = ends[1]
-    for k in range(count, 1, -1):
-        walk[k - 2] = before[k, walk[k - 1]]
-    return walk

@@ -1,12 +1,11 @@
-"""The permitted moves over a grid as a graph, as the references of grid paths take them."""
+"""The permitted moves over a grid as a graph, and the best walks along them."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray, IntArray
-
-NO_MOVE, NO_WAY_BACK = -1, -2
 
 
 class Network(NamedTuple):
@@ -51,52 +50,37 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
     return Arrivals(tails, lengths, network.unsafeness, network.ends)
 
 
-class Moves(NamedTuple):
-    """The permitted moves by the difference of their nodes' indices, for walks that never go back.
+@kernel
+def best_walks(arrivals: Arrivals, weights: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
+    """Return the least costs of walks of 0 … `count` nodes, and the best walk of `count` nodes.
 
-    Nodes side by side are looked at together: those from which one kind of move leads to them
-    stand side by side, too.
+    Args:
+        arrivals: The moves.
+        weights: (nodes,) cost of passing a node.
+        count: Most nodes.
+
+    Returns:
+        (count + 1,), inf where there is no walk from two nodes on; (count,).
     """
-
-    differences: IntArray  # (kinds,) index where a move ends less that where it starts, descending
-    backward: IntArray  # (kinds,) the kind that leads back; `NO_WAY_BACK` where there is none
-    lengths: FloatArray  # (kinds,) times ε
-    # (kinds, nodes) 0 where such a move ends at a node, else inf; none leads from the goal, or to
-    # the start
-    barred: FloatArray
-    unsafeness: FloatArray  # (nodes,)
-    first: int  # moves end at nodes from this one on
-    stop: int  # and before this one
-    ends: tuple[int, int]  # start and goal
-
-
-def moves_of(arrivals: Arrivals) -> Moves:
-    """Return the permitted moves by their differences.
-
-    Raises:
-        ValueError: If a node of the first ones has no ring of nodes around it.
-    """
-    (start, goal), nodes = arrivals.ends, len(arrivals.unsafeness)
-    heads, moves = np.nonzero(np.isfinite(arrivals.lengths))
-    tails, lengths = arrivals.tails[heads, moves], arrivals.lengths[heads, moves]
-    differences, kinds = np.unique(tails - heads, return_inverse=True)
-    differences = -differences
-    first, stop, farthest = int(heads.min()), int(heads.max()) + 1, int(np.abs(differences).max())
-    if first < farthest or stop + farthest > nodes:
-        raise ValueError(f"nodes {first} to {stop - 1} are not within a ring of {farthest} nodes")
-    by_kind = np.empty(len(differences))
-    by_kind[kinds] = lengths
-    backward = [np.flatnonzero(differences == -other) for other in differences]
-    barred = np.full((len(differences), nodes), np.inf)
-    allowed = (tails != goal) & (heads != start)
-    barred[kinds[allowed], heads[allowed]] = 0.0
-    return Moves(
-        differences,
-        np.array([found[0] if len(found) else NO_WAY_BACK for found in backward]),
-        by_kind,
-        barred,
-        arrivals.unsafeness,
-        first,
-        stop,
-        arrivals.ends,
-    )
+    tails, lengths, ends = arrivals.tails, arrivals.lengths, arrivals.ends
+    num = len(weights)
+    costs, before = np.full(count + 1, np.inf), np.zeros((count + 1, num), dtype=np.int32)
+    present, following = np.full(num, np.inf), np.full(num, np.inf)
+    present[ends[0]] = weights[ends[0]]
+    # the best way to every node by k nodes, and the node before on it
+    for k in range(2, count + 1):
+        for node in range(num):
+            least = np.inf
+            for move in range(tails.shape[1]):
+                cost = present[tails[node, move]] + lengths[node, move]
+                if cost < least:
+                    least, before[k, node] = cost, tails[node, move]
+            following[node] = least + weights[node]
+        present, following = following, present
+        costs[k] = present[ends[1]]
+    # the walk, from the goal back
+    walk = np.empty(count, dtype=np.int64)
+    walk[count - 1] = ends[1]
+    for k in range(count, 1, -1):
+        walk[k - 2] = before[k, walk[k - 1]]
+    return costs, walk

@@ -10,16 +10,21 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.references.placement_model import Directions, directions_of
-from evoexp.references.placement_polish import End, descend
-from evoexp.references.placement_programme import Programme
-from evoexp.references.placement_subgradient import LANES, slide
+from evoexp.references.placement_programme import (
+    Directions,
+    End,
+    Programme,
+    directions_of,
+    dot,
+)
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import Count, LayoutCount, Positive
 
 R2 = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequence: fills a square evenly
 DIGITS = 2  # decimals [deg] of the angles that are kept: beyond them libraries differ
 MOST_TRIES = 1000  # places looked at per start
+H = 1e-6  # [rad] of central differences; within it of a kink, the slope is between both sides
+PROJECTIONS = 3  # Newton steps back to the surface
 
 
 class PlacementConventional(Reference):
@@ -30,7 +35,7 @@ class PlacementConventional(Reference):
     the method broke a limit or left the target.
 
     - newton: sequential quadratic programming (scipy's SLSQP).
-    - subgradient: see `placement_subgradient`.
+    - subgradient: see `slide`.
     - bounded: the same, with the greatest torque as a variable above all torques; on E itself,
       which has kinks, rounding would decide the end.
 
@@ -51,7 +56,7 @@ class PlacementConventional(Reference):
         programme = Programme(model)
         method = "bounded" if programme.minimax else "newton"
         ends = {
-            method: [descend(programme, x) for x in starts],
+            method: [programme.descend(x) for x in starts],
             "subgradient": self._slide(model, starts),
         }
         arrays = {
@@ -96,11 +101,60 @@ class PlacementConventional(Reference):
 
     def _slide(self, model: Directions, starts: list[FloatArray]) -> list[End]:
         steps = self.first_step / np.sqrt(np.arange(1.0, self.num_steps + 1.0))
-        x = np.pad(np.column_stack(starts), ((0, 0), (0, -len(starts) % LANES)), mode="edge")
-        ends, costs = np.empty(x.shape), np.empty(x.shape[1])
-        slide(x, steps, model, ends, costs)
+        ends, costs = slide(np.column_stack(starts), steps, model)
         evaluations = 7 * self.num_steps
         return [End(ends[:, k].copy(), float(costs[k]), evaluations) for k in range(len(starts))]
+
+
+def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArray, FloatArray]:
+    """Follow a projected subgradient method from every start; return the best places and E there.
+
+    Pin & Culioli (1992), whom Chen & Zalzala (1995) compare with, solved the minimax problem by a
+    subgradient method; its details are not printed. Here, every step has a given length and goes
+    against the slope of E along the surface of postures that reach the target, and is followed by
+    a projection onto that surface.
+
+    Args:
+        x: (3, starts) directions that reach the target [rad].
+        steps: (steps,) their lengths [rad].
+        model: The criteria.
+
+    Returns:
+        (3, starts) and (starts,).
+    """
+    x, ends, moves = x.copy(), x.copy(), np.ones(x.shape[1])
+    costs, units = model.costs(*model.links(x)), np.eye(3)[:, :, None]
+    for step in steps:
+        # slopes of E by differences (3, starts), normals of the surface
+        above, below = (
+            model.costs(*model.links((x + sign * units).swapaxes(0, 1))) for sign in (H, -H)
+        )
+        slope, (normal, _) = (above - below) / (2.0 * H), model.links(x)
+        # slopes along the surface
+        square = dot(normal, normal)
+        share = np.divide(dot(slope, normal), square, np.zeros_like(square), where=square > 0.0)
+        slope -= share * normal
+        along = dot(slope, slope)
+        moves[along <= 0.0] = 0.0  # a way ends where there is no slope
+        # a step, and back to the surface by the shortest way to first order
+        x -= moves * step * slope / np.sqrt(np.where(along > 0.0, along, 1.0))
+        for _ in range(PROJECTIONS):
+            normal, up = model.links(x)
+            square = dot(normal, normal)
+            heights = moves * _height(model, up)
+            x -= np.divide(heights, square, np.zeros_like(square), where=square > 0.0) * normal
+        # the best place so far
+        across, up = model.links(x)
+        lower = model.costs(across, up)
+        better = (lower < costs) & (np.abs(_height(model, up)) < 1e-9)
+        costs[better], ends[:, better] = lower[better], x[:, better]
+    return ends, costs
+
+
+def _height(model: Directions, up: FloatArray) -> FloatArray:
+    """Return by how much end-effectors are above their target, by the links' extents (3, n)."""
+    found: FloatArray = -model.target[1] + up[0] + up[1] + up[2]
+    return found
 
 
 def _row(model: Directions, programme: Programme, end: End) -> FloatArray:

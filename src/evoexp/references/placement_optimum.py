@@ -4,17 +4,26 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
+from scipy import ndimage
 
 from evoexp.objectives.placement_kernels import Model
-from evoexp.records import FloatArray
-from evoexp.references.placement_model import TURN, directions_of
-from evoexp.references.placement_polish import descend, polish
-from evoexp.references.placement_programme import Programme
-from evoexp.references.placement_search import lowest
+from evoexp.records import BoolArray, FloatArray
+from evoexp.references.placement_programme import (
+    HEIGHT,
+    MARGINS,
+    OBJECTIVE,
+    TURN,
+    End,
+    Programme,
+    directions_of,
+)
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import Count
 
 SAME = 1e-3  # [deg] two minima so close are one
+ACTIVE = 1e-6  # a margin below it is taken to be 0
+MOST_STEPS = 12  # of Newton's method; it takes three or four
+DIFFERENCE = 1e-5  # of Newton's central differences, precise enough for its steps
 
 TERM_VALUES = 5  # numbers kept for one pair of angles
 
@@ -38,14 +47,12 @@ class PlacementOptimum(Reference):
 
     def truth(self, problem: Any) -> Truth:
         """Search, polish, and judge the best by the planner's own kernels."""
-        model, cap = (
-            directions_of(problem.model, problem.angle_limits),
-            problem.model.weights.greatest,
-        )
+        model = directions_of(problem.model, problem.angle_limits)
         programme, ends, exact = Programme(model), list[FloatArray](), list[FloatArray]()
         evaluations = 2 * self.num_angles * self.num_angles
-        for x in lowest(model, problem.angle_limits, self.num_angles, cap, self.num_polished):
-            end = descend(programme, x)
+        own, limits = problem.model, problem.angle_limits
+        for one, two, branch in lowest(own, limits, self.num_angles, self.num_polished):
+            end = programme.descend(model.reaching(np.radians([one, two]), branch == 1.0))
             evaluations += end.evaluations
             theta = model.theta(end.x)
             if not _is_among(exact, theta):
@@ -53,16 +60,90 @@ class PlacementOptimum(Reference):
                 ends.append(theta if polished is None else model.theta(polished.x))
                 exact += [] if polished is None else ends[-1:]
         minima = _distinct(problem.model, ends)
+        num_minima = {"num_minima": float(len(minima))}
         if not len(minima):
-            return Truth(
-                problem.angle_limits.mean(axis=1), cap, False, evaluations, {"num_minima": 0.0}
-            )
-        best, cost, count = (
-            minima[0, :2].copy(),
-            float(minima[0, 2]),
-            {"num_minima": float(len(minima))},
+            middle, cap = problem.angle_limits.mean(axis=1), problem.model.weights.greatest
+            return Truth(middle, cap, False, evaluations, num_minima)
+        best, cost = minima[0, :2].copy(), float(minima[0, 2])
+        return Truth(best, cost, True, evaluations, num_minima, {"minima": minima})
+
+
+def lowest(model: Model, angle_limits: FloatArray, num_angles: int, count: int) -> FloatArray:
+    """Return the lowest feasible local minima of a dense search, the lowest first.
+
+    Args:
+        model: The planner's model.
+        angle_limits: (2, 2) of θ1 and θ2 [deg].
+        num_angles: Values of either angle.
+        count: Number of minima, at most.
+
+    Returns:
+        (≤ count, 3) θ1, θ2 [deg], and the branch: 0, or 1 where the third link points to −x.
+    """
+    low, high = angle_limits.T[:, :, None]
+    angles = low + (high - low) * (np.arange(num_angles) / num_angles)  # (2, n)
+    rows = [
+        model.measure_branches(np.vstack([np.full(num_angles, one), angles[1]]))
+        for one in angles[0]
+    ]
+    costs, theta_3 = (np.stack(values, axis=1) for values in zip(*rows, strict=True))  # (2, n, n)
+    turns = (high - low).ravel() >= TURN
+    least = minima_of(costs, np.isfinite(theta_3[0]), turns) & (costs < model.weights.greatest)
+    found = np.flatnonzero(least)
+    found = found[np.argsort(costs.ravel()[found], kind="stable")][:count]
+    branch, i, j = np.unravel_index(found, costs.shape)
+    return np.column_stack([angles[0, i], angles[1, j], branch])
+
+
+def minima_of(costs: FloatArray, in_reach: BoolArray, turns: BoolArray) -> BoolArray:
+    """Return which places are not above any place around them, (2, n, n).
+
+    Both values of θ3 are sheets of one surface, joined where the third link is upright: a place at
+    that edge is a minimum only if nothing around it on the other sheet is lower.
+
+    Args:
+        costs: (2, n, n) branch, θ1, θ2.
+        in_reach: (n, n).
+        turns: (2,) whether the first value of θ1 and of θ2 follows the last one.
+    """
+    modes: Any = ["wrap" if whole else "constant" for whole in turns]
+    around = ndimage.minimum_filter(costs, (1, 3, 3), mode=["nearest", *modes], cval=np.inf)
+    at_edge = ndimage.minimum_filter(in_reach.astype(np.int8), (3, 3), mode=modes, cval=1) == 0
+    marked: BoolArray = (costs <= around) & (~at_edge | (costs <= around[::-1]))
+    return marked
+
+
+def polish(programme: Programme, x: FloatArray) -> End | None:
+    """Return the local minimum near the end of `Programme.descend`, to rounding.
+
+    Newton's method solves the Karush–Kuhn–Tucker conditions; the margins that are 0 at x stay 0.
+    The result is None where the method does not converge.
+    """
+    z = programme.start(x)
+    values, slopes = programme.measured(z)
+    binding = np.array([HEIGHT, *(MARGINS + np.flatnonzero(values[MARGINS:] < ACTIVE))])
+
+    def conditions(y: FloatArray) -> FloatArray:
+        values, slopes = programme.measured(y[: len(z)])
+        return np.concatenate([slopes[OBJECTIVE] - y[len(z) :] @ slopes[binding], values[binding]])
+
+    multipliers = np.linalg.lstsq(slopes[binding].T, slopes[OBJECTIVE], rcond=None)[0]
+    y, steps = np.concatenate([z, multipliers]), 0
+    while steps < MOST_STEPS:
+        off = conditions(y)
+        if np.abs(off).max() < 1e-13:
+            break
+        jacobian = np.column_stack(
+            [
+                (conditions(y + unit) - conditions(y - unit)) / (2.0 * DIFFERENCE)
+                for unit in DIFFERENCE * np.eye(len(y))
+            ]
         )
-        return Truth(best, cost, True, evaluations, count, {"minima": minima})
+        y, steps = y - np.linalg.lstsq(jacobian, off, rcond=None)[0], steps + 1
+    moved = float(np.abs(y[:3] - x).max())
+    if not np.isfinite(y).all() or moved > 1e-3 or np.abs(conditions(y)).max() > 1e-9:
+        return None
+    return End(y[:3], programme.cost(y[:3]), steps)
 
 
 def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:

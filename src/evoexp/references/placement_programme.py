@@ -1,22 +1,145 @@
-"""A mobile arm's posture as a smooth programme, compiled: objective, constraints, derivatives.
+"""A mobile arm's posture as a smooth programme over the directions of its links.
 
-z = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the
-end-effector's height. The minimax term is a bound: z = (φ1, φ2, φ3, t), t above every |α τ|.
-Nothing is shared with the planner's own kernels, which use joint angles.
+x = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the
+end-effector's height. The minimax term of Chen & Zalzala (1995, Eq. 11) is a bound:
+z = (φ1, φ2, φ3, t), t above every |α τ|. Nothing is shared with the planner's own kernels, which
+use joint angles.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import optimize
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
+from evoexp.objectives.placement_kernels import Model
 from evoexp.records import FloatArray
-from evoexp.references.placement_model import Directions
 
+INSIDE = 1e-11  # [rad], of torques [-]: on a limit, in spite of rounding, is within it
+TURN = 360.0  # [deg]
+SMALLEST = 1e-300  # keeps quotients finite
 # rows: the objective, the height (which must be 0), then margins (which must not be negative)
 OBJECTIVE, HEIGHT, MARGINS = range(3)
 TORQUE_BOUNDS = 6  # margins of the minimax term: t − α τ and t + α τ
+
+
+class Directions(NamedTuple):
+    """Task, weights and limits of the criteria over the links' directions."""
+
+    lengths: FloatArray  # (3,) l1, l2, l3
+    target: FloatArray  # (2,) X_e, Y_e
+    force: FloatArray  # (2,)
+    weights: FloatArray  # ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11
+    avoided: FloatArray  # (n, 5) γ, link, place, X_o, Y_o of Eq. 12
+    joint_limits: FloatArray  # (3, 2) θ1, θ2, θ3 [rad]
+    torque_limits: FloatArray  # (3, 2)
+
+    def bounds(self) -> FloatArray:
+        """Return the finite limits, (m, 3); see `measure`."""
+        limits = np.concatenate([self.joint_limits, self.torque_limits])
+        rows = [
+            (float(k), sign, limit)
+            for k, (least, greatest) in enumerate(limits)
+            for sign, limit in ((1.0, least), (-1.0, greatest))
+            if np.isfinite(limit)
+        ]
+        return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
+
+    def theta(self, x: FloatArray) -> FloatArray:
+        """Return θ1, θ2 [deg] of x, both in [−180, 180)."""
+        angles = np.degrees(np.array([x[0], x[1] - x[0]]))
+        wrapped: FloatArray = angles - TURN * np.floor((angles + TURN / 2) / TURN)
+        return wrapped
+
+    def directions(self, theta: FloatArray, theta_3: float) -> FloatArray:
+        """Return x of joint angles θ1, θ2 and θ3 [deg]."""
+        x: FloatArray = np.radians(np.cumsum([theta[0], theta[1], theta_3]))
+        return x
+
+    def reaching(self, theta: FloatArray, to_the_left: bool) -> FloatArray:
+        """Return x of θ1 and θ2 [rad] at which the end-effector has its height."""
+        one, both = theta[0], theta[0] + theta[1]
+        _, up = self.links(np.array([one, both, 0.0]))
+        upward = np.arcsin((self.target[1] - up[0] - up[1]) / self.lengths[2])
+        third = np.pi - upward if to_the_left else upward
+        # θ3 in [−π, π)
+        return np.array(
+            [one, both, third - 2.0 * np.pi * np.floor((third - both + np.pi) / (2.0 * np.pi))]
+        )
+
+    def links(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the extents of the links along x and along y, both (3, …), at directions x."""
+        angles = np.ascontiguousarray(x)
+        sines, cosines = np.empty(angles.shape), np.empty(angles.shape)
+        _sincos(angles.ravel(), sines.ravel(), cosines.ravel())
+        lengths = self.lengths.reshape((3,) + (1,) * (x.ndim - 1))
+        return lengths * cosines, lengths * sines
+
+    def costs(self, across: FloatArray, up: FloatArray) -> FloatArray:
+        """Return E of Eq. 14 by the links' extents (3, …), without any cap.
+
+        Sums begin at the third link: the subgradient method has the same bits everywhere.
+        """
+        epsilon, lam, delta, *alphas = self.weights
+        # the end-effector seen from the joints 3, 2, 1: the Jacobian's columns, and torques (Eq. 8)
+        jx, jy = -np.cumsum(up[::-1], axis=0), np.cumsum(across[::-1], axis=0)
+        torques = jx * self.force[0] + jy * self.force[1]
+        weighted = [
+            abs(alpha * torque) for alpha, torque in zip(alphas[::-1], torques, strict=True)
+        ]
+        determinant = dot(jx, jx) * dot(jy, jy) - dot(jx, jy) ** 2
+        singular = delta / np.maximum(determinant, SMALLEST)  # Eq. 13
+        costs = epsilon * dot(torques, torques) + lam * np.maximum.reduce(weighted) + singular
+        # obstacles (Eq. 12); of each link the share before the point that avoids
+        platform = self.target[0] - across[::-1].sum(axis=0)
+        for gamma, link, place, x_o, y_o in self.avoided:
+            dx, dy = platform - x_o, -y_o
+            for k in range(3):
+                share = 1.0 if k + 1 < link else place * (k + 1 == link)
+                dx, dy = dx + share * across[k], dy + share * up[k]
+            costs = costs + gamma / np.maximum(dx * dx + dy * dy, SMALLEST)
+        found: FloatArray = costs
+        return found
+
+
+def dot(one: FloatArray, two: FloatArray) -> FloatArray:
+    """Return the scalar products of columns (3, …), added in the order of their rows."""
+    found: FloatArray = one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
+    return found
+
+
+@kernel
+def _sincos(x: FloatArray, sines: FloatArray, cosines: FloatArray) -> None:
+    """Write sines and cosines (n,) of x [rad]."""
+    for n in range(len(x)):
+        sines[n], cosines[n] = sincos(x[n])
+
+
+def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
+    """Return the criteria of a planner's model.
+
+    Args:
+        model: The planner's model.
+        angle_limits: (2, 2) of the planner's genes [deg]; a range of less than a turn limits θ1 or
+            θ2.
+    """
+    task, joints = np.array(model.task), model.limits[:3].copy()
+    for k, (least, greatest) in enumerate(angle_limits):
+        if greatest - least < TURN:
+            joints[k] = max(least, joints[k, 0]), min(greatest, joints[k, 1])
+    inside = INSIDE * np.array([1.0, -1.0])
+    limits = np.radians(joints) + inside, model.limits[3:] + inside
+    weights = np.array(model.weights[:6])
+    return Directions(task[:3], task[3:5], task[5:7], weights, model.avoided, *limits)
+
+
+class End(NamedTuple):
+    """The end of an optimiser's way."""
+
+    x: FloatArray  # (3,) directions of the links [rad]
+    cost: float  # E there, without any cap
+    evaluations: int  # evaluations of the cost
 
 
 class Programme:
@@ -24,16 +147,14 @@ class Programme:
 
     Attributes:
         minimax: Whether t is a variable.
-        num_margins: Number of margins.
     """
 
     def __init__(self, model: Directions) -> None:
         """Take the criteria."""
         self._model, self._bounds = model, model.bounds()
         self.minimax = bool(model.weights[1])
-        self.num_margins = TORQUE_BOUNDS * self.minimax + len(self._bounds)
-        self._values = np.empty(MARGINS + self.num_margins)
-        self._slopes = np.empty((MARGINS + self.num_margins, 3 + self.minimax))
+        rows = MARGINS + TORQUE_BOUNDS * self.minimax + len(self._bounds)
+        self._values, self._slopes = np.empty(rows), np.empty((rows, 3 + self.minimax))
         self._where = b""
 
     def measured(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -63,18 +184,27 @@ class Programme:
         values, _ = self.measured(self.start(x))
         return bool(abs(values[HEIGHT]) < tolerance and (values[MARGINS:] > -tolerance).all())
 
-    def constraints(self) -> list[dict[str, Any]]:
-        """Return the constraints in the form of `scipy.optimize.minimize`."""
+    def descend(self, x: FloatArray, most_steps: int = 200) -> End:
+        """Minimise E from x by sequential quadratic programming (SLSQP)."""
         height, margins = slice(HEIGHT, MARGINS), slice(MARGINS, None)
-        kinds = [("eq", height), ("ineq", margins)][: 1 + (self.num_margins > 0)]
-        return [
-            {
-                "type": kind,
-                "fun": lambda z, rows=rows: self.measured(z)[0][rows],
-                "jac": lambda z, rows=rows: self.measured(z)[1][rows],
-            }
-            for kind, rows in kinds
-        ]
+        kinds = [("eq", height), ("ineq", margins)][: 1 + (len(self._values) > MARGINS)]
+        minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
+        found = minimize(
+            lambda z: float(self.measured(z)[0][OBJECTIVE]),
+            self.start(x),
+            jac=lambda z: self.measured(z)[1][OBJECTIVE].copy(),  # scipy keeps it
+            constraints=[
+                {
+                    "type": kind,
+                    "fun": lambda z, rows=rows: self.measured(z)[0][rows],
+                    "jac": lambda z, rows=rows: self.measured(z)[1][rows],
+                }
+                for kind, rows in kinds
+            ],
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": most_steps},
+        )
+        return End(found.x[:3], self.cost(found.x[:3]), int(found.nfev))
 
 
 @kernel

@@ -1,0 +1,89 @@
+"""What is known of the shipped maps, and the script that finds it."""
+
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.references.grid_frontier import GridFrontier, known_maps
+from planners.grid_samples import planner, solvable
+from references.all_paths import all_simple_paths, path_cost
+from references.test_grid_frontier import SETTINGS
+from shipped_conditions import expanded
+
+SCRIPT = Path(__file__).parents[2] / "scripts" / "update-grid-truths"
+EXPERIMENTS = ("chen_path", "chen_lingering", "chen_assumptions")
+
+
+@pytest.fixture(scope="module")
+def script() -> Any:
+    spec = spec_from_loader(
+        "update_grid_truths", SourceFileLoader("update_grid_truths", str(SCRIPT))
+    )
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_best_path_of_a_shipped_map_is_a_path_and_no_bound_is_above_it() -> None:
+    own, problem = dict(expanded("chen_path", "paper").conditions)["(b), exact"].prepare()
+    known = known_maps()[own.key(problem)]
+    costs = [path_cost(own.planner, problem, path) for path in known.paths]
+    assert 32.567 < min(known.bounds) <= min(costs) < 32.7304
+    for path in known.paths:
+        assert (path[0], path[-1]) == problem.ends and len(set(path)) == len(path)
+    assert own.truth(problem).cost == pytest.approx(min(costs), rel=1e-12)
+
+
+def test_a_map_is_known_by_all_that_its_truth_depends_on() -> None:
+    own, problem = dict(expanded("chen_path", "paper").conditions)["(b), exact"].prepare()
+    heavier = own.planner.objective.model_copy(update={"distance_weight": 0.123})
+    for update in (
+        {"exchanged_nodes": 2},
+        {"planner": own.planner.model_copy(update={"objective": heavier})},
+    ):
+        assert own.model_copy(update=update).key(problem) not in known_maps()
+
+
+@pytest.mark.matrix
+def test_every_shipped_map_is_known_and_nothing_else(script: Any) -> None:
+    keys = set()
+    for name in EXPERIMENTS:
+        for _, condition in expanded(name, "paper").conditions:
+            own = condition.planner
+            if isinstance(own, GridFrontier) and script.is_searched(own):
+                own, problem = condition.prepare()
+                keys.add(own.key(problem))
+    assert keys == known_maps().keys()
+
+
+@pytest.mark.matrix
+def test_the_script_finds_what_is_stored(script: Any) -> None:
+    label = "every other obstacle, exact"  # the fastest map
+    own, problem = dict(expanded("chen_assumptions", "paper").conditions)[label].prepare()
+    stored, found = known_maps()[own.key(problem)], script.searched(own, problem)
+    assert (found.paths, found.improved) == (stored.paths, stored.improved)
+    np.testing.assert_allclose(found.bounds, stored.bounds, rtol=1e-12)
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("weights", [(0.05, 2.0), (0.3, 1.0)])
+def test_the_scripts_bounds_are_below_all_paths(
+    script: Any, weights: tuple[float, float], seed: int
+) -> None:
+    own = planner(weights)
+    problem = solvable((4, 4), 0.35, seed, own)
+    found = script.searched(GridFrontier(planner=own, **SETTINGS), problem)
+    costs = [(len(path), path_cost(own, problem, path)) for path in all_simple_paths(problem)]
+    least = min(cost for _, cost in costs)
+    for number, cost in costs:
+        if number - 2 < len(found.bounds):
+            assert found.bounds[number - 2] <= cost + 1e-12
+    assert 0.97 * least <= min(found.bounds)
+    best = min(path_cost(own, problem, path) for path in found.paths)
+    assert least - 1e-12 <= best <= 1.02 * least

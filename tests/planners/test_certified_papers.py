@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.evolution.best_team import best_team
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.planner import Planner
@@ -27,7 +27,7 @@ EXPERIMENTS = {
 
 def condition(experiment: str, *words: str, acceptance: str = "certified") -> Condition:
     words = f"experiment={experiment}", f"planner.acceptance={acceptance}", *words
-    return compose.expand(words)[0].conditions[0].condition
+    return composed(*words)
 
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.string_proofs import Prover
@@ -18,7 +18,7 @@ from evoexp.store.log_reader import read_log
 
 
 def condition(*words: str, experiment: str = "rana_planar") -> Condition:
-    return compose.expand([f"experiment={experiment}", *words])[0].conditions[0].condition
+    return composed(f"experiment={experiment}", *words)
 
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.records import generations
 from planners.grid_samples import planner, robot, scenario, solvable
@@ -83,8 +83,7 @@ def test_a_fault_among_paths_would_be_noticed(fault: str) -> None:
 
 @functools.cache
 def prepared(*words: str) -> tuple[Any, Any]:
-    given = compose.expand(["experiment=chen_placement", *words], only=["A torque norm"])
-    return given[0].conditions[0].condition.prepare()
+    return composed("experiment=chen_placement", *words, label="A torque norm").prepare()
 
 
 def same_postures(planner: Any, problem: Any, seed: int, fault: str = "") -> bool:

@@ -5,7 +5,6 @@ who collides, who is on a front) their populations are equal bit for bit. Only s
 differ in the last digit, and with them costs.
 """
 
-import functools
 import json
 from collections.abc import Callable
 from typing import Any
@@ -13,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.planners.coevolution import generations as team_generations
 from evoexp.planners.coevolution import kernels
 from evoexp.planners.coevolution import settings as settings_module
@@ -29,17 +28,11 @@ DISCS = [DISC, {"shape": "sphere", "center": [0.6, 0.25], "radius": 0.04}]
 SMALL = {"ga.population_size": 16, "ga.num_generations": 25, "ga.hall_depth": 0.25}
 
 
-@functools.cache
-def shipped(experiment: str) -> dict[str, Condition]:
-    """Return the conditions of an experiment by label; composing them takes longest."""
-    return dict(compose.expand([f"experiment={experiment}"])[0].conditions)
-
-
 def condition(
     changes: dict[str, Any], experiment: str = "curkovic_methods", label: str = "V"
 ) -> Condition:
     """Return a shipped condition with some settings changed, in the canonical form's words."""
-    config = json.loads(shipped(experiment)[label].to_json())
+    config = json.loads(composed(f"experiment={experiment}", label=label).to_json())
     for path, value in changes.items():
         *parents, name = (path if "." in path else f"planner.{path}").split(".")
         inner = config if parents[0] in config else config["planner"]
@@ -123,7 +116,7 @@ def test_variants_agree(changes: dict[str, Any]) -> None:
 @pytest.mark.parametrize("discs", [[], [DISC]], ids=["free", "beside a disc"])
 def test_three_robots_agree(discs: list[Any]) -> None:
     changes = SMALL | {"ga.num_elites": 1, "scenario.obstacles": discs}
-    for label in shipped("curkovic_three"):
+    for label in ("configurations only", "5 substeps"):
         events = compare(condition(changes, "curkovic_three", label), 3)
         assert events["collisions"] > 0
         assert events["feasible"] > 0
@@ -132,8 +125,8 @@ def test_three_robots_agree(discs: list[Any]) -> None:
 
 @pytest.mark.parametrize("distinct", ["genome", "index"])
 def test_a_robot_that_stands_still_agrees(distinct: str) -> None:
-    label = next(iter(shipped("curkovic_stationary")))
-    compare(condition(SMALL | {"ga.hall_distinct": distinct}, "curkovic_stationary", label), 0)
+    changes = SMALL | {"ga.hall_distinct": distinct}
+    compare(condition(changes, "curkovic_stationary", "configurations only"), 0)
 
 
 def test_restarts_agree() -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from composed import composed
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.numeric.random_stream import Block
@@ -20,7 +21,6 @@ from evoexp.records import generations
 from matrix import num_cases
 from paths.walked_worlds import SEEDS
 from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
-from shipped_conditions import expanded
 
 SHAPES = st.sampled_from([(3, 3), (6, 5), (9, 9), (12, 4)])
 
@@ -111,7 +111,7 @@ def test_more_paths_than_walks_and_other_planners_are_refused() -> None:
         PathClimbing(planner=own, num_paths=10**6).prepare(
             robot(), scenario(np.zeros((5, 5), dtype=bool))
         )
-    other, _ = dict(expanded("chen_placement", "smoke").conditions)["B link"].prepare()
+    other, _ = composed("experiment=chen_placement", label="B link").prepare()
     assert not isinstance(other, GridPathGa)
     with pytest.raises(SettingError, match="control: must be left out: placement_ga has no paths"):
         PathClimbing(planner=other, num_paths=1).prepare(None, None)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.planner import Planner
@@ -107,7 +107,7 @@ def test_in_space_too() -> None:
 
 def test_the_setting_leaves_hashes_as_they_are() -> None:
     plain, model, proven = (
-        compose.expand(["experiment=chen_path", *words])[0].conditions[0].condition.id
+        composed("experiment=chen_path", *words).id
         for words in ([], ["planner.acceptance=model"], ["planner.acceptance=certified"])
     )
     assert plain == model != proven

@@ -5,7 +5,6 @@ who collides. Then they differ by rounding alone; were one decision to flip, pos
 by tenths.
 """
 
-import functools
 import itertools
 from types import SimpleNamespace
 from typing import Any
@@ -13,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.condition import Condition
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.records import generations
 from references import lavoie_numpy
@@ -22,11 +20,6 @@ from references import lavoie_numpy
 ROUNDING = 1e-11  # [rad], [cost]
 GA: dict[str, Any] = {"population_size": 60, "num_generations": 25, "num_elites": 2}
 PLANNER = {"num_attempts": 2, "stop_cost_sp1": 3.0, "stop_cost_sp2": 0.5}
-
-
-@functools.cache
-def composed(*words: str) -> Condition:
-    return compose.expand(words)[0].conditions[0].condition
 
 
 def condition(

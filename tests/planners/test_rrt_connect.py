@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composed import composed
 from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
@@ -33,9 +34,7 @@ POST = body("cylinder", [1.0, 0.03], [0.35, 0.35, 0.5], name="post")  # in the s
 
 
 def condition(label: str, *changes: str) -> Condition:
-    (experiment,) = expand(["experiment=rrt_connect", *changes], only=[label])
-    ((_, chosen),) = experiment.conditions
-    return chosen
+    return composed("experiment=rrt_connect", *changes, label=label)
 
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:

@@ -37,7 +37,7 @@ def condition(*overrides: str, experiment: str = "lavoie_7dof") -> Condition:
 def drawn(planner: Any, scene: lavoie_numpy.Scene, rng: np.random.Generator) -> Outcome:
     """Draw sub-path by sub-path, one population after the other, as plainly as can be."""
     ga, stops = planner.ga, (planner.stop_cost_sp1, planner.stop_cost_sp2)
-    breeding = lavoie_numpy.Breeding(ga, scene, "")
+    breeding = lavoie_numpy.Breeding(ga, scene)
     evaluations, best_plan, lowest = 0, np.inf, []
     for attempt in range(1, planner.num_attempts + 1):
         start = scene.start

@@ -25,7 +25,7 @@ def alone(*words: str, label: str | int = "") -> Experiment:
         return compose.expand(words)[0]
     settings = yaml.safe_load(Path(find("experiment", name).path).read_text())
     if labels := settings.get("conditions"):  # else the experiment is one condition
-        chosen = label if label in labels else list(labels)[int(label or 0)]
+        chosen = list(labels)[label] if isinstance(label, int) else label or next(iter(labels))
         settings["conditions"] = {chosen: labels[chosen]}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.yaml"

@@ -16,7 +16,7 @@ from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.shipped import Shipped
 from matrix import matrices_are_asked_for
-from shipped_conditions import EXAMPLES, KINDS, kinds_of_conditions, shipped_conditions
+from shipped_conditions import EXAMPLES, KINDS, expanded, kinds_of_conditions, shipped_conditions
 
 ROOT = Path(__file__).parents[1]
 TABLE = shipped.shipped()
@@ -60,6 +60,8 @@ def test_kinds_of_conditions_are_as_many_as_tests_are_collected_for(budget: str)
 
 
 def condition_of(row: Shipped) -> Condition:
+    if matrices_are_asked_for():  # for every row of the experiment
+        return dict(expanded(row.experiment, row.budget).conditions)[row.label]
     return composed(f"experiment={row.experiment}", f"budget={row.budget}", label=row.label)
 
 

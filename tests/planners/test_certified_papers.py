@@ -111,10 +111,3 @@ def test_the_cheapest_are_judged_until_one_is_proven(monkeypatch: pytest.MonkeyP
     proofs.settle(costs, lambda k: np.array([float(k)]))
     assert asked == [2, 0, 4]
     assert costs.tolist() == [np.inf, np.inf, np.inf, 9.0, 5.0]
-
-
-def test_a_verdict_is_remembered() -> None:
-    planner, problem = condition("lavoie_7dof").prepare()
-    proofs, solution = Proofs(planner, problem), np.tile(problem.start, 3)
-    assert proofs.verdict(solution) == proofs.verdict(solution.copy()) == (True, "")
-    assert proofs.num_certificates == 1

@@ -135,32 +135,6 @@ def test_the_best_team_is_what_it_says() -> None:
     )  # relative to the link before
 
 
-def test_what_stands_where_the_hall_does_is_soon_free_of_collision() -> None:
-    planner, problem = prepared(*SMALL)
-    keys: list[tuple[int, float]] = []
-    for generation in generations(planner.evolve(problem, np.random.default_rng(3))):
-        found = planner.evaluated(problem, generation.population)
-        team = found.collisions[0, -1, -1]
-        keys.append((int(team), float(found.own[:, -1].sum())))
-    assert len(keys) == 16
-    best = [cost for hits, cost in keys[2:] if hits == 0]
-    assert len(best) > 5  # what the hall keeps is soon free of collision
-
-
-def test_with_a_hall_the_best_team_of_a_generation_never_gets_worse() -> None:
-    for settings, worsens in ((SMALL, False), (NO_HALL, True)):
-        planner, problem = prepared(*settings)
-        best = np.array(
-            [
-                g.best_cost_in_generation
-                for g in generations(planner.evolve(problem, np.random.default_rng(7)))
-            ]
-        )
-        found = best[np.isfinite(best)]
-        assert len(found) > 10
-        assert bool((np.diff(found) > 1e-12).any()) is worsens
-
-
 def test_random_search_draws_teams_of_its_own() -> None:
     planner, problem = prepared(*SMALL)
     population = planner.sample(problem, np.random.default_rng(4), 9)

@@ -244,13 +244,6 @@ def test_the_cost_of_a_path_by_proof_is_inf_where_it_is_refuted() -> None:
     assert proving.cost(problem, path).cost.tolist() == [math.inf]
 
 
-def test_acceptance_is_no_part_of_the_identity_unless_it_is_asked_for() -> None:
-    plain, named = condition(PLANAR), condition(PLANAR, "planner.acceptance=model")
-    assert plain.id == named.id
-    assert b"acceptance" not in plain.to_json()
-    assert condition(PLANAR, "planner.acceptance=certified").id != plain.id
-
-
 def test_corners_are_cut_behind_the_shortcuts_and_paths_stay_free() -> None:
     """A path of few nodes becomes one of many: shorter, with lesser turns, and as free."""
     for seed in range(3):

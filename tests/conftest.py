@@ -7,6 +7,9 @@ import gc
 import os
 from typing import Any
 
+# as in evoexp's workers: two test processes with two threads each wait for each other on two cores
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import settings
 

@@ -4,13 +4,13 @@ import functools
 
 import numpy as np
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.shapes import Outline
 from evoexp.records import generations
 
-SAMPLES = {  # name: overrides, label, whether the search is run to its end
+SAMPLES = {  # name: words, label, whether the search is run to its end
     "two arms": (["experiment=rana_planar", "budget=smoke"], "via-point GA", False),
     "two arms in space": (["experiment=rana_puma", "budget=smoke"], "via-point GA", False),
     "three arms": (["experiment=rana_three_arms", "budget=smoke"], "", False),
@@ -26,12 +26,10 @@ SAMPLES = {  # name: overrides, label, whether the search is run to its end
 REPLICATE = {"pick and place": 2}  # one that puts the bottle down, hence holds it on the way
 
 
-@functools.cache
 def condition(name: str) -> Condition:
     """Return a sample's condition."""
-    overrides, label, _ = SAMPLES[name]
-    found = compose.expand(overrides, only=(label,) if label else ())[0].conditions
-    return found[0].condition
+    words, label, _ = SAMPLES[name]
+    return composed(*words, label=label)
 
 
 @functools.cache

@@ -3,6 +3,8 @@
 import functools
 from pathlib import Path
 
+import pytest
+
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
@@ -84,3 +86,32 @@ def smoke_report(outputs: Path, name: str) -> Path:
 def figure_stems(directory: Path) -> set[str]:
     """Return the names of a report's figures."""
     return {path.stem for path in directory.glob("*.svg")}
+
+
+@pytest.fixture(scope="session")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return outputs that hold two experiments; not to be changed."""
+    outputs = tmp_path_factory.mktemp("outputs")
+    store(outputs, expand("rana_planar"))
+    store(outputs, expand("rana_three_arms", "scenario=rana_three_arms"))
+    return outputs
+
+
+@pytest.fixture(scope="session")
+def results(stored: Path) -> Results:
+    """Return what is stored of the two planar arms and of random search beside them."""
+    experiment = expand("rana_planar")
+    return gather(
+        stored,
+        experiment.conditions,
+        experiment.num_replicates,
+        experiment.name,
+        experiment.budget,
+        "",
+    )
+
+
+@pytest.fixture
+def settings() -> ReportSettings:
+    """Return settings of the paper's own page."""
+    return ReportSettings(**REPORT, figures="rana")

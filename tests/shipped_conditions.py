@@ -11,6 +11,7 @@ from collections import Counter
 
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
@@ -42,7 +43,7 @@ KIND_EXAMPLES = [  # as parameters: the examples always, all kinds with --all
 def of_kind(kind: Kind, budget: str) -> Condition:
     """Return the condition of an example, or that of a kind's number."""
     if isinstance(kind, tuple):
-        return expanded(kind[0], budget).conditions[kind[1]].condition
+        return composed(f"experiment={kind[0]}", f"budget={budget}", label=kind[1])
     return kinds_of_conditions(budget)[kind]
 
 

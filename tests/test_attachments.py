@@ -18,7 +18,9 @@ from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 
 MAP = "....\n.##.\n....\n....\n"
-OVERRIDES = ["experiment=chen_path", "budget=smoke", "scenario.size=[4,4]", "scenario.start=[0,0]"]
+GROUPS = ("robot=floor_platform", "scenario=chen", "planner=grid_path_ga", "collision=chen")
+OVERRIDES = [*GROUPS, "objective=chen_path_a", "ga=chen_path", "budget=smoke"]
+OVERRIDES += ["scenario.size=[4,4]", "scenario.start=[0,0]"]
 OVERRIDES += ["scenario.goal=[3,3]", "scenario.obstacles=[]"]
 
 
@@ -31,9 +33,7 @@ def path(tmp_path: Path) -> Path:
 
 def condition_with(path: Path) -> Condition:
     return (
-        compose.expand([*OVERRIDES, f"scenario.map={{file: '{path}'}}"], only=["(a)"])[0]
-        .conditions[0]
-        .condition
+        compose.expand([*OVERRIDES, f"scenario.map={{file: '{path}'}}"])[0].conditions[0].condition
     )
 
 

@@ -56,11 +56,14 @@ def imported() -> dict[str, str]:
     }
 
 
+installed = cache(packages_distributions)
+
+
 @pytest.mark.parametrize("module", imported())
 def test_an_imported_library_is_declared(module: str) -> None:
     extras = [name for name in PROJECT["optional-dependencies"] if name not in ("test", "docs")]
     known = declared(*extras)
-    owners = packages_distributions().get(module, [MODULES.get(module, module)])
+    owners = installed().get(module, [MODULES.get(module, module)])
     assert {plain(owner) for owner in owners} & known.keys(), (
         f"{imported()[module]} imports {module}, of {owners}, which pyproject.toml does not name"
     )

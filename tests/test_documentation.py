@@ -16,6 +16,7 @@ import matplotlib.pyplot as plt
 import pytest
 import yaml
 
+from composed import composed
 from evoexp.cli import main
 from evoexp.commands.command_parser import COMMANDS, command_parser
 from evoexp.configuration import compose
@@ -156,14 +157,19 @@ def is_elsewhere(words: list[str]) -> bool:
     return any(re.search(r"path/to|PATH|my_|mine|HASH|tcp:|arm.urdf|[.]csv", w) for w in words)
 
 
+def is_no_experiment(word: str) -> bool:
+    return re.fullmatch(r"experiment=\w+", word) is None
+
+
 @each_page
 def test_commands_are_commands(page: Path) -> None:
     for words in commands(page):
         assert words[0] in COMMANDS, words
         command_parser(words[0]).parse_intermixed_args(words[1:])
         if words[0] in ("run", "plan") and not is_elsewhere(words):
-            given = [word for word in words[1:] if "=" in word]
-            assert compose.expand(given, multirun="-m" in words)
+            given = sorted((word for word in words[1:] if "=" in word), key=is_no_experiment)
+            is_one = "-m" not in words and not is_no_experiment(given[0])
+            assert composed(*given) if is_one else compose.expand(given, multirun="-m" in words)
         named = [w for w in words[1:] if re.fullmatch(r"[a-z]+(_[a-z0-9]+)+", w)]
         assert not named or set(named) <= experiments() or is_elsewhere(words), words
 

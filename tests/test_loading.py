@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import evoexp
+from composed import composed
 from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.errors import AmbiguousHash, NothingStored, SettingError, UnknownHash, UnknownOption
@@ -99,9 +100,7 @@ def test_conditions_that_become_one_have_its_rows_once(outputs: Path) -> None:
 
 
 def test_failed_replicates_are_rows(outputs: Path, tmp_path: Path) -> None:
-    condition = (
-        compose.expand(["experiment=rana_obstacles", "budget=smoke"])[0].conditions[0].condition
-    )
+    condition = composed("experiment=rana_obstacles", "budget=smoke")
     run = RunDirectory(tmp_path, condition.id)
     run.create(condition.to_json(), {})
     run.write_failure(1, "ArithmeticError: told to fail", "Traceback")

@@ -3,12 +3,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from composed import composed
 from evoexp.collision.models.body_models import BodyCapsules, BodyModel, SphereSets
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from matrix import first
-from shipped_conditions import expanded
 
 MODELS = {"spheres": SphereSets(inflation=0.01), "capsules": BodyCapsules(padding=0.0)}
 EXPERIMENTS = {
@@ -19,7 +19,7 @@ EXPERIMENTS = {
 
 
 def robot(name: str) -> tuple[Assembly, ObstacleTable]:
-    found = expanded(EXPERIMENTS[name], "paper").conditions[0].condition
+    found = composed(f"experiment={EXPERIMENTS[name]}")
     return found.robot.build(), obstacle_table(found.scenario.obstacles)  # type: ignore[attr-defined]
 
 

@@ -10,11 +10,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from composed import composed
 from evoexp.collision.models.contact_kernels import HIT, find_contacts
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision
-from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -178,8 +177,7 @@ def test_capsules_are_answered_in_full() -> None:
 
 @pytest.mark.parametrize("experiment", ["rana_planar", "rana_obstacles", "rana_puma"])
 def test_touching_spheres_find_any_collision(experiment: str) -> None:
-    given: Condition = compose.expand([f"experiment={experiment}"])[0].conditions[0].condition
-    planner, problem = given.prepare()
+    planner, problem = composed(f"experiment={experiment}").prepare()
     collision = problem.collision
     strings = planner.sample(problem, np.random.default_rng(0), 24)
     q = np.ascontiguousarray(strings.reshape(len(strings), -1))

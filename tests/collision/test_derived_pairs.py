@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from composed import composed
 from evoexp import condition as conditions
 from evoexp.attachments import PREFIX, keep
 from evoexp.batch.replicate import run_replicate
@@ -15,7 +16,6 @@ from evoexp.collision import derived_pairs
 from evoexp.collision.derived_pairs import DerivedPairs, derive_pairs, unjudged_pairs
 from evoexp.collision.scene import scene
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.robots.assembly import Assembly
 
@@ -28,7 +28,7 @@ REACH = (
 
 def condition(*overrides: str) -> Condition:
     words = [*REACH, f"robot.path={DATA / 'ur5_like.urdf'}", *overrides]
-    return compose.expand(words)[0].conditions[0].condition
+    return composed(*words)
 
 
 def robot(*overrides: str) -> Assembly:

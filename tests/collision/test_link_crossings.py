@@ -125,28 +125,6 @@ def test_counts_are_exact_where_links_touch(kind: str) -> None:
     check_sums(found)
 
 
-def test_counts_of_random_links_are_exact() -> None:
-    points_1, points_2 = populations(np.random.default_rng(5), UNEQUAL, 40, 30, 3)
-    found = count_crossings(UNEQUAL[0], points_1, UNEQUAL[1], points_2)
-    assert np.array_equal(
-        found.counts, plain.exact_counts(UNEQUAL[0].base, points_1, UNEQUAL[1].base, points_2)
-    )
-
-
-def test_right_angles_are_exact() -> None:
-    """Link angles of multiples of 30 degrees, bases a link apart.
-
-    Touching, parallel and collinear by the thousand.
-    """
-    arms = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.25, 0.0), (0.25, 0.25))
-    grid = np.array(np.meshgrid(*[np.arange(7)] * 2)).reshape(1, 2, -1) * (np.pi / 6.0)
-    points = [arm.points(grid) for arm in arms]
-    found = count_exactly(arms[0].base, points[0], arms[1].base, points[1])
-    assert np.array_equal(
-        found.counts, plain.exact_counts(arms[0].base, points[0], arms[1].base, points[1])
-    )
-
-
 def test_a_link_between_two_others_by_the_last_place() -> None:
     """A tip is moved across another link one float at a time."""
     one, two = Arm((0.0, 0.0), (1.0, 1.0)), Arm((0.3, 1.0), (1.0, 1.0))
@@ -208,15 +186,6 @@ def test_mirror_and_exchange_change_nothing(kind: str) -> None:
     assert np.array_equal(exchanged.counts.T, found.counts)
     assert np.array_equal(exchanged.sums_1, found.sums_2)
     assert np.array_equal(exchanged.sums_2, found.sums_1)
-
-
-def test_upside_down_in_angles() -> None:
-    q_1, q_2 = np.random.default_rng(9).uniform(0.0, np.pi, (2, 4, 2, 30))
-    one, two = SCENE_A
-    found = count_crossings(one, one.points(q_1), two, two.points(q_2))
-    assert np.array_equal(
-        found.counts, count_crossings(one, one.points(-q_1), two, two.points(-q_2)).counts
-    )
 
 
 @given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.floats(0.0, 1.0))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.collision.models.link_crossings import (
     Arm,
     closed_form,
@@ -23,7 +24,6 @@ from evoexp.collision.models.link_obstacles import (
     count_obstacle_collisions,
     planar_obstacles,
 )
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.proofs import judge_motion
@@ -241,8 +241,7 @@ def test_parallel_links_are_decided_at_any_angle(offset: float, tilt: Fraction) 
 
 def test_links_on_one_line_collide_as_the_exact_verdict_says() -> None:
     """Both arms lie on the x axis: 0°, 180° folds back on itself, 180°, 180° reaches over it."""
-    condition = compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0]
-    planner, problem = condition.condition.prepare()
+    planner, problem = composed("experiment=curkovic_methods", label="V").prepare()
     solution = np.array([[0.0, 180.0] * 6, [180.0, 180.0] * 6]).ravel()
     assert planner.evaluate(problem, solution)["team_collisions"] == planner.num_configurations
     verdict = judge_motion(planner, problem, planner.motion(problem, solution))
@@ -267,6 +266,6 @@ OVERLAPPING = "[{angles: [45.0, 180.0]}, {angles: [135.0, 180.0]}]"
 )
 def test_a_start_whose_links_overlap_on_one_line_is_refused(words: list[str]) -> None:
     """At 45° and 135° the links that lie at 180° share 10 cm, at heights one last place apart."""
-    condition = compose.expand(words, only=["I"])[0].conditions[0]
+    condition = composed(*words, label="I")
     with pytest.raises(SettingError, match=r"free of collision \(robots 1 and 2 touch"):
-        condition.condition.prepare()
+        condition.prepare()

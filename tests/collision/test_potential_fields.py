@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.collision.models.potential_fields import PotentialFields
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.papers.chen.figures.field_grids import (
     MISSING,
@@ -29,7 +29,7 @@ def settings(**changed: Any) -> PotentialFields:
 
 
 def test_both_fields_are_the_printed_ones_but_for_known_slips() -> None:
-    _, problem = compose.expand(["experiment=chen_fields"])[0].conditions[0].condition.prepare()
+    _, problem = composed("experiment=chen_fields").prepare()
     own = problem.fields.grid
     goal = own.inner(problem.fields.goal_field(problem.ends[1]))
     unsafeness, blocked = own.inner(problem.fields.unsafeness), np.isnan(goal)

@@ -316,14 +316,6 @@ def test_a_limit_skips_only_what_is_not_asked(seed: int, limit: float) -> None:
             assert np.all(limited[~below] == limit)
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_collides_is_the_sign_of_the_clearance(seed: int) -> None:
-    collision, rng = collision_of(seed, arms=1 + seed % 3)
-    near = rng.uniform(-np.pi, np.pi, size=(6, 1)) + 0.1 * rng.normal(size=(6, 150))
-    for q in (near, rng.uniform(-np.pi, np.pi, size=(6, 150))):
-        assert np.array_equal(collision.collides(q), collision.clearance(q).least < 0.0)
-
-
 def test_no_configurations_and_what_is_not_a_number() -> None:
     collision, _ = collision_of(0)
     assert collision.clearance(np.empty((6, 0))).least.shape == (0,)

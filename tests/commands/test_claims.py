@@ -12,9 +12,9 @@ from evoexp.registry import CLAIMS, Registration, registrations
 
 
 def test_a_claim_that_nothing_was_run_for_names_the_command(evoexp: Evoexp) -> None:
-    said = evoexp("claims", "chen")
+    said = evoexp("claims", "lavoie")
     assert said.code == 0
-    assert "evoexp run experiment=chen_fields" in said.out
+    assert "evoexp run experiment=lavoie_7dof" in said.out
     assert NOT_RUN in said.out
     assert "{" not in said.out
 

@@ -5,17 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.records import FloatArray
 from evoexp.store.log_reader import LogContents, read_log
 
 
-@functools.cache
 def condition(name: str, *overrides: str, label: int = 0) -> Condition:
     """Return a condition of an experiment."""
-    return compose.expand([f"experiment={name}", *overrides])[0].conditions[label].condition
+    return composed(f"experiment={name}", *overrides, label=label)
 
 
 @functools.cache

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.records import generations
 from references import rana_numpy
 
@@ -27,7 +27,7 @@ ARC_LENGTH = {128: 3e-3, 1024: 6e-5}  # [deg]
 
 
 def condition(*overrides: str, experiment: str = "rana_planar") -> Condition:
-    return compose.expand([f"experiment={experiment}", *overrides])[0].conditions[0].condition
+    return composed(f"experiment={experiment}", *overrides)
 
 
 def largest_differences(given: Condition, seed: int, **changes: Any) -> tuple[float, float]:

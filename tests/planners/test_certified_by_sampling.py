@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from composed import composed
 from evoexp.collision.scene import Part
-from evoexp.configuration.compose import expand
 from evoexp.paths.motion import Motion
 from evoexp.records import generations
 from matrix import counts, first
@@ -65,7 +65,7 @@ def accepted(planner: Any, problem: Any, seed: int) -> list[Any]:
 @pytest.mark.parametrize(("experiment", "changes"), first(4, SEARCHES))
 def test_no_accepted_motion_touches(experiment: str, changes: tuple[str, ...]) -> None:
     words = f"experiment={experiment}", "planner.acceptance=certified", *changes
-    planner, problem = expand(words)[0].conditions[0].condition.prepare()
+    planner, problem = composed(*words).prepare()
     judged = 0
     for seed in range(counts(1, 25)):
         for solution in accepted(planner, problem, seed):

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.evolution.best_team import best_team
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.planner import Planner
@@ -27,7 +27,7 @@ EXPERIMENTS = {
 
 def condition(experiment: str, *words: str, acceptance: str = "certified") -> Condition:
     words = f"experiment={experiment}", f"planner.acceptance={acceptance}", *words
-    return compose.expand(words)[0].conditions[0].condition
+    return composed(*words)
 
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:
@@ -111,10 +111,3 @@ def test_the_cheapest_are_judged_until_one_is_proven(monkeypatch: pytest.MonkeyP
     proofs.settle(costs, lambda k: np.array([float(k)]))
     assert asked == [2, 0, 4]
     assert costs.tolist() == [np.inf, np.inf, np.inf, 9.0, 5.0]
-
-
-def test_a_verdict_is_remembered() -> None:
-    planner, problem = condition("lavoie_7dof").prepare()
-    proofs, solution = Proofs(planner, problem), np.tile(problem.start, 3)
-    assert proofs.verdict(solution) == proofs.verdict(solution.copy()) == (True, "")
-    assert proofs.num_certificates == 1

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import Proofs, judge_motion
 from evoexp.planners.via_point_ga.search import settle
@@ -18,7 +18,7 @@ from evoexp.store.log_reader import read_log
 
 
 def condition(*words: str, experiment: str = "rana_planar") -> Condition:
-    return compose.expand([f"experiment={experiment}", *words])[0].conditions[0].condition
+    return composed(f"experiment={experiment}", *words)
 
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:
@@ -106,10 +106,17 @@ def test_covered_bodies_are_proven_too() -> None:
         assert not record.solved or is_proven(chosen, record.best)
 
 
-def test_the_default_is_the_model_and_no_part_of_the_identity(tmp_path: Any) -> None:
-    plain, named = condition(), condition("planner.acceptance=model")
-    assert plain.id == named.id
+@pytest.mark.parametrize("experiment", ["rana_planar", "rrt_connect", "chen_path"])
+def test_the_default_is_the_model_and_no_part_of_the_identity(experiment: str) -> None:
+    plain, named, proving = (
+        condition(*words, experiment=experiment)
+        for words in ((), ("planner.acceptance=model",), ("planner.acceptance=certified",))
+    )
+    assert plain.id == named.id != proving.id
     assert b"acceptance" not in plain.to_json()
+
+
+def test_the_log_of_a_proven_search_counts_its_certificates(tmp_path: Any) -> None:
     path = tmp_path / "0000.mcap"
     proving = condition("planner.acceptance=certified", "ga.num_generations=400")
     path.write_bytes(run_replicate(proving, 0).content)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
 from evoexp.planners.coevolution.link_problem import Problem
@@ -22,10 +22,8 @@ def prepared(*overrides: str, experiment: str = "curkovic_methods") -> tuple[Coe
     words = [f"experiment={experiment}", *overrides]
     if not any(word.startswith("ga=") for word in words):
         words.append("ga=curkovic_5")
-    only = ["V"] if experiment == "curkovic_methods" else []
-    condition = compose.expand(words, only=only)[0].conditions[0].condition
-    planner, problem = condition.prepare()
-    return planner, problem
+    label = "V" if experiment == "curkovic_methods" else ""
+    return composed(*words, label=label).prepare()
 
 
 def crosses(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> bool:
@@ -137,32 +135,6 @@ def test_the_best_team_is_what_it_says() -> None:
     )  # relative to the link before
 
 
-def test_what_stands_where_the_hall_does_is_soon_free_of_collision() -> None:
-    planner, problem = prepared(*SMALL)
-    keys: list[tuple[int, float]] = []
-    for generation in generations(planner.evolve(problem, np.random.default_rng(3))):
-        found = planner.evaluated(problem, generation.population)
-        team = found.collisions[0, -1, -1]
-        keys.append((int(team), float(found.own[:, -1].sum())))
-    assert len(keys) == 16
-    best = [cost for hits, cost in keys[2:] if hits == 0]
-    assert len(best) > 5  # what the hall keeps is soon free of collision
-
-
-def test_with_a_hall_the_best_team_of_a_generation_never_gets_worse() -> None:
-    for settings, worsens in ((SMALL, False), (NO_HALL, True)):
-        planner, problem = prepared(*settings)
-        best = np.array(
-            [
-                g.best_cost_in_generation
-                for g in generations(planner.evolve(problem, np.random.default_rng(7)))
-            ]
-        )
-        found = best[np.isfinite(best)]
-        assert len(found) > 10
-        assert bool((np.diff(found) > 1e-12).any()) is worsens
-
-
 def test_random_search_draws_teams_of_its_own() -> None:
     planner, problem = prepared(*SMALL)
     population = planner.sample(problem, np.random.default_rng(4), 9)
@@ -272,9 +244,7 @@ def test_a_robot_that_stands_still_keeps_its_posture() -> None:
 def test_no_team_is_cheaper_than_the_lower_bound() -> None:
     from evoexp.report.results import ConditionResults
 
-    condition = (
-        compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
-    )
+    condition = composed("experiment=curkovic_methods", label="V")
     nothing: Any = None
     bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, None, {}))
     planner, problem = prepared(*SMALL)
@@ -312,7 +282,7 @@ def test_a_spline_is_executed_between_the_same_configurations() -> None:
 
 def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() -> None:
     """Eq. 10 over 30 generations, with the decay that 30 of 200 have."""
-    condition = compose.expand(["experiment=curkovic_pareto"])[0].conditions[0].condition
+    condition = composed("experiment=curkovic_pareto")
     front, problem = condition.prepare()
     method, _ = prepared()
     pairs = zip(

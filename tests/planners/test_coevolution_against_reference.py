@@ -5,20 +5,14 @@ who collides, who is on a front) their populations are equal bit for bit. Only s
 differ in the last digit, and with them costs.
 """
 
-import functools
 import json
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
-from evoexp.planners.coevolution import generations as team_generations
-from evoexp.planners.coevolution import kernels
-from evoexp.planners.coevolution import settings as settings_module
-from evoexp.planners.coevolution.planner import Coevolution
 from evoexp.records import generations
 from references import curkovic_numpy
 
@@ -29,17 +23,11 @@ DISCS = [DISC, {"shape": "sphere", "center": [0.6, 0.25], "radius": 0.04}]
 SMALL = {"ga.population_size": 16, "ga.num_generations": 25, "ga.hall_depth": 0.25}
 
 
-@functools.cache
-def shipped(experiment: str) -> dict[str, Condition]:
-    """Return the conditions of an experiment by label; composing them takes longest."""
-    return dict(compose.expand([f"experiment={experiment}"])[0].conditions)
-
-
 def condition(
     changes: dict[str, Any], experiment: str = "curkovic_methods", label: str = "V"
 ) -> Condition:
     """Return a shipped condition with some settings changed, in the canonical form's words."""
-    config = json.loads(shipped(experiment)[label].to_json())
+    config = json.loads(composed(f"experiment={experiment}", label=label).to_json())
     for path, value in changes.items():
         *parents, name = (path if "." in path else f"planner.{path}").split(".")
         inner = config if parents[0] in config else config["planner"]
@@ -123,7 +111,7 @@ def test_variants_agree(changes: dict[str, Any]) -> None:
 @pytest.mark.parametrize("discs", [[], [DISC]], ids=["free", "beside a disc"])
 def test_three_robots_agree(discs: list[Any]) -> None:
     changes = SMALL | {"ga.num_elites": 1, "scenario.obstacles": discs}
-    for label in shipped("curkovic_three"):
+    for label in ("configurations only", "5 substeps"):
         events = compare(condition(changes, "curkovic_three", label), 3)
         assert events["collisions"] > 0
         assert events["feasible"] > 0
@@ -132,8 +120,8 @@ def test_three_robots_agree(discs: list[Any]) -> None:
 
 @pytest.mark.parametrize("distinct", ["genome", "index"])
 def test_a_robot_that_stands_still_agrees(distinct: str) -> None:
-    label = next(iter(shipped("curkovic_stationary")))
-    compare(condition(SMALL | {"ga.hall_distinct": distinct}, "curkovic_stationary", label), 0)
+    changes = SMALL | {"ga.hall_distinct": distinct}
+    compare(condition(changes, "curkovic_stationary", "configurations only"), 0)
 
 
 def test_restarts_agree() -> None:
@@ -141,106 +129,3 @@ def test_restarts_agree() -> None:
     changes = {"ga.population_size": 2, "ga.hall_depth": 0.5, "ga.restart_after": 2}
     three = condition(changes | {"ga.num_generations": 40}, "curkovic_three", "5 substeps")
     assert sum(compare(three, seed)["restarts"] for seed in range(3)) > 3
-
-
-def uniform_selection(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "inverse_weights", lambda costs, out: out.fill(1.0))
-
-
-def no_mutation(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "mutate_allele", lambda *_: None)
-
-
-def no_crossover(monkeypatch: pytest.MonkeyPatch) -> None:
-    cross = kernels.cross_single_point
-    monkeypatch.setattr(
-        kernels,
-        "cross_single_point",
-        lambda uniforms, genes, parents, rate, out: cross(uniforms, genes, parents, 0.0, out),
-    )
-
-
-def lost_elites(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "choose_elites", lambda costs, chosen: chosen.fill(0))
-
-
-def swapped_readings_of_eq_9(monkeypatch: pytest.MonkeyPatch) -> None:
-    mutate = kernels.mutate_allele
-    monkeypatch.setattr(kernels, "mutate_allele", lambda *given: mutate(*given[:-1], not given[-1]))
-
-
-def constant_rate_for_eq_10(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(settings_module, "decayed_rate", lambda rate, *_: rate)
-
-
-def c1_without_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:
-    evaluated = Coevolution.evaluated
-
-    def without(planner: Coevolution, problem: Any, populations: Any) -> Any:
-        found = evaluated(planner, problem, populations)
-        extra = found.blocked * populations.shape[2]
-        found.criteria[:, 0] -= extra
-        return found._replace(costs=found.costs - planner.objective.collision_weight * extra)
-
-    monkeypatch.setattr(Coevolution, "evaluated", without)
-
-
-def copies_on_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "drop_copies", lambda *_: None)
-
-
-def copies_as_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "merge_copies", kernels.merge_copies.py_func)
-    monkeypatch.setattr(kernels, "same_genome", lambda *_: False)
-
-
-def hall_never_offered_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    merge = kernels.merge_copies
-
-    def without(populations: Any, marks: Any, teams: Any, fronts: Any) -> None:
-        merge(populations, marks, teams, fronts)
-        for robot, front in enumerate(fronts):
-            front[teams[:, robot]] = False
-
-    monkeypatch.setattr(kernels, "merge_copies", without)
-
-
-def everybody_on_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "non_dominated", lambda criteria, count, out: out.fill(True))
-
-
-def nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave everything as it is: the kernels that faults are planted in agree when interpreted."""
-
-
-FAULTS: list[Callable[[pytest.MonkeyPatch], None]] = [
-    uniform_selection,
-    no_mutation,
-    no_crossover,
-    lost_elites,
-    swapped_readings_of_eq_9,
-    constant_rate_for_eq_10,
-    c1_without_obstacles,
-    copies_on_the_front,
-    copies_as_others,
-    hall_never_offered_again,
-    everybody_on_the_front,
-]
-
-
-@pytest.mark.parametrize("plant", [nothing, *FAULTS], ids=lambda plant: plant.__name__)
-def test_every_planted_fault_is_noticed(
-    plant: Callable[[pytest.MonkeyPatch], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    distinct = "index" if plant is copies_on_the_front else "genome"
-    changes = {"ga.num_elites": 2, "scenario.obstacles": DISCS, "ga.hall_distinct": distinct}
-    given = condition(SMALL | changes)
-    for name in ("follow", "breed", "renew"):
-        function = getattr(team_generations, name).py_func
-        monkeypatch.setattr(team_generations, name, function)
-    plant(monkeypatch)
-    if plant is nothing:
-        compare(given, 0)
-    else:
-        with pytest.raises(AssertionError):
-            compare(given, 0)

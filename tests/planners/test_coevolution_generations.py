@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.planners.coevolution import generations as team_generations
 from evoexp.planners.coevolution.generations import CACHED, PER_CALL, per_call
@@ -15,9 +15,8 @@ from evoexp.records import Generation, generations
 SMALL = ("ga.population_size=12", "ga.num_generations=30")
 
 
-def prepared(*words: str, only: str = "") -> tuple[Any, Any]:
-    condition = compose.expand(list(words), only=[only] if only else [])[0].conditions[0].condition
-    planner, problem = condition.prepare()
+def prepared(*words: str, label: str = "") -> tuple[Any, Any]:
+    planner, problem = composed(*words, label=label).prepare()
     assert problem.collision.is_lines
     return planner, problem
 
@@ -53,7 +52,7 @@ def test_generations_in_one_call_are_those_of_one_kernel_after_the_other(
     given = words[0].split()
     named = {word.split("=")[0] for word in given}
     small = [word for word in SMALL if word.split("=")[0] not in named]
-    planner, problem = prepared(*given, *small, only=words[1])
+    planner, problem = prepared(*given, *small, label=words[1])
     one, other = np.random.default_rng(5), np.random.default_rng(5)
     at_once = list(told(generations(planner.evolve(problem, one)), one))
     monkeypatch.setattr(type(problem.collision), "is_lines", False)
@@ -65,7 +64,7 @@ def test_generations_in_one_call_are_those_of_one_kernel_after_the_other(
 def test_the_number_of_generations_per_call_changes_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
+    planner, problem = prepared("experiment=curkovic_methods", *SMALL, label="V")
     rng = np.random.default_rng(2)
     expected = list(told(generations(planner.evolve(problem, rng)), rng))
     for length in (1, 3, 100):
@@ -83,7 +82,7 @@ def test_large_populations_are_computed_generation_by_generation() -> None:
 
 
 def test_coordinates_that_are_not_finite_are_refused() -> None:
-    planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
+    planner, problem = prepared("experiment=curkovic_methods", *SMALL, label="V")
     problem = problem._replace(arms=np.full_like(problem.arms, 1e200))
     with pytest.raises(ValueError, match="must be finite"):
         next(iter(generations(planner.evolve(problem, np.random.default_rng(0)))))

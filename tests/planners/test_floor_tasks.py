@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.condition import Condition
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
@@ -16,14 +15,10 @@ STRINGS = "planner=via_points", "ga=via_points", "objective=via_points", "collis
 PATHS = "planner=grid_path_ga", "ga=chen_path", "objective=chen_path_a", "collision=chen"
 
 
-def condition(*words: str) -> Condition:
-    return compose.expand(words)[0].conditions[0].condition
-
-
 def test_ends_limits_and_bodies_are_those_of_the_grid() -> None:
-    chosen = condition(*FLOOR, *RRT)
+    chosen = composed(*FLOOR, *RRT)
     _, problem = chosen.prepare()
-    _, paths = condition("experiment=chen_path").prepare()
+    _, paths = composed("experiment=chen_path").prepare()
     in_units = np.degrees(1.0)  # a length unit counts as a radian
     assert problem.start == pytest.approx(in_units * np.array(chosen.scenario.start))
     assert problem.goal == pytest.approx(in_units * np.array(chosen.scenario.goal))
@@ -35,7 +30,7 @@ def test_ends_limits_and_bodies_are_those_of_the_grid() -> None:
 
 def test_trees_and_strings_reach_the_goal() -> None:
     for words in (RRT, (*STRINGS, "ga.num_generations=60")):
-        planner, problem = condition(*FLOOR, *words).prepare()
+        planner, problem = composed(*FLOOR, *words).prepare()
         *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
         assert last.solved
         assert planner.departures(problem, last.best) == []
@@ -48,8 +43,8 @@ def test_trees_and_strings_reach_the_goal() -> None:
 
 
 def test_the_model_tests_the_discs_that_are_judged() -> None:
-    _, problem = condition(*FLOOR, *RRT, "collision.covers.padding=0").prepare()
-    rng, boxes = np.random.default_rng(1), condition(*FLOOR, *RRT).scenario.bodies()
+    _, problem = composed(*FLOOR, *RRT, "collision.covers.padding=0").prepare()
+    rng, boxes = np.random.default_rng(1), composed(*FLOOR, *RRT).scenario.bodies()
     q = rng.uniform(0.0, 31.0, (2000, 2))
     edges = np.degrees(q)
     hits = problem.collision.clearance(np.ascontiguousarray(edges.T)).least < 0.0
@@ -62,7 +57,7 @@ def test_the_model_tests_the_discs_that_are_judged() -> None:
 def test_maps_in_space() -> None:
     words = "robot=floor_platform", "robot.dimensions=3", "scenario=chen", *RRT
     size = "scenario.size=[9,9,9]", "scenario.start=[0,0,0]", "scenario.goal=[8,8,8]"
-    planner, problem = condition(*words, *size, "scenario.obstacles=[[3,3,3,5,5,5]]").prepare()
+    planner, problem = composed(*words, *size, "scenario.obstacles=[[3,3,3,5,5,5]]").prepare()
     *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert last.solved
     assert planner.motion(problem, last.best).q.shape[1] == 3
@@ -79,13 +74,13 @@ def test_maps_in_space() -> None:
 )
 def test_what_does_not_fit_is_refused(words: tuple[str, ...], refusal: str) -> None:
     with pytest.raises(SettingError, match=refusal):
-        condition("scenario=chen", *RRT, *words).prepare()
+        composed("scenario=chen", *RRT, *words).prepare()
 
 
 def test_a_map_counts_as_queries_of_its_nodes() -> None:
-    planner, problem = condition("experiment=chen_path").prepare()
+    planner, problem = composed("experiment=chen_path").prepare()
     assert planner.prior_queries(problem) == 32 * 32
-    control, problem = condition(*FLOOR, *PATHS, "control=random_search").prepare()
+    control, problem = composed(*FLOOR, *PATHS, "control=random_search").prepare()
     assert control.prior_queries(problem) == 32 * 32
-    trees, problem = condition(*FLOOR, *RRT).prepare()
+    trees, problem = composed(*FLOOR, *RRT).prepare()
     assert trees.prior_queries(problem) == 0

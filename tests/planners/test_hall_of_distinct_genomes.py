@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.planners.coevolution import generations as team_generations
 from evoexp.records import generations
 from matrix import first
@@ -16,8 +16,7 @@ BLOCK = 20  # seeds per test
 
 
 def condition(label: str, *overrides: str, experiment: str = "curkovic_methods") -> Condition:
-    words = [f"experiment={experiment}", *overrides]
-    return compose.expand(words, only=[label])[0].conditions[0].condition
+    return composed(f"experiment={experiment}", *overrides, label=label)
 
 
 def worsens(given: Condition, rng: np.random.Generator) -> bool:

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 import evoexp
+from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
@@ -121,15 +122,14 @@ POSTURES = (
 
 
 def test_postures_reach_into_a_box_and_a_shelf() -> None:
-    found = conditions(*POSTURES, budget="paper")
     for label in ("box_panda", "bookshelf_thin_panda"):
-        summary = run_replicate(found[label], 0).summary
+        summary = run_replicate(composed(*POSTURES, label=label), 0).summary
         assert summary.solved and summary.certified
 
 
 def test_covers_that_touch_at_the_start_are_left_to_the_certifier() -> None:
     """Those of a UR5's base and upper arm do where its problems begin, the bodies do not."""
-    planner, problem = conditions(*POSTURES)["box_ur5"].prepare()
+    planner, problem = composed(*POSTURES, "budget=smoke", label="box_ur5").prepare()
     (note,) = (line for line in planner.notes(problem) if "left to the certifier" in line)
     assert (
         note.startswith("covers touch at the start or the goal")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.records import generations
 from references import rana_numpy
@@ -12,7 +12,7 @@ from references import rana_numpy
 
 def control(*overrides: str, experiment: str = "rana_planar") -> Condition:
     given = [f"experiment={experiment}", "control=multi_start", *overrides]
-    return compose.expand(given)[0].conditions[0].condition
+    return composed(*given)
 
 
 def test_every_generation_evaluates_as_many_as_the_planner() -> None:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,13 @@ import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu
 
+from composed import composed
 from evoexp.cli import main
 from evoexp.condition import Condition
-from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
+from matrix import num_cases
 
 geometric = pytest.importorskip("ompl.geometric", reason="an extra")
 OMPL = ("planner=ompl", "ga=ompl", "ga.num_generations=20")
@@ -22,9 +24,7 @@ ANYTIME = ("RRTstar", "InformedRRTstar", "BITstar", "PRMstar")
 
 
 def condition(*words: str, label: str = "rana_planar") -> Condition:
-    (experiment,) = expand(["experiment=rrt_connect", *words], only=[label])
-    ((_, chosen),) = experiment.conditions
-    return chosen
+    return composed("experiment=rrt_connect", *words, label=label)
 
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:
@@ -70,20 +70,22 @@ def test_a_seed_is_the_same_run_whatever_ran_before(algorithm: str) -> None:
 
 
 def test_our_rrt_connect_is_no_other_than_ompls_in_distribution() -> None:
-    """First path and its price of 60 runs each: OMPL steps alike, and joins trees alike.
+    """First path and its price of many runs each: OMPL steps alike, and joins trees alike.
 
     It asks for the ends of edges of the goal's tree twice.
     """
-    plain = "planner.num_shortcuts=0"
-    ours = [ran(condition(plain, "ga.iterations_per_generation=1"), s)[2][-1] for s in range(60)]
+    plain, count = "planner.num_shortcuts=0", num_cases(12, 60)
+    ours = [ran(condition(plain, "ga.iterations_per_generation=1"), s)[2][-1] for s in range(count)]
     theirs = [
-        ran(of("RRTConnect", "ga.queries_per_generation=500", shortcuts=0), s) for s in range(60)
+        ran(of("RRTConnect", "ga.queries_per_generation=500", shortcuts=0), s) for s in range(count)
     ]
+    deviation = math.sqrt((2 * count + 1) / 12.0) / count  # of the share, were they the same
     lasts = [records[-1] for _, _, records in theirs]
     assert all(record.stop_reason == "solution" for record in [*ours, *lasts])
     for name in ("best_cost", "collision_queries"):
         one, two = ([getattr(r, name) for r in runs] for runs in (ours, lasts))
-        assert 0.35 < mannwhitneyu(one, two).statistic / 3600 < 0.65, name
+        share = mannwhitneyu(one, two).statistic / count**2
+        assert share == pytest.approx(0.5, abs=2.8 * deviation), name
 
 
 def test_algorithms_that_shorten_by_themselves_take_no_shortcuts() -> None:

@@ -5,13 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import generations
 from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
-from shipped_conditions import expanded
 
 
 @pytest.mark.parametrize("revisits", [False, True])
@@ -66,7 +66,7 @@ def test_more_paths_than_walks_and_other_planners_are_refused() -> None:
         PathClimbing(planner=own, num_paths=10**6).prepare(
             robot(), scenario(np.zeros((5, 5), dtype=bool))
         )
-    other, _ = dict(expanded("chen_placement", "smoke").conditions)["B link"].prepare()
+    other, _ = composed("experiment=chen_placement", label="B link").prepare()
     assert not isinstance(other, GridPathGa)
     with pytest.raises(SettingError, match="control: must be left out: placement_ga has no paths"):
         PathClimbing(planner=other, num_paths=1).prepare(None, None)

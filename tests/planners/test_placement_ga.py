@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.batch.replicate import run_replicate
-from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.planners.placement_ga.planner import Problem
@@ -15,9 +15,7 @@ BASE = ("experiment=chen_placement",)
 
 
 def prepared(*words: str) -> tuple[object, Problem]:
-    return (
-        compose.expand([*BASE, *words], only=["A torque norm"])[0].conditions[0].condition.prepare()
-    )
+    return composed(*BASE, *words, label="A torque norm").prepare()
 
 
 @pytest.mark.parametrize("coding", ["binary", "gray"])
@@ -89,7 +87,7 @@ def test_without_elitism_the_best_can_get_lost_and_with_it_never() -> None:
 
 def test_a_run_ends_near_the_optimum() -> None:
     words = [*BASE, "ga=chen_placement_elitism"]
-    condition = compose.expand(words, only=["A torque norm"])[0].conditions[0].condition
+    condition = composed(*words, label="A torque norm")
     costs = [run_replicate(condition, k).summary.best_cost for k in range(20)]
     assert min(costs) > 1.72761706
     assert np.median(costs) < 1.76, "the median of 60 runs is 1.728"

@@ -21,11 +21,11 @@ from references import posture_es_python
 FREE = ("corsepius_ball", "collision=corsepius_capsules")
 
 
-def differs(given: Any, fault: str = "") -> bool:
+def differs(given: Any) -> bool:
     """Return whether any generation is another one than that of the slow search."""
     planner, problem = given.prepare()
     rng, slow_rng = given.rng(0), given.rng(0)
-    expected = posture_es_python.cycles(problem, planner, slow_rng, fault)
+    expected = posture_es_python.cycles(problem, planner, slow_rng)
     found = generations(planner.evolve(problem, rng))
     last = float(len(problem.phases))
     for ours, theirs in itertools.zip_longest(found, expected):
@@ -81,11 +81,6 @@ def test_generations_are_those_of_the_slow_search(name: str, overrides: tuple[st
     assert not differs(condition(name, *overrides))
 
 
-@pytest.mark.parametrize("fault", ["no selection", "no mutation", "no crossover"])
-def test_a_fault_would_be_noticed(fault: str) -> None:
-    assert differs(condition("corsepius_ball", "ga.crossover_rate=0.5"), fault)
-
-
 @pytest.mark.examples(3)
 @pytest.mark.parametrize("replicate", range(5))
 @pytest.mark.parametrize("name", ["corsepius_ball", "corsepius_bottle", "corsepius_shelf"])
@@ -120,50 +115,6 @@ def test_the_first_cycle_has_a_size_of_its_own() -> None:
     found = log("corsepius_ball", "ga.initial_size=50")
     cycles = len(found.generations) - 1
     assert found.summary.evaluations == 1 + 50 + 100 * (cycles - 1)
-
-
-def _greatest_steps(fault: str) -> list[float]:
-    """Return the greatest step, in units of the scope, of ten paths to the ball."""
-    planner, problem = prepared("corsepius_ball")
-    found = []
-    for replicate in range(10):
-        path, _, _ = posture_es_python.path(
-            problem, planner, condition("corsepius_ball").rng(replicate), fault
-        )
-        found.append(float((np.abs(np.diff(np.array(path), axis=0)) / problem.scope).max()))
-    return found
-
-
-def test_half_the_scope_would_be_noticed() -> None:
-    """Some fifty uniform steps per path.
-
-    That none passes .9 of the scope has a probability of .9^50 per path.
-    """
-    assert min(_greatest_steps("")) > 0.9
-    assert max(_greatest_steps("half scope")) <= 0.5 + 1e-12
-
-
-def test_a_path_of_each_generations_best_would_be_noticed() -> None:
-    """Best individuals of successive generations need not be parent and child.
-
-    Steps beyond the scope are the rule.
-    """
-    assert max(_greatest_steps("")) <= 1.0 + 1e-9
-    assert np.median(_greatest_steps("best of generation")) > 1.0 + 1e-9
-
-
-def test_no_selection_would_be_noticed() -> None:
-    """Without selection the search is a random walk.
-
-    The ball, some 12 scopes away, is not met within 50 cycles.
-    """
-    planner, problem = prepared("corsepius_ball", "ga.num_generations=50")
-    reasons = []
-    for replicate in range(5):
-        rng = condition("corsepius_ball").rng(replicate)
-        reasons.append(posture_es_python.path(problem, planner, rng, "no selection")[2])
-        assert log("corsepius_ball", replicate=replicate).summary.stop_reason == "goal"
-    assert "goal" not in reasons
 
 
 def test_searches_end_by_goal_stagnation_or_cap() -> None:

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 from posture_samples import condition, log, postures, prepared, random_postures
 
+from composed import composed
 from evoexp.collision.certifier.coal_distances import CoalDistance
-from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import AXIAL, COLLISION, DISTANCE, HEADING, UPRIGHT
@@ -178,5 +178,5 @@ def test_the_model_lets_the_bottle_touch_the_table_but_not_sink_into_it() -> Non
 )
 def test_refusals_of_contacts_and_tolerances(name: str, overrides: list[str], message: str) -> None:
     with pytest.raises(EvoexpError, match=re.escape(message)) as found:
-        compose.expand([f"experiment={name}", *overrides])[0].conditions[0].condition.prepare()
+        composed(f"experiment={name}", *overrides).prepare()
     assert "\n" not in str(found.value)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from posture_samples import condition, prepared, random_postures
 
+from composed import composed
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.planners.posture_es.problem import reach
@@ -140,7 +141,7 @@ def phases(text: str) -> str:
 )
 def test_refusals(overrides: list[str], message: str) -> None:
     with pytest.raises(EvoexpError, match=re.escape(message)) as found:
-        compose.expand([BALL, *overrides])[0].conditions[0].condition.prepare()
+        composed(BALL, *overrides).prepare()
     assert "\n" not in str(found.value)
 
 
@@ -157,7 +158,7 @@ def test_refusals(overrides: list[str], message: str) -> None:
 def test_names_are_told_apart(name: str, message: str) -> None:
     overrides = ["experiment=corsepius_bottle", f"scenario.obstacles.1.name={name}"]
     with pytest.raises(EvoexpError, match=re.escape(message)):
-        compose.expand(overrides)[0].conditions[0].condition.prepare()
+        composed(*overrides).prepare()
 
 
 def test_one_thing_is_held_at_a_time() -> None:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.planner import Planner
@@ -103,14 +102,6 @@ def test_in_space_too() -> None:
     assert (slim == plain).all()
     assert (plain >= 0).sum() > (wide >= 0).sum() > 0
     assert not ((wide >= 0) & (plain < 0)).any()
-
-
-def test_the_setting_leaves_hashes_as_they_are() -> None:
-    plain, model, proven = (
-        compose.expand(["experiment=chen_path", *words])[0].conditions[0].condition.id
-        for words in ([], ["planner.acceptance=model"], ["planner.acceptance=certified"])
-    )
-    assert plain == model != proven
 
 
 def test_no_way_is_left() -> None:

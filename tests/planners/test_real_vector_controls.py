@@ -7,8 +7,8 @@ import cmaes
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.baselines.real_vectors import correlated, real_vectors, transposed_root
@@ -24,7 +24,7 @@ CONTROLS = (
 
 def control(name: str, *words: str, experiment: str = "rana_planar") -> Condition:
     given = [f"experiment={experiment}", f"control={name}", *words]
-    return compose.expand(given)[0].conditions[0].condition
+    return composed(*given)
 
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:

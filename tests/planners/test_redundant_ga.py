@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
@@ -21,7 +21,7 @@ LENGTHS = (10.0, 10.0, 10.0, 4.0, 4.0, 3.0, 2.0)
 
 
 def prepared(*overrides: str, experiment: str = "lavoie_7dof") -> tuple[RedundantGa, Problem]:
-    condition = compose.expand([f"experiment={experiment}", *overrides])[0].conditions[0].condition
+    condition = composed(f"experiment={experiment}", *overrides)
     planner, problem = condition.prepare()
     return planner, problem
 
@@ -81,7 +81,7 @@ def test_a_collision_costs_inf_and_says_where() -> None:
 @pytest.mark.parametrize("replicate", range(3))
 def test_a_whole_run_keeps_its_promises(replicate: int) -> None:
     planner, problem = prepared()
-    condition = compose.expand(["experiment=lavoie_7dof"])[0].conditions[0].condition
+    condition = composed("experiment=lavoie_7dof")
     best, searches = np.inf, []
     for generation in generations(planner.evolve(problem, condition.rng(replicate))):
         key = (generation.terms["attempts"], generation.terms["sub_path"])

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from composed import composed
 from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
@@ -33,9 +34,7 @@ POST = body("cylinder", [1.0, 0.03], [0.35, 0.35, 0.5], name="post")  # in the s
 
 
 def condition(label: str, *changes: str) -> Condition:
-    (experiment,) = expand(["experiment=rrt_connect", *changes], only=[label])
-    ((_, chosen),) = experiment.conditions
-    return chosen
+    return composed("experiment=rrt_connect", *changes, label=label)
 
 
 def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:
@@ -243,13 +242,6 @@ def test_the_cost_of_a_path_by_proof_is_inf_where_it_is_refuted() -> None:
     proving = condition(PLANAR, *COARSE, "planner.acceptance=certified").prepare()[0]
     assert planner.cost(problem, path).feasible.all()
     assert proving.cost(problem, path).cost.tolist() == [math.inf]
-
-
-def test_acceptance_is_no_part_of_the_identity_unless_it_is_asked_for() -> None:
-    plain, named = condition(PLANAR), condition(PLANAR, "planner.acceptance=model")
-    assert plain.id == named.id
-    assert b"acceptance" not in plain.to_json()
-    assert condition(PLANAR, "planner.acceptance=certified").id != plain.id
 
 
 def test_corners_are_cut_behind_the_shortcuts_and_paths_stay_free() -> None:

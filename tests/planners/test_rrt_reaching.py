@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.collision.models.ellipse_configurations import EllipseConfigurations
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
@@ -20,7 +20,7 @@ TREES = "planner=rrt_reaching", "ga=rrt_connect", "objective=null", "collision=l
 
 def condition(arm: str, *words: str) -> Condition:
     scene = f"robot=planar_{arm[7:-3]}r", f"scenario={arm}"
-    return compose.expand([*scene, *TREES, *words])[0].conditions[0].condition
+    return composed(*scene, *TREES, *words)
 
 
 def evolved(chosen: Condition, seed: int) -> list[Any]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
@@ -30,13 +31,13 @@ class Outcome(NamedTuple):
 
 def condition(*overrides: str, experiment: str = "lavoie_7dof") -> Condition:
     words = [f"experiment={experiment}", "control=sequential_search", *overrides]
-    return compose.expand(words)[0].conditions[0].condition
+    return composed(*words)
 
 
 def drawn(planner: Any, scene: lavoie_numpy.Scene, rng: np.random.Generator) -> Outcome:
     """Draw sub-path by sub-path, one population after the other, as plainly as can be."""
     ga, stops = planner.ga, (planner.stop_cost_sp1, planner.stop_cost_sp2)
-    breeding = lavoie_numpy.Breeding(ga, scene, "")
+    breeding = lavoie_numpy.Breeding(ga, scene)
     evaluations, best_plan, lowest = 0, np.inf, []
     for attempt in range(1, planner.num_attempts + 1):
         start = scene.start
@@ -153,5 +154,5 @@ def test_another_planner_is_refused_in_one_line() -> None:
 
 def test_its_hash_is_not_that_of_the_algorithm() -> None:
     assert isinstance(condition().planner, SequentialSearch)
-    plain = compose.expand(["experiment=lavoie_7dof"])[0].conditions[0].condition
+    plain = composed("experiment=lavoie_7dof")
     assert condition().id != plain.id

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -18,7 +19,7 @@ from evoexp.store.log_reader import read_log
 
 @pytest.fixture(scope="module")
 def condition() -> Condition:
-    return compose.expand(["experiment=chen_mission", "budget=smoke"])[0].conditions[0].condition
+    return composed("experiment=chen_mission", "budget=smoke")
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +145,7 @@ def test_by_proof_every_mission_is_proven() -> None:
 
 def test_a_mission_whose_end_is_refuted_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     words = "experiment=chen_mission", "budget=smoke", "planner.acceptance=certified"
-    planner, problem = compose.expand(words)[0].conditions[0].condition.prepare()
+    planner, problem = composed(*words).prepare()
     monkeypatch.setattr(Proofs, "is_proven", lambda self, plan: False)
     *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     assert not last.solved

@@ -12,39 +12,32 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-FAULTS = ("uniform selection", "no mutation", "no crossover", "lost elites")
 Draw = Callable[[], float]
 
 
 class Settings(NamedTuple):
-    """Settings that both algorithms share, and the fault that is made on purpose, if any."""
+    """Settings that both algorithms share."""
 
     num_elites: int
     crossover_rate: float
     mutation_rate: float
     multiple: float
-    fault: str
 
     @classmethod
-    def of(cls, ga: Any, fault: str) -> "Settings":
+    def of(cls, ga: Any) -> "Settings":
         """Return the settings of a `ScaledGenetic`."""
-        crossover = 0.0 if fault == "no crossover" else ga.crossover_rate
-        mutation = 0.0 if fault == "no mutation" else ga.mutation_rate
-        return cls(ga.num_elites, crossover, mutation, ga.scaling_multiple, fault)
+        return cls(ga.num_elites, ga.crossover_rate, ga.mutation_rate, ga.scaling_multiple)
 
     def elites(self, costs: list[float]) -> list[int]:
         """Return the individuals that stay, the best first."""
-        order = range(len(costs))
-        if self.fault != "lost elites":
-            order = sorted(order, key=lambda k: (costs[k], k))  # type: ignore[assignment]
-        return list(order)[: self.num_elites]
+        return sorted(range(len(costs)), key=lambda k: (costs[k], k))[: self.num_elites]
 
     def parents(self, draw: Draw, costs: list[float]) -> list[int]:
         """Choose parents by linear scaling and stochastic remainders without replacement."""
         count = len(costs) - self.num_elites
         mean, least = sum(costs) / len(costs), min(costs)
         copies = [1.0] * len(costs)
-        if mean > least and self.fault != "uniform selection":
+        if mean > least:
             for k, cost in enumerate(costs):
                 copies[k] = max(1.0 + (self.multiple - 1.0) * (mean - cost) / (mean - least), 0.0)
         total = sum(copies)
@@ -76,9 +69,9 @@ class Settings(NamedTuple):
 class Paths:
     """Operators on paths over the grid of a problem of `grid_path_ga`."""
 
-    def __init__(self, planner: Any, problem: Any, draw: Draw, fault: str) -> None:
+    def __init__(self, planner: Any, problem: Any, draw: Draw) -> None:
         grid = problem.fields.grid
-        self.settings, self.draw = Settings.of(planner.ga, fault), draw
+        self.settings, self.draw = Settings.of(planner.ga), draw
         self.moves = [[int(n) for n in row if n >= 0] for row in grid.neighbours]
         self.where, self.most = grid.coordinates.tolist(), grid.num_nodes
         self.unsafeness, self.fields = problem.fields.unsafeness.tolist(), problem.fields
@@ -174,10 +167,10 @@ def without_loops(nodes: list[int]) -> list[int]:
 
 
 def evolve_paths(
-    planner: Any, problem: Any, first: list[list[int]], rng: np.random.Generator, fault: str = ""
+    planner: Any, problem: Any, first: list[list[int]], rng: np.random.Generator
 ) -> Iterator[tuple[list[list[int]], list[float]]]:
     """Yield paths and costs of all generations from the first one on."""
-    own, paths = Paths(planner, problem, lambda: float(rng.random()), fault), first
+    own, paths = Paths(planner, problem, lambda: float(rng.random())), first
     for _ in range(planner.ga.num_generations + 1):
         costs = [own.cost(path) for path in paths]
         yield paths, costs
@@ -190,8 +183,8 @@ def evolve_paths(
 class Postures:
     """Criteria and operators of a problem of `placement_ga`."""
 
-    def __init__(self, planner: Any, problem: Any, draw: Draw, fault: str) -> None:
-        self.settings, self.draw = Settings.of(planner.ga, fault), draw
+    def __init__(self, planner: Any, problem: Any, draw: Draw) -> None:
+        self.settings, self.draw = Settings.of(planner.ga), draw
         self.bits, self.gray = planner.bits_per_gene, planner.coding == "gray"
         self.least, self.most = planner.angle_range
         self.model, self.criteria = problem.model, planner.objective
@@ -276,10 +269,10 @@ class Postures:
 
 
 def evolve_postures(
-    planner: Any, problem: Any, rng: np.random.Generator, fault: str = ""
+    planner: Any, problem: Any, rng: np.random.Generator
 ) -> Iterator[tuple[list[str], list[float], int]]:
     """Yield strings, costs and the number of feasible postures of all generations."""
-    own = Postures(planner, problem, lambda: float(rng.random()), fault)
+    own = Postures(planner, problem, lambda: float(rng.random()))
     first = np.floor(2.0**own.bits * rng.random((2, planner.ga.population_size)))
     strings = [own.string(individual) for individual in first.T]
     for _ in range(planner.ga.num_generations + 1):

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from evoexp.numeric.elementary import standard_normal
 
 Array = NDArray[np.float64]
-FAULTS = ("uniform selection", "no mutation", "no crossover", "lost elites")
 
 
 class Population(NamedTuple):
@@ -95,13 +94,12 @@ class Scene:
 class Breeding:
     """The operators of a condition's genetic algorithm."""
 
-    def __init__(self, ga: Any, scene: Scene, fault: str) -> None:
-        self.ga, self.fault, self.scene = ga, fault, scene
+    def __init__(self, ga: Any, scene: Scene) -> None:
+        self.ga, self.scene = ga, scene
         self.bits = getattr(ga, "bits_per_gene", 0)
         self.num_genes = len(scene.lengths) * (self.bits or 1)
         self.count = ga.population_size - ga.num_elites
-        self.mutation_rate = 0.0 if fault == "no mutation" else ga.mutation_rate
-        self.crossover_rate = 0.0 if fault == "no crossover" else ga.crossover_rate
+        self.mutation_rate, self.crossover_rate = ga.mutation_rate, ga.crossover_rate
 
     def first(self, rng: np.random.Generator) -> Array:
         """Draw the initial population."""
@@ -139,8 +137,6 @@ class Breeding:
             mutating.reshape(genes if of_gene else count, -1), normals, children, index
         )
         kept = np.argsort(costs, kind="stable")[: ga.num_elites]
-        if self.fault == "lost elites":
-            kept = np.arange(ga.num_elites)
         return np.hstack([children, genomes[:, kept]])
 
     def _choose(self, draws: Array, costs: Array) -> NDArray[np.int64]:
@@ -149,15 +145,13 @@ class Breeding:
         if self.ga.selection == "tournament":
             drawn = (draws.reshape(self.count, -1) * size).astype(np.int64)
             best = np.argmin(costs[drawn], axis=1)
-            if self.fault == "uniform selection":
-                best[:] = 0
             return np.asarray(drawn[np.arange(self.count), best])
         with np.errstate(divide="ignore"):
             weights = 1.0 / costs
         if self.ga.selection == "rank":
             s, ranks = self.ga.rank_pressure, scipy.stats.rankdata(-costs) - 1.0
             weights = 2.0 - s + 2.0 * (s - 1.0) * ranks / (size - 1)
-        if self.fault == "uniform selection" or not weights.any():
+        if not weights.any():
             weights = np.ones(size)
         wheel = np.cumsum(weights)
         return np.searchsorted(wheel, draws * wheel[-1], side="right")
@@ -212,10 +206,10 @@ class Breeding:
         return np.where(chosen, np.clip(mutants, low, high), x)
 
 
-def evolve(condition: Any, rng: np.random.Generator, fault: str = "") -> Iterator[Population]:
-    """Yield all generations of all searches; `fault`, one of `FAULTS`, is made on purpose."""
+def evolve(condition: Any, rng: np.random.Generator) -> Iterator[Population]:
+    """Yield all generations of all searches."""
     planner, scene = condition.planner, Scene(condition)
-    breeding = Breeding(planner.ga, scene, fault)
+    breeding = Breeding(planner.ga, scene)
     stops = planner.stop_cost_sp1, planner.stop_cost_sp2
     limits = stops if planner.success == "threshold" else (np.inf, np.inf)
     best_cost, best_via, best = np.inf, np.inf, np.empty(0)

@@ -1,14 +1,10 @@
-"""The shipped references to postures, composed once for all tests.
-
-Composing takes longer than they do.
-"""
+"""The shipped references to postures, found once for all tests."""
 
 import functools
 from typing import Any
 
-from evoexp.condition import Condition
+from composed import composed
 from evoexp.references.reference import Truth
-from shipped_conditions import expanded
 
 LABELS = {
     "torque_norm": "A torque norm",
@@ -19,13 +15,8 @@ LABELS = {
 }
 
 
-@functools.cache
-def conditions(experiment: str) -> dict[str, Condition]:
-    return dict(expanded(experiment, "paper").conditions)
-
-
 def problem(case: str) -> Any:
-    return conditions("chen_placement")[LABELS[case]].prepare()[1]
+    return composed("experiment=chen_placement", label=LABELS[case]).prepare()[1]
 
 
 @functools.cache
@@ -35,5 +26,6 @@ def found(case: str, kind: str) -> tuple[Truth, Any, Any]:
     Kind: optimum, conventional or landscape.
     """
     experiment = "chen_landscapes" if kind == "landscape" else "chen_placement"
-    planner, prepared = conditions(experiment)[f"{LABELS[case]}, {kind}"].prepare()
+    label = f"{LABELS[case]}, {kind}"
+    planner, prepared = composed(f"experiment={experiment}", label=label).prepare()
     return planner.truth(prepared), planner, prepared

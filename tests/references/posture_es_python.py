@@ -13,8 +13,6 @@ from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es.kernels import COST
 from evoexp.planners.posture_es.phases import Problem
 
-FAULTS = ("no selection", "best of generation", "half scope", "no mutation", "no crossover")
-
 
 class Cycle(NamedTuple):
     """One generation of a phase.
@@ -52,14 +50,12 @@ class _Numbers:
         return np.array([next(self._normals) for _ in range(count)])
 
 
-def cycles(
-    problem: Problem, planner: Any, rng: np.random.Generator, fault: str = ""
-) -> Iterator[Cycle]:
-    """Yield all generations of all phases; `fault`, one of `FAULTS`, is made on purpose."""
+def cycles(problem: Problem, planner: Any, rng: np.random.Generator) -> Iterator[Cycle]:
+    """Yield all generations of all phases."""
     line, evaluations, situation = [problem.start], 0, problem.first_situation
     for index in range(len(problem.phases)):
         stage = problem.begin(index, line[-1], situation)
-        for cycle in _phase(problem, planner, rng, stage, line, evaluations, fault):
+        for cycle in _phase(problem, planner, rng, stage, line, evaluations):
             yield cycle
         if cycle.reason != "goal":
             return
@@ -69,7 +65,7 @@ def cycles(
 
 def _phase(
     problem: Problem, planner: Any, rng: np.random.Generator, stage: Any, line: list[Any],
-    evaluations: int, fault: str,
+    evaluations: int,
 ) -> Iterator[Cycle]:  # fmt: skip
     ga, nq = planner.ga, len(problem.scope)
     judged = stage.judge(line[-1][:, None])
@@ -90,7 +86,7 @@ def _phase(
             bred * ((nq if gaussian else 0) + ranked),
         )
         scope = problem.scope * stage.phase.scope_share
-        children = [_bred(problem, ga, numbers, parents, n, scope, fault) for n in range(bred)]
+        children = [_bred(problem, ga, numbers, parents, n, scope) for n in range(bred)]
         children += [_immigrant(problem, numbers, parents, scope) for _ in range(ga.num_immigrants)]
         postures = np.array([child[-1] for child in children]).T
         judged = stage.judge(postures)
@@ -112,16 +108,12 @@ def _phase(
         yield Cycle(postures, costs, feasible, best, best_cost, evaluations, reason)
         members = [(cost, children[n]) for cost, n in usable]
         members += parents if ga.selection == "plus" else []
-        if fault != "no selection":
-            members = sorted(
-                members, key=lambda member: member[0]
-            )  # stable: the first among equals
+        members = sorted(members, key=lambda member: member[0])  # stable: the first among equals
         parents = members[: ga.num_parents] or parents
 
 
 def _bred(
     problem: Problem, ga: Any, numbers: _Numbers, parents: list[Any], n: int, scope: Any,
-    fault: str,
 ) -> list[Any]:  # fmt: skip
     """Return a child of the n-th choice of a parent: perhaps crossed, then mutated."""
     nq, number = len(problem.scope), n % len(parents)
@@ -132,12 +124,11 @@ def _bred(
     child = line[-1].copy()
     if ga.crossover_rate > 0.0:
         (decision, place), taken = numbers.uniforms(2), numbers.uniforms(nq) < 0.5
-        if decision < ga.crossover_rate and fault != "no crossover":
+        if decision < ga.crossover_rate:
             child = np.where(taken, parents[int(place * len(parents))][1][-1], child)
-    reach = scope * {"half scope": 0.5, "no mutation": 0.0}.get(fault, 1.0)
     gaussian = ga.mutation == "gaussian"
     step = ga.mutation_std * numbers.normals(nq) if gaussian else 2.0 * numbers.uniforms(nq) - 1.0
-    child = np.clip(child + reach * step, *problem.limits.T)
+    child = np.clip(child + scope * step, *problem.limits.T)
     return [*(_nearest(parents, child, scope) if ga.crossover_rate > 0.0 else line), child]
 
 
@@ -154,14 +145,7 @@ def _nearest(parents: list[Any], child: Any, scope: Any) -> list[Any]:
     return line
 
 
-def path(
-    problem: Problem, planner: Any, rng: np.random.Generator, fault: str = ""
-) -> tuple[Any, int, str]:
+def path(problem: Problem, planner: Any, rng: np.random.Generator) -> tuple[Any, int, str]:
     """Search all phases; return postures, evaluations, and why the search ended."""
-    found = list(cycles(problem, planner, rng, fault))
-    if fault == "best of generation":
-        best = [
-            one.postures[:, np.argmin(np.where(one.feasible, one.costs, np.inf))] for one in found
-        ]
-        return best, found[-1].evaluations, found[-1].reason
+    found = list(cycles(problem, planner, rng))
     return found[-1].best, found[-1].evaluations, found[-1].reason

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.references.grid_exchanges import Exchanges
 from evoexp.references.grid_frontier import frontier
 from evoexp.references.grid_networks import network_of
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
-from shipped_conditions import expanded
 
 
 def descended(own: Any, problem: Any, path: np.ndarray, longest: int) -> np.ndarray:
@@ -86,7 +86,7 @@ def test_improved_paths_are_nearly_always_the_best_of_all(
 @pytest.mark.matrix
 @pytest.mark.parametrize("label", ["(b), exact", "(c), exact"])
 def test_no_exchange_of_three_nodes_improves_the_best_path_known(label: str) -> None:
-    own, problem = dict(expanded("chen_path", "paper").conditions)[label].prepare()
+    own, problem = composed("experiment=chen_path", label=label).prepare()
     truth = own.truth(problem)
     nodes = truth.best.reshape(-1, 2).astype(int)
     grid = problem.fields.grid

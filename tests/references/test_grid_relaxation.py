@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.references.grid_frontier import GridFrontier
 from evoexp.references.grid_networks import arrivals_of, network_of
 from evoexp.references.grid_relaxation import relaxed, without_loops
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
 from references.test_grid_frontier import SETTINGS
-from shipped_conditions import expanded
 
 
 @pytest.mark.examples(8)
@@ -56,7 +56,7 @@ def test_a_walk_without_its_loops() -> None:
 def test_the_truth_of_the_papers_workspace_is_known_within_one_per_cent(
     label: str, least: float
 ) -> None:
-    own, problem = dict(expanded("chen_path", "paper").conditions)[label].prepare()
+    own, problem = composed("experiment=chen_path", label=label).prepare()
     truth = own.truth(problem)
     assert least < truth.terms["lower_bound"] <= truth.cost
     assert truth.cost <= 1.01 * truth.terms["lower_bound"]

@@ -8,10 +8,11 @@ import functools
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.references.placement_programme import directions_of
 from references import placement_complex as slow
 from references.placement_numpy import dense_least
-from references.placement_samples import conditions, found
+from references.placement_samples import found
 
 CASES = {  # E of the optimum as first found; see the test with another parametrisation
     "torque_norm": 1.7276170655,
@@ -61,7 +62,7 @@ def test_the_minimax_optimum_has_equal_torques() -> None:
     [([[-180, 60], [-180, 180], [-180, 180]], 0), ([[-180, 180], [60, 90], [-180, 180]], 1)],
 )
 def test_optima_within_joint_limits_lie_on_them(limit: list[list[int]], k: int) -> None:
-    own = conditions("chen_placement")["A torque norm, optimum"]
+    own = composed("experiment=chen_placement", label="A torque norm, optimum")
     robot = own.robot.model_copy(
         update={"joint_limits": tuple((float(low), float(high)) for low, high in limit)}
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.batch import replicate
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import difference, farthest, fingerprint, same_fingerprint
@@ -62,15 +63,10 @@ def test_a_reference_stands_around_the_planner_and_overrides_reach_it() -> None:
 
 
 def test_the_group_is_no_part_of_other_identities() -> None:
-    without = compose.expand(["experiment=rana_obstacles"])[0].conditions[0].condition
+    without = composed("experiment=rana_obstacles")
     assert not without.is_reference
     assert without.num_replicates(7) == 7
-    assert (
-        compose.expand(["experiment=rana_obstacles", "reference=null"])[0]
-        .conditions[0]
-        .condition.id
-        == without.id
-    )
+    assert composed("experiment=rana_obstacles", "reference=null").id == without.id
 
 
 @pytest.mark.parametrize(
@@ -96,7 +92,7 @@ def test_a_reference_needs_its_name() -> None:
 
 
 def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
-    found = compose.expand(WORDS)[0].conditions[0].condition
+    found = composed(*WORDS)
     content = run_replicate(found, 0).content
     log = read_log(content)
     assert len(log.generations) == 1
@@ -117,7 +113,7 @@ def test_run_list_show_reproduce_report(
     for budget in ("paper", "smoke"):
         printed = said("run", *WORDS, "num_replicates=4", f"budget={budget}")
         assert "1 of 1" in printed
-    found = compose.expand(WORDS)[0].conditions[0].condition
+    found = composed(*WORDS)
     assert found.id[:12] in said("list")
     shown = said("show", found.id[:12])
     assert "array table: 3 × 3" in shown
@@ -138,8 +134,8 @@ def test_the_report_reads_references_beside_the_planners(
     said("run", *WORDS[:-1], "num_replicates=2")
     said("run", *WORDS, "num_replicates=2")
     conditions = [
-        ("ga", compose.expand(WORDS[:-1])[0].conditions[0].condition),
-        ("truth", compose.expand(WORDS)[0].conditions[0].condition),
+        ("ga", composed(*WORDS[:-1])),
+        ("truth", composed(*WORDS)),
     ]
     results = gather(tmp_path / "outputs", conditions, 2, "", "", "")
     ga, truth = results.conditions
@@ -170,8 +166,8 @@ def test_numbers_are_compared_to_a_tolerance() -> None:
 
 
 def test_arrays_that_are_missing_differ() -> None:
-    found = compose.expand(WORDS)[0].conditions[0].condition
-    other = compose.expand([*WORDS, "+reference.rows=4"])[0].conditions[0].condition
+    found = composed(*WORDS)
+    other = composed(*WORDS, "+reference.rows=4")
     one, two = (read_log(run_replicate(c, 0).content) for c in (found, other))
     assert farthest(one, one) == ("", 0.0)
     taller = one._replace(attachments=two.attachments)
@@ -184,7 +180,7 @@ def test_references_run_first(tmp_path: Path) -> None:
     from evoexp.batch.runner import Batch
     from evoexp.batch.runner_settings import RunnerSettings
 
-    planner, truth = (compose.expand(w)[0].conditions[0].condition for w in (WORDS[:-1], WORDS))
+    planner, truth = (composed(*w) for w in (WORDS[:-1], WORDS))
     batch = Batch([(planner, 2, {}), (truth, 1, {})], RunnerSettings(num_workers=1), tmp_path)
     assert [job.condition_id for job in batch.jobs] == [truth.id, planner.id, planner.id]
     assert len(list(batch.run())) == 3

@@ -110,7 +110,8 @@ def test_settings_are_refused_before_anything_is_drawn(
 
 def test_the_width_is_that_of_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
-    words = "experiment=rana_planar", "budget=smoke", "--only", "via-point GA", "report.dpi=40"
+    words = "experiment=rana_planar", "budget=smoke", "--only", "via-point GA"
+    words = *words, "report.dpi=40", "report.formats=[png]"
     widths = {}
     for width in ("page", "column"):
         assert main(["run", *words, f"report.width={width}"]) == 0

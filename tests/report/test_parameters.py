@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from composed import alone, composed
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
@@ -27,8 +28,8 @@ def of(
     *overrides: str, name: str = "rana_planar", budget: str = "paper", label: int = 0
 ) -> dict[str, Parameter]:
     """Return the parameters of a condition that nobody ran, by name."""
-    experiment = compose.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
-    text, condition = experiment.conditions[label]
+    experiment = alone(f"experiment={name}", f"budget={budget}", *overrides, label=label)
+    ((text, condition),) = experiment.conditions
     found = nobodys(text, condition, experiment.options[text], experiment.num_replicates)
     rows = parameters.parameters(Results(name, budget, (found,)), found)
     assert len({row.name for row in rows}) == len(rows)
@@ -91,7 +92,7 @@ def test_another_option_than_the_experiments_own_is_recognised() -> None:
 
 
 def test_options_that_nothing_records_are_those_that_settings_are_most_like() -> None:
-    condition = compose.expand(["experiment=rana_three_arms"])[0].conditions[0].condition
+    condition = composed("experiment=rana_three_arms")
     found = nobodys("", condition)
     rows = {row.name: row for row in parameters.parameters(Results("", "", (found,)), found)}
     assert rows["robot"].source == "most like conf/robot/three_planar_2r.yaml"

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from composed import composed
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.batch.reproduction import ELSEWHERE, OLDER, compare
 from evoexp.cli import main
-from evoexp.configuration import compose
 from evoexp.records import TIMES, ReplicateSummary
 from evoexp.store import log as log_module
 from evoexp.store.log_reader import LogContents, read_log
@@ -23,7 +23,7 @@ WORDS = ["experiment=chen_path", "budget=smoke"]  # boxes, whose exact distance 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a small log of a motion among boxes."""
-    condition = compose.expand(WORDS)[0].conditions[0].condition
+    condition = composed(*WORDS)
     path = tmp_path_factory.mktemp("logs") / "0000.mcap"
     path.write_bytes(run_replicate(condition, 0).content)
     return path
@@ -118,7 +118,7 @@ def test_where_bits_may_differ_numbers_are_compared_and_it_is_said(
 def test_the_command_names_the_field(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    condition = compose.expand(WORDS)[0].conditions[0].condition
+    condition = composed(*WORDS)
     encode = log_module.encode_summary
     with monkeypatch.context() as patch:
         patch.setattr(

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import Comparison, reproduce_log
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.records import Generation, generations
 
@@ -33,7 +33,7 @@ Change = Callable[[Iterator[Generation], np.random.Generator], Iterator[Generati
 
 def labelled(label: str) -> Condition:
     words = [f"experiment={LABELS[label]}", "budget=smoke"]
-    return compose.expand(words, only=[label])[0].conditions[0].condition
+    return composed(*words, label=label)
 
 
 @pytest.fixture(params=LABELS, scope="module")

@@ -2,7 +2,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.configuration import compose
+from composed import composed
 from evoexp.errors import SettingError
 from evoexp.robots.dh_chain import DhChain, DhJoint
 from evoexp.robots.poses import compose as behind
@@ -13,7 +13,7 @@ SPHERE = {"name": "ball", "joint": 1, "shape": "sphere", "center": (0.0, 0.0, 0.
 
 
 def robot(experiment: str) -> DhChain:
-    found = compose.expand([f"experiment={experiment}"])[0].conditions[0].condition.robot
+    found = composed(f"experiment={experiment}").robot
     assert isinstance(found, DhChain)
     return found
 

@@ -13,6 +13,7 @@ import yaml
 from test_moveit import mesh, random_pose
 
 import evoexp
+from composed import composed
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
@@ -88,7 +89,7 @@ def judge(message: dict[str, Any], judged: MoveitScene, world: Any, obstacles: A
     "problem", sorted(path.name for path in (ASSETS / "problems").iterdir()), ids=str
 )
 def test_every_object_of_motionbenchmaker_stands_where_moveit_puts_it(problem: str) -> None:
-    condition = conditions("experiment=motionbenchmaker")[problem]
+    condition = composed("experiment=motionbenchmaker", label=problem)
     message = yaml.safe_load((ASSETS / "problems" / problem / "scene0001.yaml").read_text())
     robot = problem.rpartition("_")[2]
     urdf = (ASSETS / robot / f"{robot}.urdf").read_text()

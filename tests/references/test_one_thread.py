@@ -5,7 +5,7 @@ import scipy.linalg  # noqa: F401  # loads the BLAS whose threads are counted
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.references.one_thread import one_thread
+from evoexp.references.reference import one_thread
 from masked_logs import masked_log
 from shipped_conditions import expanded
 

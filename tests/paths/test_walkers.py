@@ -1,7 +1,6 @@
 """Walkers against walkers written plainly, who take the same random words in the same order."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -87,13 +86,3 @@ def test_a_walk_to_where_it_begins_is_one_node() -> None:
     walkers = Walkers(choice_table(world.moves), (world.ends[1], world.ends[1]), True, paths)
     assert (walkers.complete, walkers.go(random_words(0, 8))) == (3, 0)
     assert [nodes_of(path) for path in paths] == [[world.ends[1]]] * 3
-
-
-def test_tables_and_words_that_kernels_would_misread_are_refused() -> None:
-    world = World((4, 4), 0.0, 0, (1.0, 3.0))
-    choices = choice_table(world.moves)
-    for paths in (table(world, 3)[:, 1:], table(world, 3).astype(np.int64), table(world, 3)[0]):
-        with pytest.raises(ValueError, match="paths must be int32"):
-            Walkers(choices, world.ends, True, paths)
-    with pytest.raises(ValueError, match="words must be uint64"):
-        Walkers(choices, world.ends, True, table(world, 3)).go(np.zeros(4))

@@ -6,7 +6,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from composed import composed
 from evoexp.batch.replicate import run_replicate
-from evoexp.references.one_thread import one_thread
+from evoexp.references.reference import one_thread
 from masked_logs import masked_log
 
 LABEL = "B platform, conventional"  # whose optimiser takes other steps with two threads

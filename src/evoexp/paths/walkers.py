@@ -64,17 +64,9 @@ class Walkers:
             ends: Indices of start and target.
             erase: Whether loops are erased.
             paths: (paths, nodes + 1), written: a path's number of nodes, then the nodes.
-
-        Raises:
-            ValueError: If `paths` has another shape or type.
         """
-        nodes = choices.entries.shape[1]
-        if paths.ndim != 2 or paths.shape[1] != nodes + 1 or paths.dtype != np.int32:
-            raise ValueError(
-                f"paths must be int32 (paths, {nodes + 1}), were {paths.dtype} {paths.shape}"
-            )
         start, goal = ends
-        self._state = State.at(start, nodes, erase)
+        self._state = State.at(start, choices.entries.shape[1], erase)
         self._choices, self._ends, self._erase, self._paths = choices, ends, erase, paths
         if start == goal:
             paths[:, 0], paths[:, 1] = 1, start
@@ -94,12 +86,7 @@ class Walkers:
 
         Returns:
             Number of words taken.
-
-        Raises:
-            ValueError: If words has another type.
         """
-        if words.dtype != np.uint64:
-            raise ValueError(f"words must be uint64, were {words.dtype}")
         return _go(words, self._choices, self._ends, self._erase, self._state, self._paths)
 
 

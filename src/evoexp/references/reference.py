@@ -7,6 +7,8 @@ compares its numbers, to 1e-9, and not its digest.
 """
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -15,7 +17,6 @@ from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.planners.planner import Candidate, Keeper, Reproducibility
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Block, FloatArray
-from evoexp.references.one_thread import one_thread
 
 
 class Truth(NamedTuple):
@@ -70,3 +71,25 @@ class Reference(WrappedPlanner):
             collision_queries=0,
             arrays=dict(found.arrays),
         )
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let BLAS and LAPACK use one thread in the body, however many they use elsewhere.
+
+    OpenBLAS gives other last digits with two threads than with one, and an optimiser that builds on
+    them takes other steps. A worker has one thread by its environment, but a replicate also runs
+    where numpy was loaded with all of them: `reproduce`, `runner=serial`, a notebook.
+    """
+    import scipy.linalg  # noqa: F401  # it brings a BLAS of its own, limited once it is loaded
+
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _libraries() -> Any:
+    """Look once for the libraries that are loaded; it takes some milliseconds."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -10,6 +10,7 @@ import pinocchio as pin
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
+from evoexp.robots.bodies import along
 from evoexp.robots.kinematics import KinematicTable, check_size, kinematic_table
 from evoexp.validation import Component
 
@@ -255,7 +256,7 @@ def link_capsule(link: Link, name: str) -> Any:
             name, link.joint, 0, pin.SE3(np.eye(3), link.start), coal.Sphere(link.radius)
         )
     shape = coal.Capsule(link.radius, length(link.end - link.start))
-    return pin.GeometryObject(name, link.joint, 0, _along(link.start, link.end), shape)
+    return pin.GeometryObject(name, link.joint, 0, along(link.start, link.end), shape)
 
 
 def sphere_geometry(
@@ -276,15 +277,3 @@ def sphere_geometry(
             pin.GeometryObject(f"sphere_{k}", int(joint), 0, placement, coal.Sphere(radius))
         )
     return geometry
-
-
-def _along(start: FloatArray, end: FloatArray) -> Any:
-    """Return the placement of a capsule (coal draws it along z, centred) on a segment."""
-    direction = end - start
-    reach = length(direction)
-    rotation = np.eye(3)
-    if reach > 0.0:
-        rotation = pin.Quaternion.FromTwoVectors(
-            np.array([0.0, 0.0, 1.0]), direction / reach
-        ).toRotationMatrix()
-    return pin.SE3(rotation, 0.5 * (start + end))

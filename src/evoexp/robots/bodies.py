@@ -8,7 +8,9 @@ import pinocchio as pin
 from pydantic import Field
 
 from evoexp.errors import SettingError
+from evoexp.numeric.ordered_sums import length
 from evoexp.numeric.rotations import rotation_matrix
+from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 
 Point3 = tuple[float, float, float]
@@ -75,15 +77,22 @@ def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
         return coal.Box(*body.size), pin.SE3(np.eye(3), np.array(body.center))
     assert isinstance(body, CapsuleBody | CylinderBody)
     start, end = np.array(body.start), np.array(body.end)
-    along = end - start
-    length = float(np.sqrt(np.sum(along * along)))
-    if length == 0.0:
+    reach = length(end - start)
+    if reach == 0.0:
         raise SettingError(f"{field}.end", "another point than start", list(body.end))
     kind = coal.Capsule if isinstance(body, CapsuleBody) else coal.Cylinder
-    turn = pin.Quaternion.FromTwoVectors(
-        np.array([0.0, 0.0, 1.0]), along / length
-    ).toRotationMatrix()
-    return kind(body.radius, length), pin.SE3(turn, 0.5 * (start + end))
+    return kind(body.radius, reach), along(start, end)
+
+
+def along(start: FloatArray, end: FloatArray) -> Any:
+    """Return the `pin.SE3` of a capsule or cylinder (coal draws them along z) on a segment."""
+    direction = end - start
+    reach = length(direction)
+    rotation = np.eye(3)
+    if reach > 0.0:
+        upright = np.array([0.0, 0.0, 1.0])
+        rotation = pin.Quaternion.FromTwoVectors(upright, direction / reach).toRotationMatrix()
+    return pin.SE3(rotation, 0.5 * (start + end))
 
 
 def placed(position: Point3, angles: Point3) -> Any:

@@ -10,9 +10,8 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.robots.assembly import Chain, Link
+from evoexp.robots.bodies import Point3
 from evoexp.validation import NonNegative, Settings
-
-Point3 = tuple[float, float, float]
 
 
 class SerialJoint(Settings):

@@ -181,9 +181,9 @@ class Urdf(Chain):
 
     def chains(self) -> tuple[Arm, ...]:
         """Return the arms: one, or one per group."""
-        (root, joints), roles, model = self._file, self._roles(), self._model()
-        check_room(root, roles, "robot.path")
-        values, tips = standing_values(self.fixed, joints, roles), self._tips(roles.tips)
+        roles, model = self._roles(), self._model()
+        check_room(self._file, roles, "robot.path")
+        values, tips = standing_values(self.fixed, self._file.joints, roles), self._tips(roles.tips)
         bodies, base = self._geometry(model), self._base(model)
         tree = UrdfTree(model, bodies, base, roles, values, tips, self._srdf)
         return tuple(UrdfArm(tree, k) for k in range(len(roles.arms)))
@@ -195,7 +195,7 @@ class Urdf(Chain):
     def notes(self) -> list[str]:
         """Remark on what the URDF leaves open: bodies, limits, units."""
         meshes = {mesh.name: mesh.file.content for mesh in self.meshes}
-        return list(urdf_notes(self._file.root, self._roles(), self._rules, meshes))
+        return list(urdf_notes(self._file, self._roles(), self._rules, meshes))
 
     @property
     def _file(self) -> UrdfFile:

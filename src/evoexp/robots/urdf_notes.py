@@ -6,62 +6,54 @@ from typing import Any
 from evoexp.errors import SettingError
 from evoexp.robots.joint_choice import JointRoles
 from evoexp.robots.mesh_checks import unit_of
+from evoexp.robots.urdf_reading import UrdfFile
 from evoexp.robots.urdf_rewriting import JointRules, coordinate_names
+from evoexp.robots.urdf_text import JointText
 
 LIMIT_SETTINGS = {"revolute": ("turn_limit", "deg"), "prismatic": ("slide_limit", "m")}
 
 
-def check_room(root: Any, roles: JointRoles, field: str) -> None:
+def check_room(file: UrdfFile, roles: JointRoles, field: str) -> None:
     """Check that joints that move of their own have room between their limits.
 
     Args:
-        root: Of the URDF, that `read_urdf` returned.
+        file: The URDF.
         roles: Which joints move.
         field: That names the URDF, for errors.
 
     Raises:
         SettingError: If both limits of one are 0, as exporters write them where none are known.
     """
-    moving = frozenset[str]().union(*roles.arms)
-    for joint in root.iterfind("joint"):
-        limit, setting = joint.find("limit"), LIMIT_SETTINGS.get(joint.get("type"), ("",))[0]
-        if limit is None or not setting or joint.get("name") not in moving:
-            continue
-        given = [side for side in ("lower", "upper") if limit.get(side) is not None]
-        if given and all(float(limit.get(side)) == 0.0 for side in given):
+    for joint, setting, _ in _limited(file, roles):
+        given = [limit for limit in joint.limits if limit is not None]
+        if given and not any(given):
             must = "a URDF whose moving joints have room between their limits"
             hint = f"; without limits robot.{setting} holds, and robot.joints leaves it standing"
-            raise SettingError(field, must, f"joint '{joint.get('name')}': 0 to 0", hint)
+            raise SettingError(field, must, f"joint '{joint.name}': 0 to 0", hint)
 
 
 def urdf_notes(
-    root: Any, roles: JointRoles, rules: JointRules, meshes: Mapping[str, bytes]
+    file: UrdfFile, roles: JointRoles, rules: JointRules, meshes: Mapping[str, bytes]
 ) -> Iterator[str]:
     """Yield a remark on each of the things that a URDF leaves open.
 
     Args:
-        root: Of the URDF, that `read_urdf` returned.
+        file: The URDF.
         roles: Which joints move.
         rules: How joints are taken that have no limits.
         meshes: Contents of meshes by their names.
     """
-    if bare := [
-        link for link in _moving_links(root, roles, rules) if link.find("collision") is None
-    ]:
-        yield f"links that move and have no body: {', '.join(link.get('name') for link in bare)}"
-    moving = frozenset[str]().union(*roles.arms)
-    for joint in root.iterfind("joint"):
-        kind, limit = joint.get("type"), joint.find("limit")
-        if kind not in LIMIT_SETTINGS or joint.get("name") not in moving:
-            continue
-        absent = [side for side in ("lower", "upper") if limit is None or limit.get(side) is None]
+    moving = _moving_links(file, roles, rules)
+    if bare := [link.get("name") for link in moving if link.find("collision") is None]:
+        yield f"links that move and have no body: {', '.join(bare)}"
+    for joint, setting, unit in _limited(file, roles):
+        sides = zip(("lower", "upper"), joint.limits, strict=True)
+        absent = [side for side, limit in sides if limit is None]
         if len(absent) == 2:
-            setting, unit = LIMIT_SETTINGS[kind]
             most = f"robot.{setting} holds, {getattr(rules, setting):g} {unit} to either side"
-            yield f"joint '{joint.get('name')}': the URDF gives no limits; {most}"
+            yield f"joint '{joint.name}': the URDF gives no limits; {most}"
         elif absent:
-            side = absent[0]
-            yield f"joint '{joint.get('name')}': the URDF gives no {side} limit, which counts as 0"
+            yield f"joint '{joint.name}': the URDF gives no {absent[0]} limit, which counts as 0"
     for name, content in meshes.items():
         if (metres := unit_of(content, name)) != 1.0:
             yield (
@@ -70,16 +62,23 @@ def urdf_notes(
             )
 
 
-def _moving_links(root: Any, roles: JointRoles, rules: JointRules) -> Iterator[Any]:
+def _limited(file: UrdfFile, roles: JointRoles) -> Iterator[tuple[JointText, str, str]]:
+    """Yield the joints between limits that move of their own, with the setting without them."""
+    moving = frozenset[str]().union(*roles.arms)
+    for joint in file.joints.values():
+        if joint.kind in LIMIT_SETTINGS and joint.name in moving:
+            yield joint, *LIMIT_SETTINGS[joint.kind]
+
+
+def _moving_links(file: UrdfFile, roles: JointRoles, rules: JointRules) -> Iterator[Any]:
     """Yield the links that a joint carries which moves of its own or follows one that does."""
     free = frozenset[str]().union(*roles.arms)
-    above = {joint.find("child").get("link"): joint for joint in root.iterfind("joint")}
-    for link in root.iterfind("link"):
+    above = {joint.child: joint for joint in file.joints.values()}
+    for link in file.root.iterfind("link"):
         carried, name = rules.base in ("planar", "floating"), link.get("name")
         while not carried and (joint := above.get(name)) is not None:
-            joint_name = joint.get("name")
-            source = roles.rules[joint_name].source if joint_name in roles.rules else joint_name
-            carried = not free.isdisjoint({source, *coordinate_names(source, joint.get("type"))})
-            name = joint.find("parent").get("link")
+            source = roles.rules[joint.name].source if joint.name in roles.rules else joint.name
+            carried = not free.isdisjoint({source, *coordinate_names(source, joint.kind)})
+            name = joint.parent
         if carried:
             yield link

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_text import JointText, parsed_xml, read_joints
+from evoexp.robots.urdf_text import JointText, check_rules, parsed_xml, read_joints
 
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
@@ -82,8 +82,10 @@ def urdf_file(content: bytes, field: str = "robot.path") -> UrdfFile:
         SettingError: If it cannot be, by link or joint.
     """
     root = read_urdf(content, field)
-    check_tree(root, field)
-    return UrdfFile(root, read_joints(root, field))
+    joints = read_joints(root)
+    check_tree([link.get("name") for link in root.iterfind("link")], joints, field)
+    check_rules(joints, field)
+    return UrdfFile(root, joints)
 
 
 def read_urdf(content: bytes, field: str) -> Any:
@@ -118,37 +120,34 @@ def read_urdf(content: bytes, field: str) -> Any:
     return root
 
 
-def check_tree(root: Any, field: str) -> None:
+def check_tree(links: list[str], joints: dict[str, JointText], field: str) -> None:
     """Check that joints join the links of a URDF to one tree.
 
     Args:
-        root: That `read_urdf` returned.
-        field: That names it, for errors.
+        links: Their names.
+        joints: By their names.
+        field: That names the URDF, for errors.
 
     Raises:
         SettingError: If a link is not there, hangs on two joints or in a loop, or if there are
             several roots.
     """
-    links = [link.get("name") for link in root.iterfind("link")]
-    above: dict[str, tuple[str, str]] = {}  # link → the joint that carries it, and its parent
-    for joint in root.iterfind("joint"):
-        name, parent, child = (
-            joint.get("name"), *(joint.find(end).get("link") for end in ("parent", "child"))
-        )  # fmt: skip
-        for link in (parent, child):
+    above: dict[str, JointText] = {}  # link → the joint that carries it
+    for joint in joints.values():
+        for link in (joint.parent, joint.child):
             if link not in links:
-                must = f"a URDF that has the links of joint '{name}'"
+                must = f"a URDF that has the links of joint '{joint.name}'"
                 raise SettingError(field, must, f"without '{link}'", nearest(link, links))
-        if child in above:
+        if joint.child in above:
             must = "a URDF whose links hang on one joint each"
-            was = f"link '{child}' on joints '{above[child][0]}' and '{name}'"
+            was = f"link '{joint.child}' on joints '{above[joint.child].name}' and '{joint.name}'"
             raise SettingError(field, must, was)
-        above[child] = name, parent
+        above[joint.child] = joint
     roots = [link for link in links if link not in above]
     for link in links:
         passed = [link]
         while passed[-1] in above:
-            passed.append(above[passed[-1]][1])
+            passed.append(above[passed[-1]].parent)
             if passed[-1] == link:
                 must = "a URDF whose links form a tree"
                 raise SettingError(field, must, f"a loop: {' → '.join(passed[::-1])}")

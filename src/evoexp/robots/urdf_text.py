@@ -27,6 +27,8 @@ class JointText(NamedTuple):
     parent: str  # the link that carries it
     child: str  # the link that it carries
     mimic: Mimic | None  # the rule by which it follows another joint; None: it moves of its own
+    # its least and greatest coordinate [rad, m]; None: the file gives none
+    limits: tuple[float | None, float | None]
 
 
 def file_content(path: Any, field: str) -> bytes:
@@ -96,15 +98,8 @@ class _PlainTree(ET.TreeBuilder):
         return super().end(tag)
 
 
-def read_joints(root: Any, field: str) -> dict[str, JointText]:
-    """Read the joints of a URDF that `read_urdf` returned.
-
-    Returns:
-        Them by their names, in the file's order.
-
-    Raises:
-        SettingError: If a joint follows one that is not there, or itself.
-    """
+def read_joints(root: Any) -> dict[str, JointText]:
+    """Read the joints of a URDF that `read_urdf` returned, in the file's order, by their names."""
     found = {}
     for joint in root.iterfind("joint"):
         rule, mimic = joint.find("mimic"), None
@@ -112,22 +107,27 @@ def read_joints(root: Any, field: str) -> dict[str, JointText]:
             numbers = (float(rule.get("multiplier", "1")), float(rule.get("offset", "0")))
             mimic = Mimic(str(rule.get("joint")), *numbers)
         parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
-        name = joint.get("name")
-        found[name] = JointText(name, joint.get("type"), parent, child, mimic)
-    for joint in found.values():
-        _check_rule(joint, found, field)
+        name, limit = joint.get("name"), joint.find("limit")
+        texts = [None if limit is None else limit.get(side) for side in ("lower", "upper")]
+        lower, upper = (None if text is None else float(text) for text in texts)
+        found[name] = JointText(name, joint.get("type"), parent, child, mimic, (lower, upper))
     return found
 
 
-def _check_rule(joint: JointText, joints: dict[str, JointText], field: str) -> None:
-    """Follow the rules from one joint to another, to one that moves of its own or stands."""
-    passed = [joint.name]
-    while joint.mimic is not None:
-        if joint.mimic.source not in joints:
-            must = "a URDF whose joints follow joints that are there"
-            raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
-        joint = joints[joint.mimic.source]
-        if joint.name in passed:
-            must = "a URDF whose joints do not follow themselves"
-            raise SettingError(field, must, " → ".join([*passed, joint.name]))
-        passed.append(joint.name)
+def check_rules(joints: dict[str, JointText], field: str) -> None:
+    """Check that each rule leads to a joint that moves of its own or stands.
+
+    Raises:
+        SettingError: If a joint follows one that is not there, or itself.
+    """
+    for joint in joints.values():
+        passed = [joint.name]
+        while joint.mimic is not None:
+            if joint.mimic.source not in joints:
+                must = "a URDF whose joints follow joints that are there"
+                raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
+            joint = joints[joint.mimic.source]
+            if joint.name in passed:
+                must = "a URDF whose joints do not follow themselves"
+                raise SettingError(field, must, " → ".join([*passed, joint.name]))
+            passed.append(joint.name)

@@ -124,16 +124,12 @@ def _hull(points: FloatArray, pose: Pose, name: str) -> HullObstacle:
 
 def _parts(corners: FloatArray, triangles: IntArray) -> list[FloatArray]:
     """Return the corners of the parts of a mesh; corners at one place are one."""
+    from scipy.sparse import coo_array, csgraph  # few scenes have meshes
+
     places, same = np.unique(corners, axis=0, return_inverse=True)
-    root = np.arange(len(places))
     linked = same.reshape(-1)[triangles]
-    while True:  # every corner takes the least number among its triangles'
-        least = root[linked].min(axis=1)
-        new = root.copy()
-        np.minimum.at(new, linked.ravel(), np.repeat(least, 3))
-        new = new[new]
-        if np.array_equal(new, root):
-            break
-        root = new
-    used = np.unique(linked)
-    return [places[used[root[used] == part]] for part in np.unique(root[used])]
+    ends = np.repeat(linked[:, 0], 2), linked[:, 1:].ravel()
+    graph = coo_array((np.ones(len(ends[0])), ends), shape=(len(places),) * 2)
+    _, part = csgraph.connected_components(graph, directed=False)
+    used = np.unique(linked)  # parts are numbered by their first corners
+    return [places[used[part[used] == own]] for own in np.unique(part[used])]

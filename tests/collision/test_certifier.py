@@ -422,11 +422,11 @@ def test_the_tolerance_decides_what_touches() -> None:
     assert certify(built, motion, contact_tolerance=1e-3).status == "refuted"
 
 
-def test_the_clock_is_the_callers() -> None:
-    built = scene(link(3.0, (0.0, 0.0)).build())
-    ticks = iter((3.0, 5.5))
-    assert certify(built, Motion(np.zeros((2, 1))), clock=lambda: next(ticks)).duration_s == 2.5
-    assert np.isnan(certify(built, Motion(np.zeros((2, 1)))).duration_s)
+def test_a_distance_is_computed_once_and_counted_each_time() -> None:
+    built = scene(Slider(base=(0.0, 0.0, 0.0), radius=0.1).build(), (wall(3.0, 0.5),))
+    distance = CoalDistance(built, Motion(np.array([[-1.0], [1.0]])), 10)
+    assert distance(0, 0.5) == distance(0, 0.5)
+    assert distance.queries == 2
 
 
 def test_what_cannot_be_judged_is_refused() -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from collision.test_hull_graph import cloud, convex
+from collision.test_hulls import cloud, convex
 from evoexp.collision.models import body_covers
 from evoexp.collision.models.body_covers import MOST_VARIED, sphere_cover
 

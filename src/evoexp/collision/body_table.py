@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
-from evoexp.collision.hull_graph import CELLS, FEWEST, HullGraph, hull_graph, plain_corners
 from evoexp.errors import EvoexpError
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
@@ -48,11 +48,6 @@ class BodyTable(NamedTuple):
     radius: FloatArray  # (bodies,) of the ball that sweeps the core
     corners: IntArray  # (bodies, 2) first and one-past-last corner of a hull
     corner_points: FloatArray  # (corners, 3) in the frames of their hulls
-    edges: IntArray  # (corners + 1,) where the neighbours of each corner begin in `neighbours`
-    neighbours: IntArray  # corners at the other ends of a corner's edges, corner by corner
-    # (bodies, CELLS) the corner where a climb to the farthest one begins, by the cell of the
-    # direction (`hull_graph.cell_of`); −1: all corners are looked at
-    starts: IntArray
     # (bodies,) greatest distance of a body's points from its joint's origin; inf for half-spaces
     from_origin: FloatArray
     from_axis: FloatArray  # (bodies,) the same from its joint's axis
@@ -80,20 +75,15 @@ class BodyTable(NamedTuple):
         return bool(self.kind[body] == SEGMENT and self.size[body, 0] == 0.0)
 
 
-NO_HULL = plain_corners(np.empty((0, 3)))
+NO_CORNERS = np.empty((0, 3))
 
 
 class _Core(NamedTuple):
     kind: int
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
     radius: float = 0.0
-    hull: HullGraph = NO_HULL
+    corners: FloatArray = NO_CORNERS  # (corners, 3) of a hull
     exact: bool = True
-
-    @property
-    def corners(self) -> FloatArray:
-        """(corners, 3) of a hull."""
-        return self.hull.corners
 
 
 def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
@@ -117,14 +107,11 @@ def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
         radius=np.zeros(count),
         corners=np.zeros((count, 2), dtype=np.int64),
         corner_points=np.empty((0, 3)),
-        edges=np.zeros(1, dtype=np.int64),
-        neighbours=np.empty(0, dtype=np.int64),
-        starts=np.full((count, CELLS), -1, dtype=np.int64),
         from_origin=np.full(count, np.inf),
         from_axis=np.full(count, np.inf),
         ball=np.full(count, np.inf),
     )
-    hulls: list[HullGraph] = []
+    corners = [NO_CORNERS]  # of the bodies so far
     for k, item in enumerate(items):
         core, rotation, translation = _core(item)
         if item.parentJoint > 0:
@@ -137,34 +124,16 @@ def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
                 raise UnsupportedShape(
                     f"scene: half-space '{item.name}' must stand still, moves with a joint"
                 )
-        begin = sum(len(hull.corners) for hull in hulls)
-        hulls.append(core.hull)
+        begin = sum(map(len, corners))
+        corners.append(core.corners)
         bodies.kind[k], bodies.size[k], bodies.radius[k] = core.kind, core.size, core.radius
         bodies.exact[k] = core.exact
         bodies.rotation[k], bodies.translation[k] = rotation.ravel(), translation
         bodies.corners[k] = begin, begin + len(core.corners)
-        bodies.starts[k] = np.where(core.hull.starts < 0, -1, core.hull.starts + begin)
         if core.kind != HALF_SPACE:
             bodies.from_origin[k], bodies.from_axis[k] = _reach(core, rotation, translation)
             bodies.ball[k], _ = _reach(core, rotation, np.zeros(3))
-    return _with_hulls(bodies, hulls)
-
-
-def _with_hulls(bodies: BodyTable, hulls: list[HullGraph]) -> BodyTable:
-    """Return bodies with the corners of their hulls and the edges between them."""
-    nothing = np.empty(0, dtype=np.int64)
-    counts, neighbours, begin = [0], [nothing], 0
-    for hull in hulls:
-        counts += [len(others) for others in hull.neighbours]
-        neighbours += [others + begin for others in hull.neighbours]
-        begin += len(hull.corners)
-    return bodies._replace(
-        corner_points=np.ascontiguousarray(
-            np.vstack([NO_HULL.corners, *(h.corners for h in hulls)])
-        ),
-        edges=np.cumsum(np.array(counts, dtype=np.int64)),
-        neighbours=np.concatenate(neighbours),
-    )
+    return bodies._replace(corner_points=np.vstack(corners))
 
 
 def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
@@ -189,12 +158,13 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
         core = _Core(ELLIPSOID, tuple(shape.radii), swept)
     elif isinstance(shape, coal.ConvexBase):
         points = np.array([shape.point(i) for i in range(shape.num_points)])
-        core = _Core(HULL, radius=swept, hull=_climbed(points))
+        core = _Core(HULL, radius=swept, corners=points)
     elif isinstance(shape, coal.TriangleP):
-        core = _Core(HULL, radius=swept, hull=plain_corners(np.array([shape.a, shape.b, shape.c])))
+        core = _Core(HULL, radius=swept, corners=np.array([shape.a, shape.b, shape.c]))
     elif isinstance(shape, coal.BVHModelBase):
         points = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
-        core = _Core(HULL, hull=hull_graph(points), exact=False)
+        hull = hull_of(points)  # None of a flat mesh
+        core = _Core(HULL, corners=points if hull is None else hull[0], exact=False)
     else:
         raise UnsupportedShape(
             f"scene: '{item.name}' must be a convex shape, a half-space or a mesh, was a "
@@ -203,14 +173,9 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
     if core.kind == HULL:
         # the ball around a hull is small where the core's origin is its middle
         middle = 0.5 * (core.corners.min(axis=0) + core.corners.max(axis=0))
-        core = core._replace(hull=core.hull._replace(corners=core.corners - middle))
+        core = core._replace(corners=core.corners - middle)
         translation = translation + matrix_product(rotation, middle)
     return core, rotation, translation
-
-
-def _climbed(points: FloatArray) -> HullGraph:
-    """Return a convex shape's points, with edges to climb along if there are many."""
-    return plain_corners(points) if len(points) < FEWEST else hull_graph(points)
 
 
 def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[float, float]:

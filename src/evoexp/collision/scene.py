@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from evoexp.collision.body_table import BodyTable, body_table
 from evoexp.collision.box_support import coal
-from evoexp.collision.derived_pairs import unjudged_pairs
+from evoexp.collision.derived_pairs import are_neighbours, unjudged_pairs
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
@@ -124,15 +124,12 @@ def scene(
         )
     for k, (shape, placement) in enumerate(obstacle_shapes(table, hulls)):
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
-    parents = assembly.model.parents
-    joints = [item.parentJoint for item in bodies]
     unjudged = unjudged_pairs(assembly)
-    for a, one in enumerate(joints):
-        for b, two in enumerate(joints[a + 1 :], start=a + 1):
-            neighbours = one in (two, parents[two]) or two == parents[one]
+    for a in range(len(bodies)):
+        for b in range(a + 1, len(bodies)):
             if frozenset((bodies[a].name, bodies[b].name)) in unjudged:
                 continue
-            if arms[a] != arms[b] or (self_pairs and not neighbours):
+            if arms[a] != arms[b] or (self_pairs and not are_neighbours(assembly, a, b)):
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
         for k in range(len(table.kind)):
             geometry.addCollisionPair(pin.CollisionPair(a, len(bodies) + k))

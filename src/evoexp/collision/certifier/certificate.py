@@ -104,40 +104,27 @@ def _with_depths(judged: Certificate, part: Part, piece: Motion) -> Certificate:
     return judged if decided else judged._replace(certified=_all([judged.certified, None]))
 
 
-class _Allowed(NamedTuple):
-    """The fields of a `Certificate` that tell of pairs that may touch."""
-
-    allowed_contacts: str = ""
-    penetration: float | None = None
-    penetration_pair: str = ""
-
-
-def _allowed(parts: Sequence[Certificate]) -> _Allowed:
-    """Return the pairs of a whole motion that may touch, and their greatest depth."""
-    pairs = dict.fromkeys(p for one in parts for p in one.allowed_contacts.split(", ") if p)
-    if not pairs:
-        return _Allowed()
-    deepest = max(parts, key=lambda one: -1.0 if one.penetration is None else one.penetration)
-    return _Allowed(", ".join(pairs), deepest.penetration, deepest.penetration_pair)
-
-
 def combined(parts: Sequence[Certificate]) -> Certificate:
     """Return the verdict on a motion from those on its pieces.
 
     It has the first contact, or else the least clearance.
     """
-    if len(parts) == 1 and not parts[0].allowed_contacts:
-        return parts[0]
-    queries, allowed = sum(part.certificate_queries for part in parts), _allowed(parts)
+    # the pairs that may touch anywhere, and the deepest overlap of one
+    pairs = dict.fromkeys(p for part in parts for p in part.allowed_contacts.split(", ") if p)
+    deepest = max(parts, key=lambda part: -1.0 if part.penetration is None else part.penetration)
     touched = [part for part in parts if part.refuted_at is not None]
     if touched:
-        first = min(touched, key=lambda part: float(part.refuted_at or 0.0))
-        return first._replace(certificate_queries=queries, **allowed._asdict())
-    return min(parts, key=lambda part: part.clearance)._replace(
-        certified=_all([part.certified for part in parts]),
-        certified_margin=_all([part.certified_margin for part in parts]),
-        certificate_queries=queries,
-        **allowed._asdict(),
+        whole = min(touched, key=lambda part: float(part.refuted_at or 0.0))
+    else:
+        whole = min(parts, key=lambda part: part.clearance)._replace(
+            certified=_all([part.certified for part in parts]),
+            certified_margin=_all([part.certified_margin for part in parts]),
+        )
+    return whole._replace(
+        certificate_queries=sum(part.certificate_queries for part in parts),
+        allowed_contacts=", ".join(pairs),
+        penetration=deepest.penetration,
+        penetration_pair=deepest.penetration_pair,
     )
 
 

@@ -3,7 +3,9 @@
 Gilbert, Johnson & Keerthi 1988. Every direction v gives a lower bound, the gap between the two
 planes across v that support the bodies; every point found in the difference of the bodies gives an
 upper bound. Both hold whenever the iteration stops, so it stops as soon as they decide the caller's
-question. These distances decide no verdict; coal's do.
+question. These distances decide no verdict; coal's do. They stand here because a verdict on a Panda
+in convex pieces takes 4.5 to 22 times as long where coal settles the same intervals, and 8 to 66
+times where it takes part in the whole branch and bound (Pinocchio's batches, warm starts).
 
 A body's frame in the world is a row of twelve numbers, as in `motion_bounds`.
 """
@@ -192,37 +194,14 @@ def _support(
     elif kind == HALF_SPACE:
         x, y, z = 0.0, 0.0, 0.0
     elif kind == HULL:
-        chosen = _farthest_corner(bodies, body, x, y, z)
-        x, y, z = points[chosen, 0], points[chosen, 1], points[chosen, 2]
-    for e in range(3):
-        out[e] = w[9 + e] + (w[3 * e] * x + w[3 * e + 1] * y + w[3 * e + 2] * z)
-
-
-@inlined
-def _farthest_corner(bodies: BodyTable, body: int, x: float, y: float, z: float) -> int:
-    """Return the corner of a hull that is farthest in a direction, given in the hull's frame."""
-    points, edges, neighbours = bodies.corner_points, bodies.edges, bodies.neighbours
-    cell = int(x > 0.0) + 2 * int(y > 0.0) + 4 * int(z > 0.0)  # as `hull_graph.cell_of`
-    a, b, c = abs(x), abs(y), abs(z)
-    chosen = int(bodies.starts[body, cell + 8 * int(a > b) + 16 * int(b > c) + 32 * int(a > c)])
-    if chosen < 0:
         best, chosen = -np.inf, int(bodies.corners[body, 0])
         for k in range(bodies.corners[body, 0], bodies.corners[body, 1]):
             height = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
             if height > best:
                 best, chosen = height, k
-        return chosen
-    # uphill along the edges: a convex body has no summit but the highest
-    best = x * points[chosen, 0] + y * points[chosen, 1] + z * points[chosen, 2]
-    climbs = True
-    while climbs:
-        climbs, here = False, chosen
-        for e in range(edges[here], edges[here + 1]):
-            k = int(neighbours[e])
-            height = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
-            if height > best:
-                best, chosen, climbs = height, k, True
-    return chosen
+        x, y, z = points[chosen, 0], points[chosen, 1], points[chosen, 2]
+    for e in range(3):
+        out[e] = w[9 + e] + (w[3 * e] * x + w[3 * e + 1] * y + w[3 * e + 2] * z)
 
 
 @inlined

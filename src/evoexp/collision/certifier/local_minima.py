@@ -71,7 +71,6 @@ def polish(
         t[walk], distances[walk] = here, best
 
 
-@kernel
 def nearest_minimum(
     task: Task,
     work: Workspace,
@@ -95,36 +94,19 @@ def nearest_minimum(
     Returns:
         A pair of −1 if there is none but the known one.
     """
-    # the pairs that came closest, at most MAX_POLISHED, the closest first
-    order, count = np.empty(MAX_POLISHED + 1, dtype=np.int64), 0
-    for pair in range(len(least)):
-        if least[pair] <= worth and task.exact[pair]:
-            k = count
-            while k > 0 and least[order[k - 1]] > least[pair]:
-                order[k] = order[k - 1]
-                k -= 1
-            order[k] = pair
-            count = min(count + 1, MAX_POLISHED)
-    # without the one that is known
-    pairs, t, num_walks = np.empty_like(order), np.empty(len(order)), 0
-    for k in range(count):
-        # a motion of one instant is swept as a segment without movement
-        begin = min(begins[order[k]], task.last)
-        if order[k] != known[0] or not abs(begin - known[1]) < SAME:
-            pairs[num_walks], t[num_walks] = order[k], begin
-            num_walks += 1
-    if num_walks == 0:
+    # the pairs that came closest, without the one that is known
+    close = np.flatnonzero((least <= worth) & task.exact)
+    pairs = close[np.argsort(least[close], kind="stable")][:MAX_POLISHED]
+    # a motion of one instant is swept as a segment without movement
+    t = np.minimum(begins[pairs], task.last)
+    is_new = (pairs != known[0]) | ~(np.abs(t - known[1]) < SAME)
+    pairs, t = pairs[is_new], t[is_new]
+    if len(pairs) == 0:
         return -1, np.nan
-    # their local minima
-    pairs, t, distances = pairs[:num_walks], t[:num_walks], np.empty(num_walks)
+    # their local minima; of equal ones the first
+    distances = np.empty(len(pairs))
     polish(task, work, pairs, t, distances)
-    tied = distances.min() + rounding
-    earliest = np.inf
-    for k in range(num_walks):
-        if distances[k] <= tied:
-            earliest = min(earliest, t[k])
-    first, nearest = 0, np.inf
-    for k in range(num_walks):
-        if distances[k] <= tied and t[k] <= earliest + SAME and distances[k] < nearest:
-            first, nearest = k, distances[k]
-    return pairs[first], t[first]
+    tied = distances <= distances.min() + rounding
+    first = tied & (t <= t[tied].min() + SAME)
+    nearest = int(np.argmin(np.where(first, distances, np.inf)))
+    return int(pairs[nearest]), float(t[nearest])

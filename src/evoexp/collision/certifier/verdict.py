@@ -6,7 +6,6 @@ own shapes do not suffice; coal settles both, and every distance in a verdict is
 Pinocchio's placements.
 """
 
-from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -51,7 +50,6 @@ class Verdict(NamedTuple):
     proven: float  # lower bound of the clearance over the whole motion
     queries: int  # distances that coal was asked for
     intervals: int  # intervals that the sweep judged
-    duration_s: float  # time taken [s]; NaN if no clock was given
 
 
 class Limits(NamedTuple):
@@ -72,7 +70,6 @@ def certify(
     contact_tolerance: float | None = None,
     resolution: float = 1e-3,
     limits: Limits = DEFAULT_LIMITS,
-    clock: Callable[[], float] | None = None,
 ) -> Verdict:
     """Judge a motion.
 
@@ -85,20 +82,17 @@ def certify(
             `Scene.tolerances`.
         resolution: The clearance is proven up to this part of it [-].
         limits: Numbers after which the certifier gives up.
-        clock: Returns seconds, for `duration_s`.
 
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
     """
-    begin = clock() if clock is not None else np.nan
     _check(scene, motion, security_margin, contact_tolerance, resolution)
     tolerances, num_pairs = scene.tolerances, len(scene.pairs)
     if contact_tolerance is not None:
         tolerances = np.full(num_pairs, contact_tolerance)
     margins = np.empty(num_pairs)
     margins[:] = security_margin
-    verdict = _Judgement(scene, motion, margins, tolerances, resolution, limits).verdict()
-    return verdict._replace(duration_s=(clock() if clock is not None else np.nan) - begin)
+    return _Judgement(scene, motion, margins, tolerances, resolution, limits).verdict()
 
 
 class _Candidate(NamedTuple):
@@ -148,10 +142,10 @@ class _Judgement:
         self.work = work_space(self.task)
 
     def verdict(self) -> Verdict:
-        """Return the verdict, without its duration."""
+        """Return the verdict."""
         if len(self.scene.pairs) == 0:
             none = np.inf, np.nan, None, np.nan, None
-            return Verdict("certified", "certified", *none, np.inf, 0, 0, np.nan)
+            return Verdict("certified", "certified", *none, np.inf, 0, 0)
         try:
             contact, bound = self._search(self.resolution, self.tolerances, self.tolerances)
             if contact is not None:
@@ -167,13 +161,13 @@ class _Judgement:
         names = self.scene.pair_names(contact.pair)
         at = float(contact.t)
         where = 0.0, at, names, at, names
-        return Verdict("refuted", "refuted", *where, 0.0, self.coal.queries, self.intervals, np.nan)
+        return Verdict("refuted", "refuted", *where, 0.0, self.coal.queries, self.intervals)
 
     def _free(self, status: Status, margin_status: Status, proven: float) -> Verdict:
         pair = self.scene.pair_names(self.best.pair) if self.best.pair >= 0 else None
         where = float(self.best.distance), float(self.best.t), pair, np.nan, None
         return Verdict(
-            status, margin_status, *where, float(proven), self.coal.queries, self.intervals, np.nan
+            status, margin_status, *where, float(proven), self.coal.queries, self.intervals
         )
 
     def _too_close(self) -> bool:
@@ -275,18 +269,8 @@ class _Judgement:
         self._polish_from(found.pair_least, found.pair_least_at, worth)
         if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
             distance, t = self.best.distance, self.best.t
-            speed = self._greatest_speed(self.best.pair)
-            t, distance = walk_down(self.coal, self.best.pair, t, 1e-3, speed)
+            t, distance = walk_down(self.coal, self.best.pair, t, 1e-3)
             self._note(_Candidate(distance, t, self.best.pair))
-
-    def _greatest_speed(self, pair: int) -> float:
-        """Return a bound of the change of a pair's distance, per segment, in the whole motion."""
-        weights = self.task.weights[pair : pair + 1]
-        speeds, scratch, found = np.empty((2, 1)), np.empty(len(self.task.chain.parent)), 0.0
-        for piece in self.task.coefficients:
-            approach_bounds(self.task.chain, piece, 0.0, 1.0, weights, speeds, scratch)
-            found = max(found, float(speeds[0, 0]))
-        return found
 
     def _polish_from(self, least: FloatArray, begins: FloatArray, worth: float) -> None:
         """Ask coal for the least local minimum of the pairs that come as close as `worth`."""

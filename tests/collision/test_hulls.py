@@ -1,16 +1,13 @@
-"""Climbs along the edges of hulls, against a look at every corner; verdicts, against coal."""
+"""Hulls as bodies: their corners, and verdicts against coal."""
 
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.body_table import HULL, BodyTable
-from evoexp.collision.certifier.convex_distance import _farthest_corner
+from evoexp.collision.body_table import HULL
 from evoexp.collision.certifier.verdict import certify
-from evoexp.collision.hull_graph import FEWEST, hull_graph
 from evoexp.collision.scene import Scene, geometry_scene
-from evoexp.numeric.compilation import kernel
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.paths.motion import Motion
 
@@ -53,43 +50,20 @@ def hull_scene(points: np.ndarray, others: list[tuple[coal.CollisionGeometry, pi
     return geometry_scene(model, geometry)
 
 
-@kernel
-def climb(bodies: BodyTable, directions: np.ndarray, out: np.ndarray) -> None:
-    for k in range(len(directions)):
-        x, y, z = directions[k]
-        out[k] = _farthest_corner(bodies, 0, x, y, z)
-
-
-@pytest.mark.parametrize("kind", ["ball", "cloud", "plate", "cylinder", "grid"])
-def test_a_climb_ends_at_the_farthest_corner(kind: str) -> None:
-    rng = np.random.default_rng(3)
-    bodies = hull_scene(cloud(rng, kind, 400), []).bodies
-    corners = bodies.corner_points
-    assert bodies.kind[0] == HULL
-    assert (bodies.starts[0].max() >= 0) == (len(corners) >= FEWEST)
-    directions = np.vstack([rng.normal(size=(5000, 3)), np.eye(3), -np.eye(3), [[1.0, 1.0, 0.0]]])
-    chosen = np.empty(len(directions), dtype=np.int64)
-    climb(bodies, directions, chosen)
-    heights = (directions[:, None] * corners).sum(axis=2)
-    reached = heights[np.arange(len(directions)), chosen]
-    assert np.abs(reached - heights.max(axis=1)).max() < 1e-14
-
-
-def test_corners_of_a_hull_hold_all_points() -> None:
+def test_corners_of_a_mesh_are_those_of_its_hull() -> None:
     points = np.random.default_rng(4).uniform(-1.0, 1.0, size=(300, 3))
-    graph = hull_graph(points)
-    assert FEWEST <= len(graph.corners) < 200
-    directions = np.random.default_rng(5).normal(size=(500, 3))
-    most = (points[:, None] * directions).sum(axis=2).max(axis=0)
-    assert (graph.corners[:, None] * directions).sum(axis=2).max(axis=0) == pytest.approx(most)
-    edges = {(k, int(n)) for k, others in enumerate(graph.neighbours) for n in others}
-    assert edges == {(n, k) for k, n in edges}
-
-
-def test_points_in_a_plane_have_no_edges() -> None:
-    flat = np.random.default_rng(6).normal(size=(100, 3)) * [1.0, 1.0, 0.0]
-    graph = hull_graph(flat)
-    assert np.array_equal(graph.corners, flat) and graph.starts.max() == -1
+    found = hull_of(points)
+    assert found is not None and len(found[0]) < 200
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(found[1]), len(points))
+    mesh.addVertices(points)
+    mesh.addTriangles(np.arange(300).reshape(-1, 3))
+    mesh.endModel()
+    model, geometry = pin.Model(), pin.GeometryModel()
+    geometry.addGeometryObject(pin.GeometryObject("mesh", 0, 0, pin.SE3.Identity(), mesh))
+    bodies = geometry_scene(model, geometry).bodies
+    assert not bodies.exact[0] and bodies.kind[0] == HULL
+    np.testing.assert_allclose(bodies.corner_points + bodies.translation, found[0], atol=1e-15)
 
 
 @pytest.mark.parametrize("kind", ["ball", "cloud", "cylinder"])

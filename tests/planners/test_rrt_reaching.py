@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.collision.models.ellipse_configurations import EllipseConfigurations
+from evoexp.collision.models.link_ellipses import EllipseConfigurations
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError

@@ -68,9 +68,7 @@ class TouchingSpheres(Component):
             for sphere in self._of_link(assembly, link)
         ]
         kept = [
-            s
-            for k, s in enumerate(every)
-            if s.center.any() or not any(map(s.repeats, every[:k]))
+            s for k, s in enumerate(every) if s.center.any() or not any(map(s.repeats, every[:k]))
         ]
         moving = np.array([sphere.joint for sphere in kept], dtype=np.int64)
         centers = np.array([sphere.center for sphere in kept])

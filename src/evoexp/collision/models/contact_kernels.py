@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.models.center_kernels import POINT, nearest, spatial_point
-from evoexp.collision.models.contact_scene import Scene, scene_of
 from evoexp.collision.models.contact_tables import (
     FIRST_BALL,
     FIRST_HALF_SPACE,
@@ -20,6 +19,8 @@ from evoexp.collision.models.contact_tables import (
     ROUNDING,
     STOP_ENTRY,
     STOP_PART,
+    Scene,
+    scene_of,
 )
 from evoexp.collision.models.obstacle_kernels import MARGIN, nearest_to_obstacle
 from evoexp.collision.models.packed_shapes import FIRST_RUN, JOINT, STOP_RUN

@@ -5,12 +5,14 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_contact import first_contact
-from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, paths_collide
+from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, gap, paths_collide
 from evoexp.errors import SettingError
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.vectors import LANES
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.planar_ends import PlanarArm, planar_arm
+from evoexp.robots.planar_ends import PlanarArm, block_ends, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
 from evoexp.validation import Component, LayoutCount
 
@@ -112,10 +114,81 @@ class EllipseCollision(NamedTuple):
     def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
         """Return the first contact of a path between postures (N,) [rad]; None if it is free."""
         start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
-        position, obstacle, link, swept = first_contact(
+        position, obstacle, link, swept = _first_contact(
             start, end, self.arm, self.ellipses, self.num_positions, self.chords
         )
         return None if position < 0 else Contact(position, obstacle + 1, link, bool(swept))
+
+
+class EllipseConfigurations:
+    """The model of Lavoie & Boudreau 2001 at single configurations, without chords."""
+
+    def __init__(self, collision: EllipseCollision) -> None:
+        """Take the model of paths."""
+        self._collision = collision._replace(num_positions=1, chords=False)
+
+    def collides(self, q: FloatArray) -> BoolArray:
+        """Return which configurations (N, count) [deg] collide, (count,)."""
+        angles = np.ascontiguousarray(DEGREE * q)
+        return self._collision.collide(angles, angles)
+
+    def any_collides(self, q: FloatArray) -> bool:
+        """Whether any of the configurations (N, count) [deg] collides."""
+        return bool(self.collides(q).any())
+
+
+@kernel
+def _first_contact(
+    start: FloatArray,
+    end: FloatArray,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    num_positions: int,
+    chords: bool,
+) -> tuple[int, int, int, bool]:
+    """Find the first contact of one path, by position, ellipse and link, chords before links.
+
+    Args:
+        start: (N,) joint angles at the start [rad].
+        end: (N,) at the end.
+        arm: The arm.
+        ellipses: The ellipses.
+        num_positions: M.
+        chords: Whether chords are swept.
+
+    Returns:
+        Position; index of the ellipse; link, or link end, from 1; whether the chord of that end
+        touches. −1, −1, −1 and false if nothing touches.
+    """
+    num = len(start)
+    begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)
+    x, y = np.empty((2, (num + 1) * LANES)), np.empty((2, (num + 1) * LANES))
+    block_ends(begin, stop, arm, 0, num_positions, x[0], y[0])
+    for position in range(1, num_positions + 1):
+        old, new = (position + 1) % 2, position % 2
+        block_ends(begin, stop, arm, position, num_positions, x[new], y[new])
+        for e in range(len(ellipses.maps)):
+            ellipse = ellipses.maps[e]
+            for k in range(num + 1):
+                at, root = k * LANES, max(k - 1, 0) * LANES
+                here = _mapped(ellipse, x[new, at], y[new, at])
+                if chords and _meets(_mapped(ellipse, x[old, at], y[old, at]), here):
+                    return position, e, k, True
+                if _meets(_mapped(ellipse, x[new, root], y[new, root]), here):
+                    return position, e, k, False
+    return -1, -1, -1, False
+
+
+@kernel
+def _mapped(ellipse: FloatArray, x: float, y: float) -> tuple[float, float]:
+    """Return a point in an ellipse's frame."""
+    return ellipse[0] * x + ellipse[1] * y + ellipse[2], ellipse[3] * y + ellipse[4]
+
+
+@kernel
+def _meets(one: tuple[float, float], two: tuple[float, float]) -> bool:
+    """Return whether a segment, given by its `_mapped` ends, touches the unit circle."""
+    return bool(gap(one[0], one[1], two[0], two[1]) <= 0.0)
 
 
 def _to_unit_circle(

@@ -31,12 +31,12 @@ from evoexp.collision.models.encounter_kernels import (
     fill_up,
     listed_from,
 )
-from evoexp.collision.models.flat_primitives import named_primitives
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     STOP_LISTED,
     ContactTables,
     PrimitiveTables,
+    named_primitives,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import LANES as EIGHT

@@ -13,13 +13,13 @@ import numpy as np
 
 from evoexp.collision.models.contact_kernels import HIT, find_contacts
 from evoexp.collision.models.contact_tables import contact_tables
-from evoexp.collision.models.flat_primitives import flat_primitives
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     PackedObstacles,
     PackedShapes,
     PrimitiveTables,
     Units,
+    flat_primitives,
 )
 from evoexp.collision.models.primitive_kernels import BETWEEN, SELF, primitive_clearances
 from evoexp.collision.models.primitive_tables import (

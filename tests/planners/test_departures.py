@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.planners import departures
+from evoexp.planners import answers
 from evoexp.testing.evolution_record import evolution
 from shipped_conditions import of_kind
 
@@ -37,11 +37,11 @@ def test_a_disturbed_solution_departs(
 
 def test_rounded_numbers_are_no_departure() -> None:
     one, two = np.array([1.0, 2.0]), np.array([1.0, 2.0 + 1e-7])
-    assert departures.of_place("the start", one, two, "deg") == []
+    assert answers.of_place("the start", one, two, "deg") == []
     limits = np.array([[0.0, 1.0], [0.0, 2.0]])
-    names = departures.joint_names(2)
-    assert departures.of_limits(names, two[:, None], limits, "rad") == []
-    assert departures.of_limits(names, np.array([[0.5, -0.5], [1.0, 2.5]]), limits, "rad") == [
+    names = answers.joint_names(2)
+    assert answers.of_limits(names, two[:, None], limits, "rad") == []
+    assert answers.of_limits(names, np.array([[0.5, -0.5], [1.0, 2.5]]), limits, "rad") == [
         "joint 1 leaves its limits by 0.5 rad",
         "joint 2 leaves its limits by 0.5 rad",
     ]

@@ -1,12 +1,54 @@
-"""Answers of a planner beside motions and costs: tables, shapes of solutions, tested covers."""
+"""Answers of a planner beside motions: judged populations, tables, covers, departures.
+
+Departures are ways in which a solution is none of the task, each in a phrase for people. A motion
+that never leaves the start touches nothing and is certified; only its ends tell that it does not do
+what was asked for.
+"""
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
 
-from evoexp.records import FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.records import BoolArray, FloatArray
 
 Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stands for any number
 LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
+SAME = 1e-6  # [unit of the values] files hold rounded numbers: what differs by less is the same
+
+
+class Judgement(Protocol):
+    """A judged population."""
+
+    @property
+    def cost(self) -> FloatArray:
+        """(individuals,) lower is better; inf: infeasible."""
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """(individuals,) whether the planner's own model accepts each."""
+
+    @property
+    def collision_queries(self) -> int:
+        """Configurations that the algorithm asks for, also those that the kernels skip."""
+
+    def named_terms(self, individual: int) -> dict[str, float]:
+        """Return the paper's own terms of one individual."""
+
+
+class JudgementArrays(NamedTuple):
+    """A `Judgement` as plain arrays."""
+
+    cost: FloatArray  # (individuals,) lower is better; inf: infeasible
+    feasible: BoolArray  # (individuals,) whether the planner's own model accepts each
+    collision_queries: int  # configurations that the algorithm asks for
+    terms: Mapping[str, NDArray[Any]]  # name → (individuals,) of the planner's own terms
+
+    def named_terms(self, individual: int) -> dict[str, float]:
+        """Return the terms of one individual."""
+        return {name: float(values[individual]) for name, values in self.terms.items()}
 
 
 class CoverShape(NamedTuple):
@@ -43,3 +85,39 @@ def num_values(shape: Shape) -> int:
     if len(shape) and shape[0] is ...:
         return LONGEST * num_values(shape[1:])
     return sum(math.prod(part) for part in shape)
+
+
+def of_place(name: str, given: FloatArray, wanted: FloatArray, unit: str) -> list[str]:
+    """Return a phrase if a configuration or place is another one than the task's.
+
+    Args:
+        name: Of the place, as in "the start of arm 1".
+        given: Its values in the solution, any shape.
+        wanted: Its values in the task, of the same shape.
+        unit: Of both.
+    """
+    apart = float(np.max(np.abs(given - wanted)))
+    return [] if apart <= SAME else [f"{name} is not the task's: {apart:.4g} {unit} away"]
+
+
+def of_limits(names: Sequence[str], values: FloatArray, limits: FloatArray, unit: str) -> list[str]:
+    """Return a phrase per joint that leaves its limits.
+
+    Args:
+        names: (joints,) as in "joint 1".
+        values: (joints, configurations).
+        limits: (joints, 2) least and greatest value.
+        unit: Of values and limits.
+    """
+    below = limits[:, 0] - values.min(axis=1)
+    above = values.max(axis=1) - limits[:, 1]
+    return [
+        f"{name} leaves its limits by {beyond:.4g} {unit}"
+        for name, beyond in zip(names, np.maximum(below, above).tolist(), strict=True)
+        if beyond > SAME
+    ]
+
+
+def joint_names(count: int) -> list[str]:
+    """Return the names of joints, counted from 1."""
+    return [f"joint {k + 1}" for k in range(count)]

@@ -18,7 +18,6 @@ from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.answers import CoverShape
-from evoexp.planners.floor_tasks import floor_motion, within_floor
 from evoexp.planners.moveit_tasks import (
     arm_motion,
     hull_notes,
@@ -86,7 +85,7 @@ def arm_problem(
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
     elif isinstance(scenario, GridMotion):
-        assembly = within_floor(assembly, scenario)
+        assembly = _within_floor(assembly, scenario)
     task = _arm_motion(assembly, scenario)
     start, goal = ends_of(assembly, task)
     collision: SphereCollision | CoveredCollision
@@ -112,7 +111,7 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         SettingError: If its goal is a pose, it is silent about a joint, or robots stand still.
     """
     if isinstance(task, GridMotion):
-        return floor_motion(task)
+        return _floor_motion(task)
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
     from evoexp.collision.models.link_collision import two_link_arms  # and its kernels
@@ -129,6 +128,39 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         security_margin=task.security_margin,
         length_unit=task.length_unit,
         obstacles=task.obstacles,
+    )
+
+
+def _within_floor(assembly: Assembly, task: GridMotion) -> Assembly:
+    """Return a platform whose joints slide from the first node of the grid to the last one.
+
+    Raises:
+        SettingError: If the robot does not slide along each direction of the grid.
+    """
+    slides = moving_joints(assembly).slides
+    if len(slides) != len(task.size) or not slides.all():
+        must = f"one that slides along the {len(task.size)} directions of the grid"
+        named = [str(name) for name in list(assembly.model.names)[1:]]
+        raise SettingError("robot", must, f"one of joints {', '.join(named)}")
+    model = assembly.model.copy()
+    model.lowerPositionLimit = np.zeros(len(slides))
+    model.upperPositionLimit = np.array(task.size, dtype=np.float64) - 1.0
+    return assembly._replace(model=model)
+
+
+def _floor_motion(task: GridMotion) -> ArmMotion:
+    """Return the way over a grid as a motion from one place to another [length unit].
+
+    Raises:
+        SettingError: If an obstacle stands on the start or the goal.
+    """
+    task.blocked()  # refuses ends that are blocked
+    return ArmMotion(
+        q_start=(tuple(map(float, task.start)),),
+        q_goal=(tuple(map(float, task.goal)),),
+        security_margin=task.security_margin,
+        length_unit=task.length_unit,
+        obstacles=task.bodies(),
     )
 
 

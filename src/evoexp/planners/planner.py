@@ -16,10 +16,10 @@ from evoexp.collision.scene import Part, Scene
 from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
+from evoexp.planners.answers import Judgement as Judgement
+from evoexp.planners.answers import JudgementArrays as JudgementArrays
 from evoexp.planners.answers import Shape as Shape
 from evoexp.planners.answers import num_values as num_values
-from evoexp.planners.judgements import Judgement as Judgement
-from evoexp.planners.judgements import JudgementArrays as JudgementArrays
 from evoexp.records import Best, Block, BoolArray, FloatArray
 
 Reproducibility = Literal["bits", "environment"]

@@ -23,6 +23,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
+from evoexp.planners.answers import of_limits, of_place
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.generations import TeamSearch
 from evoexp.planners.coevolution.kernels import HALF_TURN, evaluate_lines, measure
@@ -30,7 +31,6 @@ from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem, check_
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
-from evoexp.planners.departures import of_limits, of_place
 from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray

@@ -22,7 +22,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
-from evoexp.planners.departures import of_limits
+from evoexp.planners.answers import of_limits
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults

@@ -69,24 +69,15 @@ class Search:
     def __init__(
         self,
         ga: StrategySettings,
-        problem: Problem,
+        problem: Problem,  # the prepared task
         stage: Stage,
-        edge_check: int,
-        ancestry: Ancestry,
-        node: int,
+        edge_check: int,  # as in `kernels.Strategy`
+        ancestry: Ancestry,  # of all phases
+        node: int,  # where the phase begins
+        # whether a parent (nq,) may have a child (nq,); None: any
         accepts: Callable[[FloatArray, FloatArray], bool] | None = None,
     ) -> None:
-        """Begin a phase.
-
-        Args:
-            ga: Settings.
-            problem: The prepared task.
-            stage: The phase.
-            edge_check: As in `kernels.Strategy`.
-            ancestry: Of all phases.
-            node: Where the phase begins.
-            accepts: Whether a parent (nq,) may have a child (nq,); None: any.
-        """
+        """Begin a phase."""
         self.ga, self._judging, self.ancestry, self._accepts = ga, stage.judging, ancestry, accepts
         self._strategy = Strategy(
             problem.scope * stage.phase.scope_share,

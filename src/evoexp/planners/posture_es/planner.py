@@ -30,8 +30,7 @@ from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape, Listing
-from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.answers import CoverShape, Listing, joint_names, of_limits, of_place
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem

@@ -11,10 +11,9 @@ import numpy as np
 
 from evoexp.collision.models.ellipse_kernels import PathChecks, prepare_checks
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.mutation import GAUSSIAN, NON_UNIFORM, decode_bits, non_uniform_spread
+from evoexp.evolution.mutation import NON_UNIFORM, decode_bits, non_uniform_spread
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.pcg64 import Words, fill_normals, fill_uniforms
 from evoexp.planners.redundant_ga.breeding import Breeding, Draws, breed
 from evoexp.planners.redundant_ga.sub_path_costs import (
     RESULTS,
@@ -32,15 +31,12 @@ class Generations(NamedTuple):
     """Some generations; number g is at place g modulo the number of places."""
 
     tables: FloatArray  # (places, rows, individuals, filled up to whole vectors)
-    states: Words  # (places, 2) of the random generator behind each: high and low half
     summaries: FloatArray  # (places, SUMMARY)
 
 
 class Memory(NamedTuple):
     """Arrays that a generation writes on its way."""
 
-    uniforms: FloatArray  # (choosing + crossing + mutating,) uniform numbers
-    normals: FloatArray  # normal deviates; see `Draws`
     parents: IntArray  # (offspring,) indices of individuals
     elites: IntArray  # (elites,) likewise
     lanes: IntArray  # (individuals + LANES,) scratch
@@ -51,9 +47,9 @@ class Memory(NamedTuple):
 
 @kernel
 def evolve(
-    words: Words,  # the random generator, see `numeric.pcg64`
+    uniforms: FloatArray,  # (generations, numbers) of those to be computed
+    normals: FloatArray,  # normal deviates, of one generation only; see `Draws`
     first: int,  # the present generation
-    last: int,  # the last one to be computed
     stop_cost: float,  # the first generation whose best costs less ends the search
     # whether generations are bred; if not, each is drawn as the initial one is, as many individuals
     # as would be bred
@@ -69,25 +65,25 @@ def evolve(
     Returns:
         The last generation that was computed.
     """
-    words, starts, breeding, judging, generations, memory = borrowed(
-        (words, starts, breeding, judging, generations, memory)
+    uniforms, normals, starts, breeding, judging, generations, memory = borrowed(
+        (uniforms, normals, starts, breeding, judging, generations, memory)
     )
-    tables, states, summaries = generations
-    count = len(memory.parents)
+    tables, summaries = generations
+    count, last = len(memory.parents), first + len(uniforms)
     checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
     for index in range(first, last):
         own, other = index % len(tables), (index + 1) % len(tables)
         following = tables[other]
         costs = following[len(following) - RESULTS]
         if evolving:
-            draws = _drawn(words, breeding, memory)
+            draws = _drawn(uniforms[index - first], normals, memory)
             advance(draws, index, breeding, judging, starts, tables[own], following, memory, checks)
         else:
-            draw(words, count, breeding, judging, starts, following, memory, checks)
+            numbers = uniforms[index - first]
+            draw(numbers, count, breeding, judging, starts, following, memory, checks)
             costs = costs[:count]
         costs = costs[: len(memory.hit)]
         summarise_costs(costs, summaries[other])
-        states[other, 0], states[other, 1] = words[0], words[1]
         if costs[int(summaries[other, 0])] < stop_cost:
             return index + 1
     return last
@@ -95,7 +91,7 @@ def evolve(
 
 @kernel
 def begin(
-    words: Words,
+    uniforms: FloatArray,  # (genes · individuals,)
     breeding: Breeding,
     judging: Judging,
     starts: FloatArray,
@@ -103,27 +99,22 @@ def begin(
     memory: Memory,
 ) -> None:
     """Draw and judge the initial population, at place 0; see `evolve`."""
-    (tables, states, summaries), size = generations, len(memory.hit)
+    (tables, summaries), size = generations, len(memory.hit)
     checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
-    draw(words, size, breeding, judging, starts, tables[0], memory, checks)
+    draw(uniforms, size, breeding, judging, starts, tables[0], memory, checks)
     summarise_costs(tables[0, len(tables[0]) - RESULTS, :size], summaries[0])
-    states[0, 0], states[0, 1] = words[0], words[1]
 
 
 @kernel
-def _drawn(words: Words, breeding: Breeding, memory: Memory) -> Draws:
-    """Return the random numbers of the next generation."""
+def _drawn(uniforms: FloatArray, normals: FloatArray, memory: Memory) -> Draws:
+    """Return the random numbers of a generation, by their use."""
     chosen, crossed = memory.num_choosing, memory.num_choosing + memory.num_crossing
-    fill_uniforms(words, memory.uniforms)
-    if breeding.mutation == GAUSSIAN:
-        fill_normals(words, memory.normals.reshape(-1))
-    uniforms = memory.uniforms
-    return Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], memory.normals)
+    return Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
 
 
 @kernel
 def draw(
-    words: Words,
+    uniforms: FloatArray,  # (genes · count,)
     count: int,
     breeding: Breeding,
     judging: Judging,
@@ -133,10 +124,9 @@ def draw(
     checks: PathChecks,
 ) -> None:
     """Draw and judge the first `count` individuals, uniform within the limits or bit by bit."""
-    num_genes, limits, numbers = breeding.num_genes, breeding.limits, np.empty(count)
+    num_genes, limits = breeding.num_genes, breeding.limits
     for gene in range(num_genes):
-        fill_uniforms(words, numbers)
-        row = table[gene]
+        row, numbers = table[gene], uniforms[gene * count : (gene + 1) * count]
         if breeding.binary:
             for k in range(count):
                 row[k] = np.floor(2.0 * numbers[k])

@@ -24,7 +24,7 @@ from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
-from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.answers import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem

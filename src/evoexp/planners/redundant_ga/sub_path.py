@@ -22,8 +22,8 @@ from evoexp.evolution.mutation import (
     SCOPES,
     num_mutation_uniforms,
 )
-from evoexp.numeric.generator_state import STATE_SIZE, state_bytes
-from evoexp.numeric.pcg64 import Twin
+from evoexp.numeric.elementary import standard_normal
+from evoexp.numeric.generator_state import state_bytes, states_behind
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
@@ -77,21 +77,18 @@ class Search(TableSearch):
         first = breeding.num_genes if breeding.binary else 0
         rows, filled = first + len(limits) + RESULTS, -(-size // LANES) * LANES
         per_call = generations_per_call(STRETCH, 8 * rows * filled, MEMORY)
-        super().__init__(ga, 1 if planner.answers_are_proven else per_call)
+        # normal deviates take no fixed number of uniform ones: generations are drawn one by one
+        one_by_one = planner.answers_are_proven or breeding.mutation == GAUSSIAN
+        super().__init__(ga, 1 if one_by_one else per_call)
         self._planner, self._problem, self._breeding = planner, problem, breeding
         self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
-        self._rng, self._words = rng, Twin(rng).words
-        self._behind = state_bytes(rng.bit_generator)[STATE_SIZE:]  # the same in all states
-        self._generations = Generations(
-            np.zeros((self.num_places, rows, filled)),
-            np.empty((self.num_places, 2), dtype=np.uint64),
-            self.summaries,
-        )
+        self._rng, tables = rng, np.zeros((self.num_places, rows, filled))
+        self._generations = Generations(tables, self.summaries)
         choosing, crossing, mutating = _num_uniforms(ga, breeding)
-        gaussian = breeding.mutation == GAUSSIAN
+        bred, drawn = choosing + crossing + mutating, breeding.num_genes * count
+        self._num_drawn = bred if self.evolving else drawn  # uniform numbers of a generation
+        self._num_normals = breeding.num_genes if breeding.mutation == GAUSSIAN else 0, count
         self._memory = Memory(
-            np.empty(choosing + crossing + mutating),
-            np.empty((breeding.num_genes if gaussian else 0, count)),
             np.empty(count, dtype=np.int64),
             np.empty(ga.num_elites, dtype=np.int64),
             np.empty(size + LANES, dtype=np.int64),
@@ -139,16 +136,24 @@ class Search(TableSearch):
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
+        uniforms = rng.random(self._breeding.num_genes * self._ga.population_size)
         arguments = self._breeding, self._judging, self._starts, self._generations, self._memory
-        kernels.begin(self._words, *arguments)
-        self._complete(0, 0)
+        kernels.begin(uniforms, *arguments)
+        self.states = [state_bytes(rng.bit_generator)]
+        self._prove(0)
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
         """Compute generations, as far as the best end is not good enough."""
+        before, num_drawn = rng.bit_generator.state, self._num_drawn
+        state = state_bytes(rng.bit_generator)
+        uniforms = rng.random((last - first, num_drawn))
+        normals = np.empty((0, 0))
+        if self.evolving and self._num_normals[0]:
+            normals = standard_normal(rng, self._num_normals)
         reached = kernels.evolve(
-            self._words,
+            uniforms,
+            normals,
             first,
-            last,
             self._stop_cost,
             self.evolving,
             self._breeding,
@@ -157,17 +162,19 @@ class Search(TableSearch):
             self._generations,
             self._memory,
         )
-        self._complete(first + 1, reached)
+        if reached < last:  # the generator goes on behind the last generation computed
+            rng.bit_generator.state = before
+            rng.random((reached - first) * num_drawn)
+        states = states_behind(state, [num_drawn] * (reached - first - 1))
+        self.states = [*states, state_bytes(rng.bit_generator)]
+        self._prove(reached % self.num_places)
         return int(reached)
 
-    def _complete(self, first: int, last: int) -> None:
-        """Take over the states of the generator; where proofs are asked for, refute ends."""
-        places = np.arange(first, last + 1) % self.num_places
-        halves = self._generations.states[places][:, ::-1]  # the low one first
-        self.states = [words.astype("<u8").tobytes() + self._behind for words in halves]
+    def _prove(self, place: int) -> None:
+        """Refute the ends of a generation that are not proven, where proofs are asked for."""
         if self._proofs is None:
             return
-        place, postures = places.item(-1), self._postures
+        postures = self._postures
         costs, ends = self.costs[place, 0], self._angles[place]
         self._proofs.settle(
             costs, lambda k: np.concatenate([*postures, *[ends[:, k]] * (3 - len(postures))])

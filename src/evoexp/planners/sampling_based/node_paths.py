@@ -15,7 +15,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.planners.answers import CoverShape
+from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
 from evoexp.planners.arm_tasks import (
     UNLIMITED,
     ArmProblem,
@@ -24,7 +24,6 @@ from evoexp.planners.arm_tasks import (
     cover_notes,
     cover_shapes,
 )
-from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import distance, lengths_along

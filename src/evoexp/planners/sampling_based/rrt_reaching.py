@@ -19,7 +19,7 @@ import numpy as np
 from evoexp.collision.models.link_ellipses import EllipseConfigurations
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.answers import joint_names, of_limits, of_place
 from evoexp.planners.planner import Candidate, JudgementArrays
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem

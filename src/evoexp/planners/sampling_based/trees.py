@@ -24,17 +24,12 @@ class EdgeTest:
 
     def __init__(
         self,
-        collision: SphereCollision | CoveredCollision | EllipseConfigurations,
-        resolution: float,
+        collision: SphereCollision | CoveredCollision | EllipseConfigurations,  # the model
+        resolution: float,  # greatest distance of configurations that are tested [deg]
+        # judge the edges that the model calls free; None: the model is trusted
         proofs: Proofs | None = None,
     ) -> None:
-        """Begin with no query.
-
-        Args:
-            collision: The model.
-            resolution: Greatest distance of configurations that are tested [deg].
-            proofs: Judge the edges that the model calls free; None: the model is trusted.
-        """
+        """Begin with no query."""
         self._collision, self._resolution, self.queries = collision, resolution, 0
         self._proofs = proofs
 

@@ -21,7 +21,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
-from evoexp.planners.answers import CoverShape
+from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
 from evoexp.planners.arm_tasks import (
     UNLIMITED,
     ArmTask,
@@ -29,7 +29,6 @@ from evoexp.planners.arm_tasks import (
     cover_notes,
     cover_shapes,
 )
-from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings

@@ -1,18 +1,22 @@
 """Small experiments to report on."""
 
 import functools
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.report import build
+from evoexp.report import build, style
 from evoexp.report.claim_rules import Rule
 from evoexp.report.judging import Hearing
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, gather
+from evoexp.report.results import ConditionResults, Results, gather
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory
 
@@ -69,6 +73,15 @@ def smoke_results(outputs: Path, name: str, *overrides: str) -> Results:
     )
 
 
+def made_up(experiment: Experiment, columns: Callable[[str], dict[str, Any]]) -> Results:
+    """Return results in which the runs of every condition have these columns, by its label."""
+    found = []
+    for label, condition in experiment.conditions:
+        rows = pd.DataFrame(columns(label))
+        found.append(ConditionResults(label, condition, len(rows), rows, {}, None, {}))
+    return Results(experiment.name, experiment.budget, tuple(found))
+
+
 def page_settings(name: str, figures: str | None = None) -> ReportSettings:
     """Return settings for an experiment's own page, or another one."""
     pages = {"formats": ("svg",), "figures": figures or smoke_experiment(name).report.figures}
@@ -86,6 +99,11 @@ def smoke_report(outputs: Path, name: str) -> Path:
 def figure_stems(directory: Path) -> set[str]:
     """Return the names of a report's figures."""
     return {path.stem for path in directory.glob("*.svg")}
+
+
+def can_be_drawn(table: pd.DataFrame, draw: Callable[[pd.DataFrame], Figure]) -> bool:
+    """Return whether there is a picture of a table."""
+    return len(style.drawn(lambda: draw(table), ("svg",), 60)["svg"]) > 1000
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pytest
 from composed import composed
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
-from evoexp.papers.chen.figures.field_grids import (
+from evoexp.papers.chen.fields_page import (
     MISSING,
     SURPLUS,
     WRONG,

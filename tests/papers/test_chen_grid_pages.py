@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.papers.chen import path_measures
-from evoexp.papers.chen.figures.field_grids import MISSING, SURPLUS, WRONG, compare
-from evoexp.papers.chen.path_measures import inside_points, routes, signature
-from evoexp.report.pages import page_of
-from report_samples import figure_stems, page_settings, smoke_report, smoke_results
+from evoexp.papers.chen import path_claims
+from evoexp.papers.chen.fields_page import MISSING, SURPLUS, WRONG, compare
+from evoexp.papers.chen.path_claims import inside_points, routes, signature
+from report_samples import figure_stems, smoke_report, smoke_results
 
 CENTRES = inside_points([(2, 2, 3, 3), (6, 2, 7, 3)])
 ABOVE = np.array([[0, 2], [1, 4], [4, 5], [9, 2]], dtype=float)
@@ -53,11 +52,6 @@ def test_rows_are_aligned_by_the_fewest_slips(printed: str, slips: list[tuple[in
     assert [(int(r.column), r.slip) for r in found.itertuples(index=False)] == slips
 
 
-@pytest.fixture(scope="module")
-def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("chen_grid")
-
-
 @pytest.mark.matrix
 def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(
     outputs: Path,
@@ -75,7 +69,7 @@ def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(
 
 def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) -> None:
     results = smoke_results(outputs, "chen_path")
-    groups = path_measures.group_list(results)
+    groups = path_claims.group_list(results)
     assert [(group.name, group.weights) for group in groups] == [
         ("(a)", (1, 0)),
         ("(b)", (0.1, 10)),
@@ -86,7 +80,7 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
         assert [c.is_control for c in group.conditions] == [False, False, True, True]
         for c in group.conditions:
             assert (c.column("best_cost") >= group.bound - 1e-9).all()
-    assert path_measures.shortest(groups) == pytest.approx(39.62741699796952)
+    assert path_claims.shortest(groups) == pytest.approx(39.62741699796952)
 
 
 @pytest.mark.matrix
@@ -107,12 +101,6 @@ def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
     assert "row 9 from the top, column 13: 17 for 13" in text
     missing = "row 6 from the top, column 5: 9 is left out (or any equal one of columns 5 to 7)"
     assert missing in text
-
-
-@pytest.mark.parametrize("figures", ["chen_path", "chen_lingering", "chen_fields"])
-def test_other_planners_get_the_generic_page(outputs: Path, figures: str) -> None:
-    results = smoke_results(outputs, "rana_planar", "ga.population_size=8", "ga.num_generations=1")
-    assert page_of(results, page_settings("rana_planar", figures)).claims == ()
 
 
 def test_the_page_of_the_mission_shows_path_posture_and_verdict(outputs: Path) -> None:

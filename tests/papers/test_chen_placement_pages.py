@@ -15,11 +15,6 @@ from report_samples import figure_stems, page_settings, smoke_report, smoke_resu
 
 
 @pytest.fixture(scope="module")
-def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("chen")
-
-
-@pytest.fixture(scope="module")
 def cases(outputs: Path) -> list[Case]:
     return case_results.cases(smoke_results(outputs, "chen_placement"))
 
@@ -76,7 +71,7 @@ def test_postures_end_at_the_target(cases: list[Case]) -> None:
     np.testing.assert_allclose(
         tips[["x_end", "y_end"]].to_numpy(), [[5.0, 1.4]] * len(tips), atol=1e-9
     )
-    assert set(table["posture"]) == {"", *placements.POSTURES}
+    assert set(table["posture"]) == {"", *placements.POSTURE_NAMES}
     assert len(table[table["element"] == "obstacle"]) == 2
 
 

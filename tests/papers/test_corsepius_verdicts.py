@@ -10,16 +10,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import report_samples
 from evoexp.configuration.experiment import Experiment
-from evoexp.papers.corsepius import claims as task_claims
+from evoexp.papers.corsepius import claims as paper_claims
 from evoexp.papers.corsepius import measures
-from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import judging
 from evoexp.report.judging import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Judge
 from evoexp.report.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import Results
 from report_samples import REPORT
 from shipped_conditions import expanded
 
@@ -37,11 +37,8 @@ def conditions_of(name: str) -> Experiment:
 
 def made_up(name: str, rows: Callable[[str], dict[str, object]]) -> Results:
     """Return results in which the runs of every condition have these columns."""
-    experiment, found = conditions_of(name), []
-    for label, condition in experiment.conditions:
-        table = pd.DataFrame({"stop_reason": ["goal"] * RUNS} | rows(label))
-        found.append(ConditionResults(label, condition, RUNS, table, {}, None, {}))
-    return Results(experiment.name, experiment.budget, tuple(found))
+    given = {"stop_reason": ["goal"] * RUNS}
+    return report_samples.made_up(conditions_of(name), lambda label: given | rows(label))
 
 
 def study(effort: Effort) -> dict[str, Claim]:
@@ -63,11 +60,12 @@ def study(effort: Effort) -> dict[str, Claim]:
 
     found = measures.tasks(made_up("corsepius_population", rows), "num_offspring")
     compared = {
-        metric: verdicts.compare_sizes(found, metric, SETTINGS) for metric in verdicts.METRICS
+        metric: paper_claims.compare_sizes(found, metric, SETTINGS)
+        for metric in paper_claims.METRICS
     }
     return {
         claim.text: claim
-        for claim in verdicts.judge_study(Judge("", 0.05, RULES), found, compared, SETTINGS)
+        for claim in paper_claims.judge_study(Judge("", SETTINGS, RULES), found, compared)
     }
 
 
@@ -119,7 +117,7 @@ def test_steep_costs_of_small_populations_are_over_proportional() -> None:
     claims = study(
         lambda task, size: (20.0 * max(1.0, (100.0 / size) ** 2), RUNS if size >= 100 else 5)
     )
-    for metric in verdicts.METRICS:
+    for metric in paper_claims.METRICS:
         text = f"Smaller populations increase planning times over-proportionally: {metric}"
         assert verdict(claims, text) == REPRODUCED
     assert verdict(claims, "Smaller populations reduce convergence") == REPRODUCED
@@ -168,7 +166,7 @@ def judged(
     name: str, rows: Callable[[str], dict[str, object]], monkeypatch: pytest.MonkeyPatch
 ) -> dict[str, str]:
     monkeypatch.setattr(judging, "not_judged", lambda results: "")
-    return {c.text: c.verdict for c in task_claims.judge_tasks(made_up(name, rows), SETTINGS)}
+    return {c.text: c.verdict for c in paper_claims.judge_tasks(made_up(name, rows), SETTINGS)}
 
 
 def test_a_wall_that_a_subgoal_opens_is_a_local_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -245,12 +243,12 @@ def test_allowed_contacts_are_named_with_the_verdict(monkeypatch: pytest.MonkeyP
         return task_rows({})(label) | {"allowed_contacts": ["table – bottle, hand – bottle"] * RUNS}
 
     monkeypatch.setattr(judging, "not_judged", lambda results: "")
-    found = task_claims.judge_tasks(made_up("corsepius_pick_and_place", rows), SETTINGS)
+    found = paper_claims.judge_tasks(made_up("corsepius_pick_and_place", rows), SETTINGS)
     told = next(c.evidence for c in found if c.name == "paths_avoid_obstacles")
     assert "may touch, 0.001 m deep at most: table – bottle, hand – bottle" in told
 
 
 def test_below_the_papers_budget_nothing_is_judged() -> None:
     results = made_up("corsepius_wall", task_rows({"wall": 0}))._replace(budget="smoke")
-    for claim in task_claims.judge_tasks(results, SETTINGS):
+    for claim in paper_claims.judge_tasks(results, SETTINGS):
         assert claim.verdict.startswith(NOT_JUDGED)

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import report_samples
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.papers.lavoie import claims, control_claims, measures, sweep_claims
+from evoexp.papers.lavoie import claims, measures, sweep_page
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import RULES
 from evoexp.report.judging import (
@@ -25,7 +26,7 @@ from evoexp.report.judging import (
 )
 from evoexp.report.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import Results
 from evoexp.report.statistics import Proportion, fisher_exact
 from report_samples import REPORT, hearing
 
@@ -42,20 +43,19 @@ def made_up(errors: dict[str, np.ndarray], *words: str) -> Results:
 
     NaN: no solution.
     """
-    experiment, found = conditions_of(*words), []
-    for label, condition in experiment.conditions:
+
+    def columns(label: str) -> dict[str, object]:
         values = errors[label]
         solved = ~np.isnan(values)
-        columns = {
+        return {
             "solved": solved,
             "certified": pd.array([True] * len(values), dtype="boolean"),
             "evaluations": np.full(len(values), 1000),
             "term_position_error_sp2": np.where(solved, values, 0.5),
             "term_attempts": np.ones(len(values)),
         }
-        rows = pd.DataFrame(columns)
-        found.append(ConditionResults(label, condition, len(rows), rows, {}, None, {}))
-    return Results(experiment.name, experiment.budget, tuple(found))
+
+    return report_samples.made_up(conditions_of(*words), columns)
 
 
 def below_one(count: int, runs: int = 1000) -> np.ndarray:
@@ -74,7 +74,7 @@ def below_one(count: int, runs: int = 1000) -> np.ndarray:
 )
 def test_a_printed_percentage_is_a_sample_too(count: int, runs: int, verdict: str) -> None:
     results = made_up({"7-DOF": below_one(count, runs), "10-DOF": below_one(991)}, "lavoie")
-    found = claims.percentages(Judge("", 0.05, RULES), results.conditions, 0.95)
+    found = claims.percentages(Judge("", SETTINGS, RULES), results.conditions)
     assert [claim.verdict for claim in found] == [verdict, *[REPRODUCED] * 3]
 
 
@@ -83,7 +83,7 @@ def test_four_percentages_are_one_family_of_tests() -> None:
     both = {"7-DOF": below_one(935), "10-DOF": below_one(999)}
     one, two = Proportion(999, 1000), Proportion(991, 1000)
     assert fisher_exact(one, two) < 0.05 < 4 * fisher_exact(one, two)
-    found = claims.percentages(Judge("", 0.05, RULES), made_up(both, "lavoie").conditions, 0.95)
+    found = claims.percentages(Judge("", SETTINGS, RULES), made_up(both, "lavoie").conditions)
     assert [claim.verdict for claim in found] == [REPRODUCED] * 4
     assert all("adjusted by Holm over 4" in claim.evidence for claim in found)
 
@@ -105,7 +105,7 @@ def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: st
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(991)}, "lavoie")
-    seven, _, ten, _ = claims.percentages(Judge("", 0.05, RULES), results.conditions, 0.95)
+    seven, _, ten, _ = claims.percentages(Judge("", SETTINGS, RULES), results.conditions)
     assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
     assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
     assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed share lies outside" in seven.evidence
@@ -146,7 +146,7 @@ def test_runs_need_no_start_if_they_fail_no_more_often_than_the_papers(
     errors[label][:failures] = np.nan
     results = made_up(errors, "lavoie")
     own = next(c for c in results.conditions if c.label == label)
-    found = claims.no_start_needed(judge(results, SETTINGS, RULES), own, 0.95)
+    found = claims.no_start_needed(judge(results, SETTINGS, RULES), own)
     assert found is not None
     assert found.verdict == verdict
     assert f"{1000 - failures} of 1000" in found.evidence
@@ -156,14 +156,13 @@ def test_runs_need_no_start_if_they_fail_no_more_often_than_the_papers(
 def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(999)}, "lavoie")
     below_1, below_2 = claims.more_joints_are_better(
-        judge(results, SETTINGS, RULES), results.conditions, 0.95
+        judge(results, SETTINGS, RULES), results.conditions
     )
     assert (below_1.verdict, below_2.verdict) == (REPRODUCED, INCONCLUSIVE)
     assert "Fisher's exact p = 4.1e−10" in below_1.evidence
     alone = results._replace(conditions=results.conditions[:1])
     assert (
-        list(claims.more_joints_are_better(judge(alone, SETTINGS, RULES), alone.conditions, 0.95))
-        == []
+        list(claims.more_joints_are_better(judge(alone, SETTINGS, RULES), alone.conditions)) == []
     )
 
 
@@ -173,15 +172,11 @@ def test_motions_in_contact_contradict() -> None:
     certified = seven.summaries["certified"].copy()
     certified[:115] = False
     seven = dataclasses.replace(seven, summaries=seven.summaries.assign(certified=certified))
-    found = claims.free_of_collision(
-        judge(results, SETTINGS, RULES), seven, Proportion(115, 1000), 0.95
-    )
+    found = claims.free_of_collision(judge(results, SETTINGS, RULES), seven, Proportion(115, 1000))
     assert found.verdict == CONTRADICTED
     assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
     assert (
-        claims.free_of_collision(
-            judge(results, SETTINGS, RULES), ten, Proportion(0, 1000), 0.95
-        ).verdict
+        claims.free_of_collision(judge(results, SETTINGS, RULES), ten, Proportion(0, 1000)).verdict
         == REPRODUCED
     )
 
@@ -192,11 +187,9 @@ def test_what_is_overridden_or_too_few_is_not_judged() -> None:
     other = made_up(errors, "lavoie", "planner.success=finite")
     for results, why in ((few, "fewer replicates than planned"), (other, "settings overridden")):
         for claim in (
-            *claims.percentages(judge(results, SETTINGS, RULES), results.conditions[:1], 0.95),
-            *claims.more_joints_are_better(
-                judge(results, SETTINGS, RULES), results.conditions, 0.95
-            ),
-            claims.no_start_needed(judge(results, SETTINGS, RULES), results.conditions[0], 0.95),
+            *claims.percentages(judge(results, SETTINGS, RULES), results.conditions[:1]),
+            *claims.more_joints_are_better(judge(results, SETTINGS, RULES), results.conditions),
+            claims.no_start_needed(judge(results, SETTINGS, RULES), results.conditions[0]),
         ):
             assert claim is not None
             assert claim.verdict == f"{NOT_JUDGED} ({why})"
@@ -211,7 +204,7 @@ def sweep(results: Results, in_contact: dict[str, int] | None = None) -> list[Cl
         )
         for c in results.conditions
     }
-    return list(sweep_claims.judge_sweep(results, SETTINGS, refuted))
+    return list(sweep_page.judge_sweep(results, SETTINGS, refuted))
 
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:
@@ -287,12 +280,12 @@ def test_the_best_control_solves_most_and_then_costs_least() -> None:
     labels = [label for label, _ in conditions_of("lavoie_controls").conditions]
     none = made_up({label: np.full(20, np.nan) for label in labels}, "lavoie_controls")
     drawn, pairs = (c for c in none.conditions if c.is_control and c.label.startswith("7-DOF"))
-    assert control_claims.best_control([pairs, drawn]) is pairs, "the first where none is better"
+    assert claims.best_control([pairs, drawn]) is pairs, "the first where none is better"
     one = dataclasses.replace(drawn, summaries=drawn.summaries.assign(solved=[True] + [False] * 19))
-    assert control_claims.best_control([pairs, one]) is one
+    assert claims.best_control([pairs, one]) is one
     cheap = dataclasses.replace(one, summaries=one.summaries.assign(evaluations=10))
-    assert control_claims.best_control([one, cheap]) is cheap
-    assert control_claims.solved_within(one, one).having == 1, "runs without a solution count not"
+    assert claims.best_control([one, cheap]) is cheap
+    assert claims.solved_within(one, one).having == 1, "runs without a solution count not"
 
 
 def test_positions_and_chords_are_judged_with_adjusted_p_values() -> None:

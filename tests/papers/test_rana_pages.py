@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp.papers.rana import crossover_checks, measures, motions, operators_page, weights_page
+from evoexp.papers.rana import measures, motions, operators_page, weights_page
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.records import generations
 from evoexp.report import results as report_results
@@ -16,11 +16,6 @@ from evoexp.shipped import Shipped
 from report_samples import page_settings, smoke_results
 
 WORDS = ("ga.population_size=12", "ga.num_generations=3")
-
-
-@pytest.fixture(scope="module")
-def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("rana")
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +96,7 @@ def test_unevenness_is_the_sum_over_arms(obstacles: Results) -> None:
 
 def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
     (condition, *_) = smoke_results(outputs, "rana_crossover", *WORDS).conditions
-    shares = crossover_checks.kept_apart(condition)
+    shares = operators_page.kept_apart(condition)
     assert list(shares) == [0]  # three generations only
     planner, problem = condition.planner, motions.problem(condition)
     first = next(iter(generations(planner.evolve(problem, condition.condition.rng(0)))))

@@ -12,6 +12,7 @@ from evoexp.report.results import Results
 from evoexp.report.statistics import Proportion
 from report_samples import REPORT
 
+SETTINGS = ReportSettings(**REPORT, figures=None)  # type: ignore[arg-type]
 BETTER = compare("cost", np.arange(12.0), np.arange(12.0) + 20.0, True, 0.95, 50)
 ENTRY = (
     '{{claim: "{{who}}a claim of {{metric}}", source: "section 5", kind: {kind}, experiments: [e]'
@@ -59,7 +60,7 @@ def test_a_claim_carries_rule_and_number_and_is_judged_by_its_own_kind_alone(
     tmp_path: Path, kind: str
 ) -> None:
     rules = rules_of(tmp_path, kind, OWN if kind == "own" else "")
-    hearing = Judge("", 0.05, rules).on("told", who="", metric="cycles")
+    hearing = Judge("", SETTINGS, rules).on("told", who="", metric="cycles")
     one, two = Proportion(20, 20), Proportion(0, 20)
     judged = {
         "every": lambda: hearing.every("20", 20, 20, 20),
@@ -83,7 +84,7 @@ def test_a_claim_carries_rule_and_number_and_is_judged_by_its_own_kind_alone(
 
 
 def test_an_unjudged_claim_names_the_reason_and_keeps_its_numbers(tmp_path: Path) -> None:
-    hearing = Judge("budget smoke", 0.05, rules_of(tmp_path, "every")).on(
+    hearing = Judge("budget smoke", SETTINGS, rules_of(tmp_path, "every")).on(
         "told", who="", metric="cycles"
     )
     claim = hearing.every("1 of 2", 1, 2, 2)
@@ -93,7 +94,7 @@ def test_an_unjudged_claim_names_the_reason_and_keeps_its_numbers(tmp_path: Path
 
 @pytest.mark.parametrize("kind", ["better", "better than all", "best"])
 def test_a_comparison_with_nothing_is_not_judged(tmp_path: Path, kind: str) -> None:
-    hearing = Judge("", 0.05, rules_of(tmp_path, kind)).on("told", who="", metric="cycles")
+    hearing = Judge("", SETTINGS, rules_of(tmp_path, kind)).on("told", who="", metric="cycles")
     claim = {
         "better": lambda: hearing.better(None, "lower"),
         "better than all": lambda: hearing.better_than_all("–", []),

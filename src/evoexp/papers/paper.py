@@ -9,13 +9,17 @@ The words stand in `words.yaml` beside the pages; words in braces are given wher
       attempts:                               # the stem of its files, unless `stem` gives another
         title: "Attempts"
         caption: "Share of runs that took so many attempts, with Wilson's {level:g} % interval."
+        columns: "Columns attempts, having, total, …"  # of its table, for the file beside it
     tables:
       tasks: {heading: "Tasks", headers: [task, goal met], note: "Median [quartiles]."}
     checks:
       arms: [["Time of a run", "the paper prints its own"]]
+    quantities:                               # rows of the table of results: name, unit, column
+      arms: [[attempts, "–", term_attempts]]  # or the name of a function of a run's values
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,14 +27,36 @@ import pandas as pd
 import yaml
 from matplotlib.figure import Figure
 
-from evoexp.report.kit import ConditionResults, Drawing, Page, PlayedRun, Results, Table
+from evoexp.report.claim_rules import Rules
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    Page,
+    PlayedRun,
+    Quantity,
+    Results,
+    Table,
+    Values,
+    by_column,
+    read_rules,
+    run_measures,
+)
+from evoexp.report.pages.generic import quantity
+
+# give the table of a figure, and draw it
+Functions = tuple[Callable[..., pd.DataFrame], Callable[[pd.DataFrame], Figure]]
+VALUES: dict[str, Values] = {  # of runs, that rows of the table of results may name
+    "first_feasible": run_measures.first_feasible,
+    "search_seconds": run_measures.search_seconds,
+    "evaluations_per_second": run_measures.evaluations_per_second,
+}
 
 
 class Paper(NamedTuple):
     """The name of a paper, and the words of its pages."""
 
     name: str  # "Chen & Zalzala 1995"
-    words: Mapping[str, Mapping[str, Any]]  # pages, figures, tables and checks, by their names
+    words: Mapping[str, Mapping[str, Any]]  # pages, figures, tables, …, by their names
 
     def page(self, results: Results, name: str, base: Page | None = None, **parts: Any) -> Page:
         """Build a page with its introduction.
@@ -50,9 +76,9 @@ class Paper(NamedTuple):
     def drawing(
         self,
         name: str,
-        table: Callable[[], pd.DataFrame],
-        draw: Callable[[pd.DataFrame], Figure],
+        functions: Functions,
         conditions: Sequence[ConditionResults],
+        *arguments: Any,
         plays: Sequence[PlayedRun] = (),
         suffix: str = "",
         **words: object,
@@ -61,18 +87,25 @@ class Paper(NamedTuple):
 
         Args:
             name: Of the figure among the words.
-            table: Gives its data.
-            draw: Draws its data.
+            functions: Give the table, and draw it.
             conditions: Whose results it shows.
+            arguments: Of the function that gives the table.
             plays: Runs whose motions it shows.
             suffix: Ends the stem of one of several figures; the title then names the condition.
             words: Filled in for the words in braces.
         """
-        entry = self.words["figures"][name]
+        entry, (table, draw) = self.words["figures"][name], functions
         title, caption = (entry[part].format(**words) for part in ("title", "caption"))
-        stem = entry.get("stem", name).format(**words) + suffix
-        title += f" ({conditions[0].label})" if suffix else ""
-        return Drawing(stem, title, caption, table, draw, tuple(conditions), tuple(plays))
+        return Drawing(
+            stem=entry.get("stem", name).format(**words) + suffix,
+            title=f"{title} ({conditions[0].label})" if suffix else title,
+            caption=caption,
+            table=partial(table, *arguments),
+            draw=draw,
+            conditions=tuple(conditions),
+            plays=tuple(plays),
+            columns=entry.get("columns", ""),
+        )
 
     def table(self, name: str, rows: Sequence[tuple[object, ...]], **words: object) -> Table:
         """Return a table with its heading, its headers and its note."""
@@ -81,12 +114,42 @@ class Paper(NamedTuple):
         note = entry.get("note", "").format(**words)
         return Table(entry["heading"], headers, tuple(rows), note)
 
-    def checks(self, name: str) -> tuple[tuple[str, str], ...]:
-        """Return the checks of a page that no results change: (title, finding)."""
-        return tuple((title, finding) for title, finding in self.words["checks"][name])
+    def quantities(
+        self,
+        results: Results,
+        name: str,
+        values: Mapping[str, Values] | None = None,
+        **words: object,
+    ) -> tuple[Quantity, ...]:
+        """Return rows of the table of results.
+
+        Args:
+            results: With data.
+            name: Of the rows among the words; the unit "length" is the scene's unit of length.
+            values: Functions that the rows name, beside those of every paper.
+            words: Filled in for the words in braces.
+        """
+        length, known = results.with_data[0].condition.length_unit, VALUES | dict(values or {})
+        return tuple(
+            quantity(
+                results,
+                title.format(**words),
+                length if unit == "length" else unit,
+                known.get(column, by_column(column)),
+            )
+            for title, unit, column in self.words["quantities"][name]
+        )
+
+    def checks(self, name: str, **words: object) -> tuple[tuple[str, str], ...]:
+        """Return rows of checks, (title, finding), with their words in braces filled in."""
+        return tuple(
+            (title.format(**words), finding.format(**words))
+            for title, finding in self.words["checks"][name]
+        )
 
 
-def read_paper(path: Path) -> Paper:
-    """Read a file of words."""
-    words = yaml.safe_load(path.read_text(encoding="utf-8"))
-    return Paper(words.pop("name"), words)
+def read_paper(module: str) -> tuple[Paper, Rules]:
+    """Read the words and the rules that stand beside a module, given by its file."""
+    folder = Path(module).parent
+    words = yaml.safe_load((folder / "words.yaml").read_text(encoding="utf-8"))
+    return Paper(words.pop("name"), words), read_rules(folder / "claims.yaml")

@@ -170,7 +170,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
             "columns": {
                 str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
             },
-            "description": description(drawing.table),
+            "description": drawing.columns or description(drawing.table),
         },
         "files": {name: _sha256(content) for name, content in pictures.items()},
     }

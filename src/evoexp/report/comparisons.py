@@ -21,6 +21,7 @@ from evoexp.report.statistics import (
 )
 
 Values = Callable[[ConditionResults], FloatArray]
+Pair = tuple[ConditionResults, ConditionResults]
 
 
 class Comparison(NamedTuple):
@@ -44,6 +45,72 @@ class Comparison(NamedTuple):
         point the other way.
         """
         return self.test.direction if self.p_adjusted < significance else 0
+
+
+class Measure(NamedTuple):
+    """A quantity that conditions are compared in."""
+
+    name: str
+    values: Values  # of a condition, (done,)
+    unit: str = "–"
+    lower_is_better: bool = True
+
+
+class Family(NamedTuple):
+    """Conditions that are compared with each other."""
+
+    name: str  # of the first ones of the pairs
+    pairs: tuple[Pair, ...]  # (first, other)
+
+    @classmethod
+    def of(cls, conditions: Sequence[ConditionResults]) -> "Family":
+        """Return the first of several conditions against each of the others."""
+        first, *others = conditions
+        return cls(first.label, tuple((first, other) for other in others))
+
+
+class FamilyComparison(NamedTuple):
+    """A family compared in one quantity."""
+
+    measure: Measure
+    family: Family
+    rows: tuple[Comparison, ...]  # one per pair that shares seeds; p-values are adjusted over them
+
+
+def compare_families(
+    families: Iterable[Family], measures: Iterable[Measure], settings: ReportSettings
+) -> tuple[FamilyComparison, ...]:
+    """Compare every family in every quantity."""
+    own = tuple(families)
+    return tuple(
+        FamilyComparison(
+            measure,
+            family,
+            compared(
+                family.pairs,
+                measure.values,
+                settings,
+                lower_is_better=measure.lower_is_better,
+            ),
+        )
+        for measure in measures
+        for family in own
+    )
+
+
+def headed(found: Iterable[FamilyComparison]) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    """Return comparisons with their headings, as a page takes them; none without rows."""
+    return tuple(
+        (f"{one.measure.name}: {one.family.name} against …", one.rows) for one in found if one.rows
+    )
+
+
+def rows_by_name(found: Iterable[FamilyComparison]) -> dict[str, tuple[Comparison, ...]]:
+    """Return the rows of all families together, by the name of their quantity."""
+    rows: dict[str, tuple[Comparison, ...]] = {}
+    for one in found:
+        rows[one.measure.name] = rows.get(one.measure.name, ()) + one.rows
+    return rows
 
 
 def by_column(name: str) -> Values:
@@ -108,7 +175,7 @@ def beside(first: Condition, control: Condition) -> bool:
 
 
 def compared(
-    pairs: Iterable[tuple[ConditionResults, ConditionResults]],
+    pairs: Iterable[Pair],
     values: Values,
     settings: ReportSettings,
     *,

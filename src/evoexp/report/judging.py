@@ -6,11 +6,11 @@ from typing import NamedTuple
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report import markdown
 from evoexp.report.claim_rules import NO_RULES, OWN, Rule, Rules
-from evoexp.report.comparisons import Comparison
+from evoexp.report.comparisons import Comparison, Values, compared
 from evoexp.report.page_parts import Claim
 from evoexp.report.parameters import option, planned_replicates
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import Proportion, fisher_exact
 from evoexp.shipped import config_directory, shipped
 
@@ -151,8 +151,28 @@ class Judge(NamedTuple):
     """Opens the hearings of claims; where nothing is judged, each claim names the reason."""
 
     reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
-    significance: float  # below this adjusted p-value a difference counts
+    settings: ReportSettings  # levels and resamples
     rules: Rules = NO_RULES  # of the paper's claims, by name
+
+    @property
+    def significance(self) -> float:
+        """Below this adjusted p-value a difference counts."""
+        return self.settings.significance
+
+    @property
+    def level(self) -> float:
+        """The level of every interval."""
+        return self.settings.confidence
+
+    def compared(
+        self, first: ConditionResults, second: ConditionResults, values: Values
+    ) -> Comparison | None:
+        """Compare two conditions in a quantity, lower is better; None: they share no seed."""
+        return next(iter(compared([(first, second)], values, self.settings)), None)
+
+    def share(self, proportion: Proportion, decimals: int = 0) -> str:
+        """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
+        return proportion.with_interval(self.level, decimals)
 
     def on(self, name: str, **words: object) -> Hearing:
         """Open the hearing of a claim.
@@ -171,7 +191,7 @@ class Judge(NamedTuple):
 
 def judge(results: Results, settings: ReportSettings, rules: Rules = NO_RULES) -> Judge:
     """Return the judge of an experiment's claims."""
-    return Judge(not_judged(results), settings.significance, rules)
+    return Judge(not_judged(results), settings, rules)
 
 
 def not_judged(results: Results) -> str:
@@ -209,6 +229,11 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
             if results.experiment in rule.experiments and rule.name not in known:
                 told = "not among its conditions: " + ", ".join(sorted(missing))
                 yield Hearing(rule.unjudged(), "", 0.0).made(told, "0", verdict)
+
+
+def fisher_evidence(one: Proportion, two: Proportion) -> str:
+    """Return the test of two proportions in words: "Fisher's exact p = 0.02"."""
+    return f"Fisher's exact p = {markdown.p_value(fisher_exact(one, two))}"
 
 
 def evidence(comparison: Comparison, better: str) -> str:

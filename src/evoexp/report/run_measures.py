@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
+from evoexp.report.comparisons import Values
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import Proportion
 
@@ -80,3 +81,31 @@ def first_feasible(condition: ConditionResults) -> FloatArray:
     """
     found = condition.column("first_feasible_generation")
     return np.where(np.isnan(found), np.inf, found)
+
+
+def num_joints(condition: ConditionResults) -> int:
+    """Return the number of joints of the arm, whose start the scenario names."""
+    return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
+
+
+def certified(condition: ConditionResults) -> Proportion:
+    """Count the solved runs whose motions the exact verdict certifies."""
+    free = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
+    return counted(free[solved(condition)])
+
+
+def where_solved(values: Values) -> Values:
+    """Return values of runs, (done,), that are infinite where a run is not solved."""
+    return lambda condition: np.where(solved(condition), values(condition), np.inf)
+
+
+def on_common_seeds(
+    one: ConditionResults, two: ConditionResults, values: Values
+) -> list[tuple[FloatArray, BoolArray]]:
+    """Return values and success of the replicates that both conditions have, for each of both."""
+    common = one.summaries.index.intersection(two.summaries.index)
+    return [
+        (values(c)[rows], solved(c)[rows])
+        for c in (one, two)
+        for rows in (c.summaries.index.get_indexer(common),)
+    ]

@@ -1,6 +1,6 @@
 """The assumed numbers of Chen & Zalzala 1995, and which headline claims on paths survive others."""
 
-from evoexp.papers.chen import path_claims, path_measures
+from evoexp.papers.chen import path_claims
 from evoexp.papers.chen.rules import PAPER, RULES
 from evoexp.report import kit
 from evoexp.report.kit import assumptions, generic
@@ -8,7 +8,7 @@ from evoexp.report.kit import assumptions, generic
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of assumed numbers, or the generic page if another planner was run."""
-    if not path_measures.fits(results):
+    if not path_claims.fits(results):
         return generic.page(results, settings)
 
     def truth(condition: kit.ConditionResults) -> kit.ConditionResults:
@@ -26,21 +26,21 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
             "much_longer",
             "length above shortest [%]",
             lambda c: path_claims.excess_of(c, shortest(c)),
-            lambda judge, c, _: path_claims.much_longer(judge, c, c.label, shortest(c), truth(c)),
+            lambda judge, c, _: path_claims.much_longer(judge, c, shortest(c), truth(c)),
         ),
         kit.Headline(
             "nearly_best",
             "cost above best known [%]",
-            lambda c: path_measures.gaps(c, known(c)),
+            lambda c: path_claims.gaps(c, known(c)),
             lambda judge, c, _: path_claims.nearly_best(
-                judge, c, c.label, known(c), known(c, "term_lower_bound")
+                judge, c, known(c), known(c, "term_lower_bound")
             ),
         ),
         kit.Headline(
             "path_evolution",
             "cost C",
             kit.by_column("best_cost"),
-            lambda judge, c, controls: path_claims.evolution(judge, settings, c, c.label, controls),
+            path_claims.evolution,
         ),
     )
     return assumptions.page(results, settings, RULES, PAPER.name, headlines)

@@ -105,11 +105,7 @@ class Case(NamedTuple):
         return [row[:2] for row in self.minima[best]]
 
     def ends(self) -> dict[str, FloatArray]:
-        """Return the postures at which local methods end.
-
-        Returns:
-            Name of a method that was run → (starts, 3): θ1, θ2 [deg], E.
-        """
+        """Return local method → the postures at which it ends, (starts, 3): θ1, θ2 [deg], E."""
         own = self.conventional
         return {
             name: own.array(key)

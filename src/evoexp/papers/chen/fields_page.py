@@ -1,25 +1,168 @@
 """Chen & Zalzala 1995, Fig. 1: two numerical potential fields, and the slips of their print."""
 
-from functools import partial
+import difflib
+from collections.abc import Sequence
+from importlib import resources
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 
-from evoexp.papers.chen.figures import field_grids
 from evoexp.papers.chen.rules import PAPER, RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
+from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import generic, judging
+from evoexp.report.kit import generic, groups, judging, records, style
 
+BLOCKED = "*"
+MOST_LEVELS = 10  # of a map whose colour bar shows them one by one
+WRONG, MISSING, SURPLUS = "wrong", "missing", "surplus"
+MARKED_SLIPS = {
+    WRONG: "another number is printed (below, small)",
+    MISSING: "nothing is printed for the node",
+    SURPLUS: "a token too many is printed here",
+}
+FRAMES: dict[str, dict[str, Any]] = {
+    slip: {"fill": False, "edgecolor": colour, "linewidth": 1.4}
+    for slip, colour in ((WRONG, "#CC3311"), (MISSING, "#EE7733"), (SURPLUS, "#0077BB"))
+}
+
+NUMBER: dict[str, Any] = {"ha": "center", "va": "center_baseline", "fontsize": 6.0}
+SMALL = NUMBER | {"va": "center", "fontsize": 4.2}
 PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")
 PLACE = "row {0.row} from the top, column {0.column}"
 SLIPS = {
-    field_grids.WRONG: PLACE + ": {0.printed} for {0.computed}",
-    field_grids.MISSING: PLACE + ": {0.computed} is left out",
-    field_grids.SURPLUS: PLACE + ": a {0.printed} too many before it",
+    WRONG: PLACE + ": {0.printed} for {0.computed}",
+    MISSING: PLACE + ": {0.computed} is left out",
+    SURPLUS: PLACE + ": a {0.printed} too many before it",
 }
+
+
+def printed(name: str) -> list[list[list[str]]]:
+    """Return the grids of an asset, each a list of rows of words.
+
+    Empty lines stand between grids; lines that begin with `;` are comments.
+    """
+    text = resources.files("evoexp").joinpath("assets", name).read_text(encoding="utf-8")
+    lines = (line for line in text.splitlines() if not line.startswith(";"))
+    blocks = "\n".join(lines).split("\n\n")
+    return [[row.split() for row in block.strip().splitlines()] for block in blocks]
+
+
+def rows_of(values: FloatArray, blocked: np.ndarray, edge: str = BLOCKED) -> list[list[str]]:
+    """Return a field (along x, along y) as rows of words from the top, as it would be printed.
+
+    `blocked` nodes are printed as `*`, those with a free node beside them as `edge`.
+    """
+    free = np.pad(~blocked, 1)
+    beside = free[:-2, 1:-1] | free[2:, 1:-1] | free[1:-1, :-2] | free[1:-1, 2:]
+    numbers = np.vectorize(lambda v: f"{v:g}")(values)
+    words = np.where(blocked, np.where(beside, edge, BLOCKED), numbers)
+    return [[str(word) for word in row] for row in words.T[::-1]]
+
+
+def compare(
+    name: str, computed: Sequence[Sequence[str]], given: Sequence[Sequence[str]]
+) -> pd.DataFrame:
+    """Compare a computed grid with a printed one, cell by cell.
+
+    A slip is empty, `wrong`, `missing` (nothing is printed for the cell) or `surplus` (printed
+    before the column, and belongs to no cell).
+    """
+    found: list[tuple[object, ...]] = []
+    for row, (own, theirs) in enumerate(zip(computed, given, strict=True)):
+        opcodes = difflib.SequenceMatcher(None, theirs, own, autojunk=False).get_opcodes()
+        for kind, i1, i2, j1, j2 in opcodes:
+            both = min(i2 - i1, j2 - j1)
+            slip = "" if kind == "equal" else WRONG
+            found += [(name, row, j1 + k, own[j1 + k], theirs[i1 + k], slip) for k in range(both)]
+            found += [(name, row, j, own[j], "", MISSING) for j in range(j1 + both, j2)]
+            found += [(name, row, j2, "", theirs[i], SURPLUS) for i in range(i1 + both, i2)]
+    return pd.DataFrame(found, columns=["field", "row", "column", "computed", "printed", "slip"])
+
+
+def draw_fields(table: pd.DataFrame) -> Figure:
+    """Draw one grid per field, with the number of every node, and mark where the print differs."""
+    count = table["field"].nunique()
+    figure = style.figure(7.2 * 0.5 * 1.12, style.WIDTH * (1.0 if count > 1 else 0.55))
+    panels = figure.subplots(1, count, squeeze=False)[0]
+    for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
+        _draw_field(axes, rows, str(name))
+    keys = [
+        Rectangle((0, 0), 1, 1, label=text, **FRAMES[slip])
+        for slip, text in MARKED_SLIPS.items()
+        if (table["slip"] == slip).any()
+    ]
+    if keys:
+        style.keys_below(figure, keys)
+    return figure
+
+
+def draw_maps(table: pd.DataFrame) -> Figure:
+    """Draw fields as shaded maps: columns field, x, y, value (NaN where no path can be)."""
+    figure, panels = style.row_of_panels(3.4, table["field"].nunique())
+    for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
+        wide = rows.pivot_table(index="y", columns="x", values="value", dropna=False)
+        image = wide.to_numpy(dtype=np.float64)
+        look: dict[str, Any] = {"cmap": "viridis", "interpolation": "nearest", "origin": "lower"}
+        levels = np.unique(image[np.isfinite(image)])
+        if 1 < len(levels) <= MOST_LEVELS:  # a colour and a tick for each number that there is
+            middles = 0.5 * (levels[1:] + levels[:-1])
+            ends = 2.0 * levels[0] - middles[0], 2.0 * levels[-1] - middles[-1]
+            look["norm"] = BoundaryNorm([ends[0], *middles, ends[1]], 256)
+        shown = axes.imshow(image, **look)
+        bar = figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
+        for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
+            axis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+        if "norm" in look:
+            bar.set_ticks(levels.tolist())
+            bar.minorticks_off()
+        axes.grid(visible=False)
+        axes.set(title=str(name), xlabel="x [node]", ylabel="y [node]", facecolor=style.NEUTRAL)
+    return figure
+
+
+def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
+    """Draw a grid: a shaded square with a number per node, frames around slips."""
+    count = int(rows["row"].max()) + 1
+    width = int(rows.loc[rows["slip"] != SURPLUS, "column"].max()) + 1
+    numbers = pd.to_numeric(rows["computed"], errors="coerce")
+    shades = 0.97 - 0.32 * numbers / float(np.nanmax(numbers))
+    for cell, shade in zip(records(rows), shades, strict=True):
+        x, y = cell.column, count - 1 - cell.row
+        # a token too many stands between two nodes
+        if cell.slip == SURPLUS:
+            axes.add_patch(Rectangle((x - 0.62, y - 0.46), 0.24, 0.92, zorder=3, **FRAMES[SURPLUS]))
+            continue
+        # the node and its number, lifted where a wrong one stands below
+        blocked, wrong = cell.computed == BLOCKED, cell.slip == WRONG
+        face, ink = (style.NEUTRAL, "white") if blocked else (str(shade), "black")
+        square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, edgecolor="white", lw=0.5)
+        axes.add_patch(square)
+        axes.text(x, y + 0.12 * wrong, cell.computed, color=ink, **NUMBER)
+        # a wrong or missing number
+        if cell.slip:
+            look = FRAMES[cell.slip]
+            axes.add_patch(Rectangle((x - 0.46, y - 0.46), 0.92, 0.92, zorder=3, **look))
+        if wrong:
+            axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **SMALL)
+    axes.grid(visible=False)
+    axes.set(
+        xlim=(-0.5, width - 0.3),
+        ylim=(-0.5, count - 0.5),
+        aspect="equal",
+        xticks=range(0, width, 5),
+        yticks=range(0, count, 5),
+        xlabel="x [node]",
+        ylabel="y [node]",
+        title=title,
+    )
 
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -46,20 +189,19 @@ def _fields(condition: kit.ConditionResults) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _compared(condition: kit.ConditionResults) -> pd.DataFrame:
-    """Return all nodes of both fields beside the printed ones; see `field_grids.compare`."""
+    """Return all nodes of both fields beside the printed ones; see `compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
-    computed = field_grids.rows_of(goal, blocked), field_grids.rows_of(unsafeness, blocked, edge)
-    parts = map(field_grids.compare, NAMES, computed, field_grids.printed(PRINT))
+    computed = rows_of(goal, blocked), rows_of(unsafeness, blocked, edge)
+    parts = map(compare, NAMES, computed, printed(PRINT))
     return pd.concat(parts, ignore_index=True)
 
 
 def _claim(judge: kit.Judge, name: str, table: pd.DataFrame) -> kit.Claim:
     """Judge that a field is printed as the wave front computes it."""
-    total = int((table["slip"] != field_grids.SURPLUS).sum())
+    total = int((table["slip"] != SURPLUS).sum())
     same, wrong, missing, surplus = (
-        int((table["slip"] == slip).sum())
-        for slip in ("", field_grids.WRONG, field_grids.MISSING, field_grids.SURPLUS)
+        int((table["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
     )
     evidence = (
         f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left out, "
@@ -80,9 +222,9 @@ def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:
 
 def _alike(slip: Any, table: pd.DataFrame) -> str:
     """Name the equal neighbours of a number left out: it may be any of them that is missing."""
-    if slip.slip != field_grids.MISSING:
+    if slip.slip != MISSING:
         return ""
-    own = table[(table["row"] == slip.row) & (table["slip"] != field_grids.SURPLUS)]
+    own = table[(table["row"] == slip.row) & (table["slip"] != SURPLUS)]
     words = own.sort_values("column")["computed"].to_list()
     first = last = int(slip.column)
     while first > 0 and words[first - 1] == slip.computed:
@@ -93,22 +235,15 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
 
 
 def _numbers(condition: kit.ConditionResults, table: pd.DataFrame) -> kit.Drawing:
-    return PAPER.drawing(
-        "fig_1_fields", partial(_compared_table, table), field_grids.draw_fields, (condition,)
-    )
-
-
-def _compared_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the compared fields: columns as of `field_grids.compare`."""
-    return table
+    return PAPER.drawing("fig_1_fields", (lambda: table, draw_fields), (condition,))
 
 
 def _map(condition: kit.ConditionResults) -> kit.Drawing:
     return PAPER.drawing(
         "fields_map",
-        partial(_map_table, condition),
-        field_grids.draw_maps,
+        (_map_table, draw_maps),
         (condition,),
+        condition,
         shape="_".join(map(str, _fields(condition)[0].shape)),
         label=condition.label,
     )

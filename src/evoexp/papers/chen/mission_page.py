@@ -1,14 +1,112 @@
 """Chen & Zalzala 1995, both searches joined: a safe path and a docking posture as one motion."""
 
+from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
+import pandas as pd
+import pinocchio as pin
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
-from evoexp.papers.chen.figures import missions
+from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
 from evoexp.papers.chen.rules import PAPER
-from evoexp.planners.two_stage.planner import TwoStage
+from evoexp.planners.two_stage.planner import Problem, TwoStage
+from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import generic, markdown, run_measures
+from evoexp.report.kit import generic, markdown, run_measures, style
+
+PATH, TRAVEL, DOCKED = "path", "travel posture", "docking posture"
+TARGET, BODY, FORCE = "target", "body", "force"
+MARK: dict[str, Any] = {"color": style.NEUTRAL}
+PLATFORM: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": style.NEUTRAL}
+ARROW = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
+
+
+def missions_table(shown: Sequence[kit.ConditionResults]) -> pd.DataFrame:
+    """Return the run of median cost of every condition, with everything that is drawn of it."""
+    rows: list[tuple[object, ...]] = []
+    for c in shown:
+        replicate = kit.median_replicate(c, c.column("best_cost"))
+        q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
+        word = "certified" if verdict["certified"] else "not certified"
+        told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
+        robot: Any = c.condition.robot
+        scenario: Any = c.condition.scenario
+        arm = partial(_joints, c.problem(Problem).scene.model, robot.link_lengths[-1])
+        reach, above = scenario.docking.target
+        kinds = [
+            *((OBSTACLE, k, [box[:2], box[2:]]) for k, box in enumerate(scenario.grid.obstacles)),
+            (PATH, 0, q[:-1, :2].tolist()),
+            (TRAVEL, 0, arm(q[-2])),
+            (DOCKED, 0, arm(q[-1])),
+            (BODY, 0, [(robot.body_radius, robot.body_height)]),
+            (TARGET, 0, [(scenario.task_origin[0] + reach, robot.body_height + above)]),
+            (FORCE, 0, [scenario.docking.force]),
+        ]
+        given = told, c.condition.length_unit
+        rows += [(*given, *kind, a, b) for *kind, points in kinds for a, b in points]
+    return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
+
+
+def _joints(model: pin.Model, last: float, q: FloatArray) -> list[list[float]]:
+    """Return the arm's joints and its end, (4, 2): x, and height."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    points = [data.oMi[k].translation for k in range(3, model.njoints)]
+    points.append(data.oMi[model.njoints - 1].act(np.array([last, 0.0, 0.0])))
+    return [[float(x), float(z)] for x, _, z in points]
+
+
+def draw_missions(table: pd.DataFrame) -> Figure:
+    """Draw one row per motion: from above, and from the side."""
+    count = table["row"].nunique()
+    figure = style.figure(3.1 * count + 0.3)
+    panels = figure.subplots(count, 2, squeeze=False)
+    for (above, side), (name, rows) in zip(panels, kit.groups(table, "row"), strict=True):
+        _draw_above(above, rows)
+        _draw_side(side, rows)
+        label, _, told = str(name).partition(", ")
+        above.set_title(f"{label}: from above")
+        side.set_title(told)
+    style.legend_of_all(figure, panels[0], 3)
+    return figure
+
+
+def _draw_above(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw obstacles and the platform's way."""
+    for _, corners in kit.groups(rows[rows["kind"] == OBSTACLE], "number"):
+        draw_obstacle(axes, corners["a"], corners["b"])
+    path = rows.loc[rows["kind"] == PATH, ["a", "b"]].to_numpy()
+    axes.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
+    axes.plot(*path[0], "o", markersize=4, **MARK)
+    axes.plot(*path[-1], "*", markersize=8, label="docking place", **MARK)
+    style.operational_axes(axes, str(rows["unit"].iloc[0]))
+    axes.margins(0.08)
+
+
+def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw the platform, both postures of the arm, the target and the force."""
+    first = {str(kind): own[["a", "b"]].to_numpy()[0] for kind, own in kit.groups(rows, "kind")}
+    (radius, height), (middle, _) = first[BODY], first[DOCKED]
+    axes.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **PLATFORM))
+    for name, colour, pattern in ((TRAVEL, style.FAINT, "--"), (DOCKED, style.ARM_COLOURS[1], "-")):
+        arm: dict[str, Any] = {"marker": "o", "markersize": 3.5, "color": colour, "label": name}
+        joints = rows[rows["kind"] == name]
+        axes.plot(joints["a"], joints["b"], pattern, **arm)
+    (x, z), (fx, fz) = first[TARGET], first[FORCE]
+    axes.plot(x, z, "x", label="target of the end-effector", markersize=7, zorder=4, **MARK)
+    size = np.hypot(fx, fz) or 1.0
+    tail = x - 0.6 * fx / size, z - 0.6 * fz / size
+    axes.annotate("F", (x, z), tail, arrowprops=ARROW, ha="center", fontsize=7.5)
+    axes.axhline(0.0, linewidth=1.0, **MARK)
+    unit = rows["unit"].iloc[0]
+    axes.set(
+        xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]", adjustable="datalim", aspect="equal"
+    )
+    axes.margins(0.1)
 
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -16,35 +114,19 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     found = results.with_data
     if not kit.planned_by(results, TwoStage):
         return generic.page(results, settings)
-    row, column = partial(generic.quantity, results), kit.by_column
-    clearance = "clearance of the bodies over the whole motion (exact)"
     drawing = PAPER.drawing(
         "mission",
-        partial(missions.missions_table, found),
-        missions.draw_missions,
+        (missions_table, draw_missions),
         found,
-        tuple(
-            kit.PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c)))
-            for c in found
+        found,
+        plays=tuple(
+            kit.PlayedRun(c, run_measures.median_replicate(c, c.column("best_cost"))) for c in found
         ),
     )
     return PAPER.page(
         results,
         "mission",
-        quantities=(
-            row("cost E + C", "–", column("best_cost")),
-            row("path cost C", "–", column("term_path_cost")),
-            row("length of the path D", "cell", column("term_distance")),
-            row("mean unsafeness S", "–", column("term_unsafeness")),
-            row("posture cost E", "–", column("term_posture_cost")),
-            row("torque norm, squared", "–", column("term_torque_norm")),
-            row("greatest torque", "–", column("term_torque_max")),
-            row("from the last node to the docking place", "unit", column("term_last_leg")),
-            row(clearance, "unit", column("clearance")),
-            row("evaluations", "–", column("evaluations")),
-            row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
-            row("CPU time of its searches", "s", run_measures.search_seconds),
-        ),
+        quantities=PAPER.quantities(results, "mission"),
         checks=tuple(row for c in found for row in _checks(c, settings)),
         drawings=(drawing,),
     )

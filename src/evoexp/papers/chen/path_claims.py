@@ -1,17 +1,175 @@
-"""The claims of Chen & Zalzala 1995 on their grid paths (section 4.1, Fig. 2), judged."""
+"""The grid paths of Chen & Zalzala 1995: weightings, gaps to the truth, routes; their claims."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.papers.chen import path_measures as measures
-from evoexp.papers.chen.path_measures import Group
 from evoexp.papers.chen.rules import RULES
+from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.report.kit import ConditionResults, Results, judging, markdown, planned_by, run_measures
 
+# name of a route (A, B, …; A is the most frequent) → keys of its paths
+Routes = dict[str, tuple[Any, ...]]
 DISTANCE, UNSAFENESS, COST = "term_distance", "term_unsafeness", "best_cost"
+
+
+class Group(NamedTuple):
+    """Conditions of one weighting and one rule for loops."""
+
+    name: str  # label of the first condition: (a), (b), …, as in the paper's Fig. 2
+    weights: tuple[float, float]  # ε and λ
+    revisits: bool  # whether nodes may be passed again
+    # GA first, then with elitism, then the controls; without the reference
+    conditions: tuple[ConditionResults, ...]
+    truth: ConditionResults | None  # the reference; None if it has no data
+
+    @property
+    def main(self) -> ConditionResults:
+        """The first condition."""
+        return self.conditions[0]
+
+    @property
+    def all(self) -> tuple[ConditionResults, ...]:
+        """The conditions, and the reference if it is there."""
+        return self.conditions if self.truth is None else (*self.conditions, self.truth)
+
+    @property
+    def title(self) -> str:
+        """Name and weights, over a panel."""
+        return f"{self.name}  ε = {self.weights[0]:g}, λ = {self.weights[1]:g}"
+
+    @property
+    def optimum(self) -> float:
+        """Cost of the best path that the reference knows; NaN without a reference."""
+        return float(self.truth.column("best_cost")[0]) if self.truth is not None else np.nan
+
+    @property
+    def bound(self) -> float:
+        """The greatest known lower bound of the cost of any path; NaN without a reference."""
+        return float(self.truth.column("term_lower_bound")[0]) if self.truth is not None else np.nan
+
+    @property
+    def best_path(self) -> list[FloatArray]:
+        """The best path that the reference knows, (nodes, 2); empty without a reference."""
+        return [] if self.truth is None else [paths(self.truth)[0]]
+
+
+def fits(results: Results) -> bool:
+    """Whether there are planners' results, and all are of paths over a plane grid."""
+    found = results.with_data
+    evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
+    return evolved and all(
+        len(c.condition.scenario.size) == 2  # type: ignore[attr-defined]
+        for c in found
+    )
+
+
+def group_list(results: Results) -> tuple[Group, ...]:
+    """Return the conditions by weighting and rule for loops, in the order of the experiment."""
+    found = []
+    for members in run_measures.grouped(
+        results.with_data, lambda c: (c.planner.objective.weights, c.planner.revisits)
+    ):
+        evolved = tuple(c for c in members if not c.is_reference)
+        truth = next((c for c in members if c.is_reference), None)
+        weights, revisits = members[0].planner.objective.weights, members[0].planner.revisits
+        found += [Group(c.label, weights, revisits, evolved, truth) for c in evolved[:1]]
+    return tuple(found)
+
+
+def shortest(groups: tuple[Group, ...]) -> float:
+    """Return the length of the shortest path [cell]; NaN without a reference."""
+    known = (g.truth.array("frontier")[:, 1].min() for g in groups if g.truth is not None)
+    return float(min(known, default=np.nan))
+
+
+def gaps(condition: ConditionResults, truth: float) -> FloatArray:
+    """Return the gap of each run's cost above a known cost, (done,) [%]."""
+    return np.asarray(np.round(100.0 * (condition.column("best_cost") / truth - 1.0), 9))
+
+
+def cost_of(truth: ConditionResults, weights: tuple[float, float]) -> float:
+    """Return the cost of a reference's best path by other weights ε and λ."""
+    terms = (float(truth.column(f"term_{name}")[0]) for name in ("distance", "unsafeness"))
+    return sum(weight * term for weight, term in zip(weights, terms, strict=True))
+
+
+def paths(condition: ConditionResults) -> dict[int, FloatArray]:
+    """Return replicate → nodes (nodes, 2) of its best path."""
+    return {k: values.reshape(-1, 2) for k, values in condition.solutions.items()}
+
+
+def boxes(condition: ConditionResults) -> list[tuple[int, ...]]:
+    """Return the obstacles as blocks of nodes (x0, y0, x1, y1)."""
+    return list(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+
+
+def route_list(groups: tuple[Group, ...]) -> Routes:
+    """Return the routes of all first conditions together: members are (label, replicate)."""
+    of = {(g.main.label, k): path for g in groups for k, path in paths(g.main).items()}
+    return routes(of, inside_points(boxes(groups[0].main)))
+
+
+def routes_of(condition: ConditionResults, found: Routes) -> dict[str, list[int]]:
+    """Return name of a route → replicates of a condition that take it; none is empty."""
+    label = condition.label
+    own = {name: [m[1] for m in members if m[0] == label] for name, members in found.items()}
+    return {name: members for name, members in own.items() if members}
+
+
+def median_replicate(condition: ConditionResults, replicates: list[int] | None = None) -> int:
+    """Return the replicate of median cost (the lower one of two) among some, or all."""
+    among = None if replicates is None else condition.summaries.index.isin(replicates)
+    return run_measures.median_replicate(condition, condition.column("best_cost"), among)
+
+
+def median_path(condition: ConditionResults, replicates: list[int] | None = None) -> FloatArray:
+    """Return the path of the `median_replicate`."""
+    return paths(condition)[median_replicate(condition, replicates)]
+
+
+def signature(path: FloatArray, centres: FloatArray) -> tuple[int, ...]:
+    """Count the passes of a path (nodes, 2) above each obstacle, rightward minus leftward.
+
+    Two paths with the same ends that pass the same sides of all obstacles have the same signature.
+    `centres` (obstacles, 2) are points inside the obstacles, whose x is that of no node.
+    """
+    before, after = path[:-1, None, :], path[1:, None, :]
+    crosses = (before[..., 0] < centres[:, 0]) != (after[..., 0] < centres[:, 0])
+    run = np.where(crosses, after[..., 0] - before[..., 0], 1.0)
+    share = (centres[:, 0] - before[..., 0]) / run
+    above = crosses & (before[..., 1] + share * (after[..., 1] - before[..., 1]) > centres[:, 1])
+    return tuple(int(value) for value in (above * np.sign(run)).sum(axis=0))
+
+
+def inside_points(boxes: Sequence[Sequence[int]]) -> FloatArray:
+    """Return a point inside each box (x0, y0, x1, y1) of nodes; no point has the x of a node."""
+    return np.array(
+        [[0.5 * (x0 + x1) + 0.26, 0.5 * (y0 + y1)] for x0, y0, x1, y1 in boxes]
+    ).reshape(-1, 2)
+
+
+def routes(paths: Mapping[Any, FloatArray], centres: FloatArray) -> Routes:
+    """Return paths, key → (nodes, 2), grouped by signature, the most frequent route first.
+
+    Of equally frequent routes, that of the earlier path is first. As far as signatures tell, no
+    path of a route passes over an obstacle if it is bent to another path of the route.
+    """
+    of = {key: signature(path, centres) for key, path in paths.items()}
+    return {
+        _name(k): tuple(key for key, own in of.items() if own == found)
+        for k, (found, _) in enumerate(Counter(of.values()).most_common())
+    }
+
+
+def _name(number: int) -> str:
+    """Return the name of a route, counted from 0: A to Z, then AA and so on."""
+    before, last = divmod(number, 26)
+    return (_name(before - 1) if before else "") + chr(ord("A") + last)
 
 
 def judge_paths(
@@ -20,15 +178,15 @@ def judge_paths(
     """Judge the claims of Fig. 2: they need its three weightings, in their order."""
     judge = judging.judge(results, settings, RULES)
     return (
-        nearly_shortest(judge, groups[0].main, groups[0].main.label, measures.shortest(groups)),
-        *(_compromise(judge, settings, groups) if len(groups) == 3 else ()),
+        nearly_shortest(judge, groups[0].main, shortest(groups)),
+        *(_compromise(judge, groups) if len(groups) == 3 else ()),
         *(_converges(judge, group.main) for group in groups),
         *(
-            nearly_best(judge, group.main, group.main.label, group.optimum, group.bound)
+            nearly_best(judge, group.main, group.optimum, group.bound)
             for group in groups
             if group.truth is not None
         ),
-        *(claim for group in groups for claim in _evolution_of(judge, settings, group)),
+        *(claim for group in groups for claim in _evolution_of(judge, group)),
     )
 
 
@@ -38,12 +196,12 @@ def excess_of(condition: kit.ConditionResults, shortest: float) -> FloatArray:
 
 
 def nearly_shortest(
-    judge: kit.Judge, condition: kit.ConditionResults, label: str, shortest: float
+    judge: kit.Judge, condition: kit.ConditionResults, shortest: float
 ) -> kit.Claim:
     """Judge that paths are nearly shortest without safety."""
     excess, limit = excess_of(condition, shortest), RULES["nearly_shortest"].limits["near_percent"]
     near = int(np.count_nonzero(excess <= limit))
-    return judge.on("nearly_shortest", condition=label).majority(
+    return judge.on("nearly_shortest", condition=condition.label).majority(
         f"median length {markdown.number(float(np.median(condition.column(DISTANCE))))}, "
         f"{np.median(excess):.1f} % above the shortest {markdown.number(shortest)} (Dijkstra); "
         f"{markdown.share(near, condition.done)} runs",
@@ -53,14 +211,14 @@ def nearly_shortest(
 
 
 def nearly_best(
-    judge: kit.Judge, condition: kit.ConditionResults, label: str, known: float, bound: float
+    judge: kit.Judge, condition: kit.ConditionResults, known: float, bound: float
 ) -> kit.Claim:
     """Judge that costs are near that of the best path known."""
-    gaps, limit = measures.gaps(condition, known), RULES["nearly_best"].limits["near_percent"]
-    near = int(np.count_nonzero(gaps <= limit))
-    return judge.on("nearly_best", condition=label).majority(
+    above, limit = gaps(condition, known), RULES["nearly_best"].limits["near_percent"]
+    near = int(np.count_nonzero(above <= limit))
+    return judge.on("nearly_best", condition=condition.label).majority(
         f"median {markdown.number(float(np.median(condition.column(COST))))}, "
-        f"{np.median(gaps):.1f} % above the best path known "
+        f"{np.median(above):.1f} % above the best path known "
         f"({markdown.number(known)}; no path costs less than {markdown.number(bound)}); "
         f"{markdown.share(near, condition.done)} runs",
         near,
@@ -71,7 +229,6 @@ def nearly_best(
 def much_longer(
     judge: kit.Judge,
     condition: kit.ConditionResults,
-    label: str,
     shortest: float,
     truth: kit.ConditionResults | None,
 ) -> kit.Claim:
@@ -82,29 +239,29 @@ def much_longer(
     if truth is not None:
         known = float(excess_of(truth, shortest)[0])
         told += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
-    return judge.on("much_longer", condition=label).majority(told, longer, condition.done)
+    return judge.on("much_longer", condition=condition.label).majority(told, longer, condition.done)
 
 
-def _compromise(
-    judge: kit.Judge, settings: kit.ReportSettings, groups: tuple[Group, ...]
-) -> tuple[kit.Claim, ...]:
+def _compromise(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim, ...]:
     """Judge the claims that compare the three weightings."""
     a, b, c = (group.main for group in groups)
-    safer = _compared(b, a, UNSAFENESS, settings)
-    shorter = _compared(b, c, DISTANCE, settings)
+    unsafeness, distance = kit.by_column(UNSAFENESS), kit.by_column(DISTANCE)
+    safer = kit.compared([(b, a)], unsafeness, judge.settings)
+    shorter = kit.compared([(b, c)], distance, judge.settings)
     told = "; ".join(
         f"against {other.label}: {kit.evidence(row, word)}"
         for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
         for row in rows
     )
     rows = kit.adjusted([*safer, *shorter])
-    safest = next(iter(_compared(c, b, UNSAFENESS, settings)), None)
     return (
         judge.on("compromise", condition=b.label, first=a.label, last=c.label).better_than_all(
             told, rows
         ),
-        judge.on("safest", condition=c.label, other=b.label).better(safest, "safer"),
-        much_longer(judge, c, c.label, measures.shortest(groups), groups[2].truth),
+        judge.on("safest", condition=c.label, other=b.label).better(
+            judge.compared(c, b, unsafeness), "safer"
+        ),
+        much_longer(judge, c, shortest(groups), groups[2].truth),
     )
 
 
@@ -123,26 +280,20 @@ def _converges(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     )
 
 
-def _evolution_of(
-    judge: kit.Judge, settings: kit.ReportSettings, group: Group
-) -> Iterator[kit.Claim]:
+def _evolution_of(judge: kit.Judge, group: Group) -> Iterator[kit.Claim]:
     """Judge the genetic algorithm, without and with elitism, against all controls."""
     controls = tuple(c for c in group.conditions if c.is_control)
     if controls:
         for own in group.conditions:
             if not own.is_control:
-                yield evolution(judge, settings, own, own.label, controls)
+                yield evolution(judge, own, controls)
 
 
 def evolution(
-    judge: kit.Judge,
-    settings: kit.ReportSettings,
-    own: kit.ConditionResults,
-    label: str,
-    controls: tuple[kit.ConditionResults, ...],
+    judge: kit.Judge, own: kit.ConditionResults, controls: tuple[kit.ConditionResults, ...]
 ) -> kit.Claim:
     """Judge that evolution helps, and tell its gain over the best control."""
-    rows = kit.compared([(own, c) for c in controls], kit.by_column(COST), settings)
+    rows = kit.compared([(own, c) for c in controls], kit.by_column(COST), judge.settings)
     medians = {control_name(c): float(np.median(c.column(COST))) for c in controls}
     best, median = min(medians, key=lambda name: medians[name]), float(np.median(own.column(COST)))
     gain = medians[best] - median
@@ -155,7 +306,7 @@ def evolution(
     )
     verb = "saves" if gain >= 0.0 else "loses"
     return judge.on(
-        "path_evolution", condition=label, controls=" and ".join(medians)
+        "path_evolution", condition=own.label, controls=" and ".join(medians)
     ).better_than_all(
         f"median {markdown.number(median)}: beside the best control, {best}, evolution {verb} "
         f"{abs(gain):.3g} ({100.0 * abs(gain) / medians[best]:.0f} %); {told}",
@@ -167,13 +318,3 @@ def control_name(condition: kit.ConditionResults) -> str:
     """Return the name of a control in sentences."""
     component = str(condition.condition.planner.component)
     return {"random_search": "random walks"}.get(component, component.replace("_", " "))
-
-
-def _compared(
-    first: kit.ConditionResults,
-    second: kit.ConditionResults,
-    column: str,
-    settings: kit.ReportSettings,
-) -> tuple[kit.Comparison, ...]:
-    """Compare two conditions in a column; empty if they have no common seed."""
-    return kit.compared([(first, second)], kit.by_column(column), settings)

@@ -5,29 +5,136 @@ from collections.abc import Iterator
 import numpy as np
 
 from evoexp.papers.chen.cases import METHODS, Case
-from evoexp.papers.chen.posture_claims import judge_printed
 from evoexp.papers.chen.rules import RULES
+from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.report.kit import Claim, Judge, judging, markdown
+
+
+def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
+    """Judge the number, the angles, the torques and their ratio, as far as they are printed."""
+    printed = case.printed
+    if not np.isnan(printed.value):
+        yield judge_value(judge, case)
+    if printed.angles is not None:
+        yield _angles(judge, case, printed.angles)
+    if printed.torques is not None:
+        torques = np.array(printed.torques)
+        yield _torques(judge, case, torques)
+        if printed.angles is not None:
+            yield _torques_at_angles(judge, case, torques, printed.angles)
+        if not np.isnan(printed.ratio):
+            yield _ratio(judge, case, torques)
+
+
+def judge_value(judge: Judge, case: Case) -> Claim:
+    """Judge the printed number by that of the exact optimum."""
+    printed, exact = case.printed, case.measured(case.optimal_angles)
+    best, name = exact[printed.term], printed.term.replace("_", " ")
+    told = f"at the exact optimum {markdown.number(best)}"
+    if case.conditions[0].planner.objective.avoidances:
+        told += (
+            f" (E = {markdown.number(case.least)}, of which the obstacle "
+            f"{markdown.number(exact['obstacle'])})"
+        )
+    agrees: bool | None = abs(best - printed.value) <= RULES["printed_value"].limits["rounded"]
+    if case.name == "obstacle and platform":
+        told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
+        agrees = agrees or None
+    words = {"case": case.name, "term": name, "value": f"{printed.value:g}"}
+    return judge.on("printed_value", figure=printed.figure, **words).own(told, 1, agrees)
+
+
+def _angles(judge: Judge, case: Case, angles: tuple[float, float]) -> Claim:
+    """Judge that the printed angles are near the optimum."""
+    cost = case.measured(angles)["cost"]
+    gap = 100.0 * float(case.gaps(np.array([cost]))[0])
+    words = {"case": case.name, "angles": _degrees(angles), "figure": case.printed.figure}
+    return judge.on("printed_angles", **words).own(
+        f"E = {cost:.6g} there, {case.least:.6g} at the optimum: {gap:.2g} % above it",
+        1,
+        gap <= RULES["printed_angles"].limits["near_percent"],
+    )
+
+
+def _torques(judge: Judge, case: Case, torques: FloatArray) -> Claim:
+    """Judge the printed torques by those of the exact optimum, of its mirror images the nearest."""
+    exact, limits = _nearest(case, torques), RULES["printed_torques"].limits
+    by_norm = case.conditions[0].planner.objective.torque_norm_weight > 0.0
+    cost = float((torques**2).sum() if by_norm else np.abs(torques).max())
+    gap, off = 100.0 * (cost / case.least - 1.0), float(np.abs(exact - torques).max())
+    words = {"case": case.name, "torques": triple(torques, 2), "figure": case.printed.figure}
+    return judge.on("printed_torques", **words).own(
+        f"{triple(exact, 4)} at the exact optimum, at most {off:.2g} off; E = {cost:.4g} of the "
+        f"printed torques, {gap:.2g} % above the optimum's {case.least:.4g}",
+        1,
+        gap <= limits["near_percent"] and off <= limits["rounded"],
+    )
+
+
+def _torques_at_angles(
+    judge: Judge, case: Case, torques: FloatArray, angles: tuple[float, float]
+) -> Claim:
+    """Judge the printed torques by those of our model at the printed angles."""
+    own = case.torques(angles)
+    off = float(np.abs(own - torques).max())
+    words = {"torques": triple(torques, 2), "angles": _degrees(angles)}
+    return judge.on("torques_at_angles", case=case.name, figure=case.printed.figure, **words).own(
+        f"{triple(own, 4)} in our model, at most {off:.2g} off",
+        1,
+        off <= RULES["torques_at_angles"].limits["rounded"],
+    )
+
+
+def _ratio(judge: Judge, case: Case, torques: FloatArray) -> Claim:
+    """Judge the printed ratio of torques by the printed torques, and by the exact optimum."""
+    printed, limits = case.printed, RULES["torque_ratio"].limits
+    sizes, rounded = np.abs(torques), limits["rounded"]
+    least = (sizes.max() - rounded) / (sizes.min() + rounded)
+    greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
+    exact = np.abs(_nearest(case, torques))
+    own = float(exact.max() / exact.min())
+    off = 100.0 * (own / printed.ratio - 1.0)
+    words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
+    return judge.on("torque_ratio", **words).own(
+        f"{sizes.max() / sizes.min():.3g} of the printed torques as they stand, {least:.3g} to "
+        f"{greatest:.3g} before they were rounded; {own:.4g} at the exact optimum ({off:+.1f} %)",
+        1,
+        least <= printed.ratio <= greatest and abs(off) <= limits["near_percent"],
+    )
+
+
+def _nearest(case: Case, torques: FloatArray) -> FloatArray:
+    """Return the torques of the optimum, of its mirror images those nearest to some others."""
+    found = [case.torques(angles) for angles in case.mirrored()]
+    return min(found, key=lambda own: float(np.abs(own - torques).max()))
+
+
+def triple(torques: FloatArray, digits: int) -> str:
+    """Return torques in words: (−0.61, 1.13, −0.30)."""
+    told = ", ".join(f"{torque:.{digits}f}" for torque in torques)
+    return f"({told})".replace("-", "−")
+
+
+def _degrees(angles: tuple[float, float]) -> str:
+    return f"({angles[0]:g}, {angles[1]:g})°".replace("-", "−")
 
 
 def judge_cases(
     results: kit.Results, cases: list[Case], settings: kit.ReportSettings
-) -> tuple[kit.Claim, ...]:
+) -> tuple[Claim, ...]:
     """Judge all claims; the optimum of every case is known."""
     judge = judging.judge(results, settings, RULES)
     minimax = [case for case in cases if case.name == "minimax torque"]
     return (
         *(one for case in cases for one in judge_printed(judge, case)),
-        *_against_search(judge, cases, settings),
-        *(one for case in cases for one in _against_conventional(judge, case, settings)),
+        *_against_search(judge, cases),
+        *(one for case in cases for one in _against_conventional(judge, case)),
         *(_seconds(judge, case.name, case.plain) for case in minimax if case.plain is not None),
     )
 
 
-def _against_search(
-    judge: kit.Judge, cases: list[Case], settings: kit.ReportSettings
-) -> list[kit.Claim]:
+def _against_search(judge: Judge, cases: list[Case]) -> list[Claim]:
     """Judge that the genetic algorithm, with and without elitism, beats random search."""
     pairs = {
         own.label: (case, name, own, case.search)
@@ -38,7 +145,7 @@ def _against_search(
     rows = kit.compared(
         [(own, search) for _, _, own, search in pairs.values()],
         kit.by_column("best_cost"),
-        settings,
+        judge.settings,
         named=lambda own, _: own.label,
     )
     claims = []
@@ -51,9 +158,7 @@ def _against_search(
     return claims
 
 
-def _against_conventional(
-    judge: kit.Judge, case: Case, settings: kit.ReportSettings
-) -> Iterator[kit.Claim]:
+def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge that conventional methods get stuck, and that the genetic algorithm does better."""
     close = RULES["gets_stuck"].limits["near_percent"] / 100.0
     for method, ends in case.ends().items():
@@ -61,7 +166,7 @@ def _against_conventional(
         stuck = kit.Proportion(at_best.total - at_best.having, at_best.total)
         yield judge.on("gets_stuck", case=case.name, method=method).own(
             f"{stuck.having} of {stuck.total} starts "
-            f"({markdown.percent(stuck.interval(settings.confidence))})",
+            f"({markdown.percent(stuck.interval(judge.level))})",
             stuck.total,
             stuck.having > 0,
         )
@@ -70,12 +175,12 @@ def _against_conventional(
 
 
 def _better(
-    judge: kit.Judge,
+    judge: Judge,
     case: Case,
     elitist: kit.ConditionResults,
     method: str,
     at_best: kit.Proportion,
-) -> Iterator[kit.Claim]:
+) -> Iterator[Claim]:
     """Judge a run of the genetic algorithm against one start of a method, and their efforts."""
     assert case.conventional is not None
     close = RULES["per_success"].limits["near_percent"] / 100.0
@@ -101,7 +206,7 @@ def _better(
     )
 
 
-def _seconds(judge: kit.Judge, name: str, condition: kit.ConditionResults) -> kit.Claim:
+def _seconds(judge: Judge, name: str, condition: kit.ConditionResults) -> Claim:
     """Judge that the minimax problem takes seconds."""
     seconds = float(np.median(condition.column("cpu_s")))
     return judge.on("seconds", case=name).own(

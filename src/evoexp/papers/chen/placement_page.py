@@ -1,7 +1,6 @@
 """Chen & Zalzala 1995, Figs. 3–9: docking postures by five criteria, exact optima, controls."""
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
@@ -42,9 +41,9 @@ def landscapes_page(results: kit.Results, settings: kit.ReportSettings) -> kit.P
         return page(results, settings)
     drawing = PAPER.drawing(
         "fig_9_landscapes",
-        partial(placements.landscape_table, shown),
-        placements.draw_landscape,
+        placements.LANDSCAPE,
         tuple(c for case in shown for c in case.conditions),
+        shown,
     )
     return PAPER.page(
         results,
@@ -146,20 +145,8 @@ def _drawings(cases: list[Case]) -> tuple[kit.Drawing, ...]:
     exact = [case for case in cases if case.optimum is not None and case.evolved]
     shown = tuple(c for case in cases for c in case.conditions)
     found = (
-        PAPER.drawing(
-            "fig_3_to_8_postures",
-            partial(placements.postures_table, cases),
-            placements.draw_postures,
-            shown,
-        ),
-        PAPER.drawing(
-            "fig_4_to_8_fitness",
-            partial(placements.fitness_table, exact),
-            placements.draw_fitness,
-            shown,
-        ),
-        PAPER.drawing(
-            "placement_gaps", partial(placements.gaps_table, exact), placements.draw_gaps, shown
-        ),
+        PAPER.drawing("fig_3_to_8_postures", placements.POSTURES, shown, cases),
+        PAPER.drawing("fig_4_to_8_fitness", placements.FITNESS, shown, exact),
+        PAPER.drawing("placement_gaps", placements.GAPS, shown, exact),
     )
     return found if exact else found[:1]

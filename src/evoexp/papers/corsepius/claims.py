@@ -1,58 +1,62 @@
-"""The claims of Corsépius 2001 on single tasks, judged by their experiments."""
+"""The claims of Corsépius 2001: on tasks, and on the size of the population, metric by metric."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
-from evoexp.papers import run_values
+import numpy as np
+
 from evoexp.papers.corsepius import measures
+from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import kit
 from evoexp.report.kit import judging, markdown
 
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
+RECOMMENDED = 100.0  # individuals (section 5)
+METRICS: dict[str, kit.Values] = {
+    "cycles": measures.cycles,
+    "evaluations": measures.evaluations,
+    "CPU time": measures.usual_seconds,
+}
 
 
 def judge_tasks(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Claim, ...]:
     """Judge the claims that the conditions of an experiment allow to judge."""
-    judge, level = judging.judge(results, settings, RULES), settings.confidence
+    judge = judging.judge(results, settings, RULES)
     found = measures.among_obstacles(results.main)
     many = RULES["redundant_arms"].limits["joints"]
-    arms = [c for c in found if run_values.num_joints(c) > many]
+    arms = [c for c in found if kit.num_joints(c) > many]
     single = (
-        (
-            judge_met(judge, c, level),
-            judge_free(judge, c, level),
-            *_tilt(judge, c),
-            *_planning_time(judge, c),
-        )
+        (judge_met(judge, c), judge_free(judge, c), *_tilt(judge, c), *_planning_time(judge, c))
         for c in found
     )
     stuck = (
-        _stuck(judge, one, helped, level)
+        _stuck(judge, one, helped)
         for one in found
         for helped in found
         if measures.only_subgoals_differ(one, helped)
     )
     pairs = measures.with_empty_scenes(results.main)
-    redundant = [judge_redundant(judge, arms, level)] if arms else []
+    redundant = [_redundant(judge, arms)] if arms else []
     at_obstacles = [_at_obstacles(judge, pairs)] if pairs else []
     return (*(one for own in single for one in own), *redundant, *stuck, *at_obstacles)
 
 
-def judge_met(judge: kit.Judge, condition: kit.ConditionResults, level: float) -> kit.Claim:
+def judge_met(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     """Judge that goals given in work space are met by a search in configuration space."""
     met = kit.success(condition)
-    told = f"goal met {met.with_interval(level)}"
-    return judge.on("goals_met", who=condition.label).majority(told, *met)
+    hearing = judge.on("goals_met", who=condition.label)
+    return hearing.majority(f"goal met {judge.share(met)}", *met)
 
 
-def judge_free(judge: kit.Judge, condition: kit.ConditionResults, level: float) -> kit.Claim:
+def judge_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     """Judge that binary ratings of distances keep the whole motion free."""
-    refuted, free = measures.refuted(condition), run_values.certified(condition).having
+    refuted, free = measures.refuted(condition), kit.certified(condition).having
     planned = refuted.total if condition.done == condition.planned else 0
     told = (
         f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-        f"{refuted.with_interval(level)}: postures are free, motions between them are not rated"
+        f"{judge.share(refuted)}: postures are free, motions between them are not rated"
     )
     allowed = measures.allowed_contacts(condition)
     if allowed:
@@ -80,12 +84,12 @@ def _tilt(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Cla
             yield judge.on("not_tilted", who=condition.label).every(told, *kept, planned)
 
 
-def judge_redundant(judge: kit.Judge, arms: list[kit.ConditionResults], level: float) -> kit.Claim:
+def _redundant(judge: kit.Judge, arms: list[kit.ConditionResults]) -> kit.Claim:
     """Judge that the approach works for highly redundant arms: it finds a certified path."""
-    free = {c.label: run_values.certified(c).having for c in arms}
+    free = {c.label: kit.certified(c).having for c in arms}
     texts = [
-        f"{c.label}, {run_values.num_joints(c)} joints: goal met "
-        f"{kit.success(c).with_interval(level)}, {free[c.label]} of them certified"
+        f"{c.label}, {kit.num_joints(c)} joints: goal met "
+        f"{judge.share(kit.success(c))}, {free[c.label]} of them certified"
         for c in arms
     ]
     runs = sum(c.done for c in arms)
@@ -109,14 +113,14 @@ def _planning_time(judge: kit.Judge, condition: kit.ConditionResults) -> Iterato
 
 
 def _stuck(
-    judge: kit.Judge, stuck: kit.ConditionResults, helped: kit.ConditionResults, level: float
+    judge: kit.Judge, stuck: kit.ConditionResults, helped: kit.ConditionResults
 ) -> kit.Claim:
     """Judge that the search gets stuck where the same task with a sub-goal finds a way."""
     one, two = kit.success(helped), kit.success(stuck)
     told = (
-        f"goal met {two.with_interval(level)}; {helped.label}: {one.with_interval(level)}; "
-        f"Fisher's exact p = {markdown.p_value(kit.fisher_exact(one, two))}; ended by stagnation: "
-        f"{measures.reasons(stuck)['stagnation'].with_interval(level)}"
+        f"goal met {judge.share(two)}; {helped.label}: {judge.share(one)}; "
+        f"{kit.fisher_evidence(one, two)}; ended by stagnation: "
+        f"{judge.share(measures.reasons(stuck)['stagnation'])}"
     )
     return judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
 
@@ -138,3 +142,167 @@ def _at_obstacles(
     holds = True if stuck else None if any(less) else False
     runs = sum(own.total + empty.total for _, own, empty in shares)
     return judge.on("stuck_at_obstacles").own("; ".join(texts), runs, holds)
+
+
+class SizeComparison(NamedTuple):
+    """The effort of a size over that of the recommended one, expected running times both."""
+
+    task: str  # name of the task
+    value: float  # the size
+    ratio: float  # ratio of the expected efforts
+    interval: kit.Interval  # its interval
+    bound: float  # the ratio that it is compared with: 1, or a proportional increase
+
+    @property
+    def says(self) -> int:
+        """1 if the ratio is above the bound, −1 if it is below, 0 if neither is certain."""
+        return int(self.interval.low > self.bound) - int(self.interval.high < self.bound)
+
+
+def judge_study(
+    judge: kit.Judge, found: tuple[Task, ...], compared: dict[str, list[SizeComparison]]
+) -> tuple[kit.Claim, ...]:
+    """Judge the claims on the size."""
+    larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in compared.items()}
+    smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in compared.items()}
+    return (
+        *(
+            claim(judge, metric, own)
+            for metric, own in larger.items()
+            for claim in (_no_faster, _not_necessarily)
+        ),
+        *(_over_proportional(judge, metric, own) for metric, own in smaller.items()),
+        _converges_less(judge, found),
+        *(_reasonable(judge, metric, found, values) for metric, values in METRICS.items()),
+    )
+
+
+def _beside_recommended(
+    found: tuple[Task, ...],
+) -> Iterator[tuple[str, float, kit.ConditionResults, kit.ConditionResults]]:
+    """Yield (task, size, its condition, that of the recommended size) where either solves it."""
+    for task in found:
+        own = task.by_value.get(RECOMMENDED)
+        for value, c in task.by_value.items():
+            if own is not None and value != RECOMMENDED and (own.solved or c.solved):
+                yield task.name, value, c, own
+
+
+def compare_sizes(
+    found: tuple[Task, ...], metric: str, settings: kit.ReportSettings
+) -> list[SizeComparison]:
+    """Compare every size with the recommended one, task by task.
+
+    Intervals are of one family: their levels are Bonferroni's over all of them. Tasks that neither
+    size ever solves are left out.
+    """
+    pairs = list(_beside_recommended(found))
+    level = 1.0 - (1.0 - settings.confidence) / max(1, len(pairs))
+    rows = []
+    for name, value, c, own in pairs:
+        one, two = kit.on_common_seeds(c, own, METRICS[metric])
+        above, below = kit.expected_effort(*one), kit.expected_effort(*two)
+        ratio = above / below if np.isfinite(below) else 0.0
+        proportional = RECOMMENDED / value if metric == "cycles" and value < RECOMMENDED else 1.0
+        interval = kit.effort_ratio(one, two, level, settings.num_resamples)
+        rows.append(SizeComparison(name, value, ratio, interval, proportional))
+    return rows
+
+
+def _ratios(rows: list[SizeComparison], says: int) -> str:
+    """Return the ratios that say so, task by task: "ball × 1.8 (200), 3.4 (400)"."""
+    by_task: dict[str, list[str]] = {}
+    for row in rows:
+        if row.says == says:
+            by_task.setdefault(row.task, []).append(f"{_short(row.ratio)} ({row.value:g})")
+    return "; ".join(f"{task} × {', '.join(texts)}" for task, texts in by_task.items()) or "none"
+
+
+def _short(ratio: float) -> str:
+    return markdown.number(float(f"{ratio:.2g}")) if np.isfinite(ratio) else "∞"
+
+
+def _unless(against: object, favour: object) -> bool | None:
+    """Return whether a claim holds: not if anything is against, but if anything favours it."""
+    return False if against else True if favour else None
+
+
+def _no_faster(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
+    """Judge that nothing larger is faster, on any task."""
+    says = [row.says for row in rows]
+    told = (
+        f"expected {metric} over those of 100 individuals, λ in brackets: less for "
+        f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)}"
+    )
+    hearing = judge.on("larger_no_faster", metric=metric)
+    return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, 1 in says))
+
+
+def _not_necessarily(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
+    """Judge the weaker reading: there are tasks on which nothing larger is faster."""
+    says = {name: [row.says for row in rows if row.task == name] for name in (r.task for r in rows)}
+    never = [name for name, own in says.items() if min(own) >= 0]
+    slower = [name for name in never if max(says[name]) > 0]
+    told = (
+        f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
+        f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them"
+    )
+    hearing = judge.on("larger_not_necessarily_faster", metric=metric)
+    return hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
+
+
+def _over_proportional(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
+    """Judge that on every task every smaller population costs over-proportionally more."""
+    says = [row.says for row in rows]
+    exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
+    told = (
+        f"above: {_ratios(rows, 1)}; below: {_ratios(rows, -1)}; not certain: {says.count(0)} of "
+        f"{len(rows)}"
+    )
+    hearing = judge.on("smaller_over_proportional", metric=metric, exceeds=exceeds)
+    return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
+
+
+def _converges_less(judge: kit.Judge, found: tuple[Task, ...]) -> kit.Claim:
+    """Judge that smaller populations meet their goals less often."""
+    pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
+    adjusted = kit.holm(
+        [kit.fisher_exact(kit.success(c), kit.success(own)) for _, _, c, own in pairs]
+    )
+    says = [
+        judging.greater(kit.success(own), kit.success(c), p, judge.significance)
+        for (_, _, c, own), p in zip(pairs, adjusted, strict=True)
+    ]
+    clear = [pair for pair, said in zip(pairs, says, strict=True) if said]
+    less, more = says.count(1), says.count(-1)
+    texts = (
+        f"{name} {value:g}: {markdown.share(*kit.success(c))} for "
+        f"{markdown.share(*kit.success(own))}"
+        for name, value, c, own in clear
+    )
+    told = (
+        f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
+        f"often in {more}: {'; '.join(texts) or '–'}"
+    )
+    hearing = judge.on("smaller_converge_less")
+    return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
+
+
+def _reasonable(
+    judge: kit.Judge, metric: str, found: tuple[Task, ...], values: kit.Values
+) -> kit.Claim:
+    """Judge that 100 is a reasonable size on every task that can be solved."""
+    factors = {}
+    for task in found:
+        efforts = {
+            v: kit.expected_effort(values(c), kit.solved(c)) for v, c in task.by_value.items()
+        }
+        best = min(efforts, key=lambda value: efforts[value])
+        if RECOMMENDED in efforts and np.isfinite(efforts[best]):
+            factors[task.name] = efforts[RECOMMENDED] / efforts[best], best
+    texts = (f"{name} {_short(factor)} (best: {b:g})" for name, (factor, b) in factors.items())
+    most = RULES["reasonable"].limits["most"]
+    told = f"effort of 100 over that of the best size: {', '.join(texts) or '–'}"
+    hearing = judge.on("reasonable", metric=metric)
+    against = any(factor > most for factor, _ in factors.values())
+    return hearing.own(told, f"{len(factors)} tasks", _unless(against, factors))

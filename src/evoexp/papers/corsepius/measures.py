@@ -7,7 +7,6 @@ import pandas as pd
 
 from evoexp.collision.certifier.coal_distances import CoalDistance
 from evoexp.objectives.posture_cost import UPRIGHT
-from evoexp.papers import run_values
 from evoexp.paths.motion import Motion
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
@@ -44,12 +43,9 @@ def scene(condition: kit.ConditionResults) -> tuple[Any, Any]:
 
 
 def tasks(results: kit.Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
-    """Return the tasks that have several values of a setting.
+    """Return the tasks that have several values of a setting, without controls.
 
-    Args:
-        results: With data; controls are left out.
-        setting: The setting in which the conditions of a task differ.
-        of: The part of the planner that it belongs to; empty: the planner itself.
+    It is a setting of a part of the planner, or, where `of` is empty, of the planner itself.
     """
 
     def key(condition: kit.ConditionResults) -> tuple[Any, ...]:
@@ -99,7 +95,7 @@ def num_steps(condition: kit.ConditionResults) -> FloatArray:
 
 def paths(condition: kit.ConditionResults) -> dict[int, FloatArray]:
     """Return replicate → the postures of its path, (postures, nq) [rad]."""
-    nq = run_values.num_joints(condition)
+    nq = kit.num_joints(condition)
     return {k: flat.reshape(-1, nq) for k, flat in condition.solutions.items()}
 
 
@@ -233,11 +229,7 @@ def by_robot(conditions: tuple[kit.ConditionResults, ...]) -> tuple[kit.Conditio
 
 
 def phase_cycles(condition: kit.ConditionResults) -> pd.DataFrame:
-    """Count the cycles of every run in every phase that it began.
-
-    Returns:
-        Columns replicate, phase (from 0), cycles, reached.
-    """
+    """Count the cycles of every run in every phase (from 0) that it began."""
     rows = condition.generations
     begun = rows.assign(phase=rows["term_phase"].astype(int) - 1)
     sizes = begun.groupby(["replicate", "phase"]).size()

@@ -6,7 +6,6 @@ from functools import partial
 import numpy as np
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers import run_values
 from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.figures import posture_history, posture_motions, posture_trap, solids
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
@@ -36,52 +35,37 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
 
 def quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), kit.by_column
-    unit = results.with_data[0].condition.length_unit
-    tilts = [
-        row(
+    tilts = (
+        generic.quantity(
+            results,
             f"greatest tilt {where} postures ({term.replace('_', ' ')})",
             "deg",
-            column(f"term_greatest_{term}{part}_deg"),
+            kit.by_column(f"term_greatest_{term}{part}_deg"),
         )
         for term in claims.TILTS
         if any(getattr(c.planner.objective, term) is not None for c in results.with_data)
         for where, part in (("at", ""), ("between", "_between"))
-    ]
-    return (
-        *effort_quantities(results),
-        row("length of the path in joint space", "rad", measures.path_lengths),
-        row("length over the straight line of its ends", "–", measures.detours),
-        row("clearance of the bodies over the whole motion (exact)", unit, column("clearance")),
-        *tilts,
     )
+    own = {"path_lengths": measures.path_lengths, "detours": measures.detours}
+    return (*effort_quantities(results), *PAPER.quantities(results, "paths", own), *tilts)
 
 
 def effort_quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows that need no log, only summaries."""
-    row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
-    column = kit.by_column
-    return (
-        row("cycles, all phases", "–", measures.cycles),
-        row("evaluations", "–", measures.evaluations),
-        row("distance to the goal of the last phase", unit, measures.residuals),
-        row("steps of the path", "–", measures.num_steps),
-        row("longest step", "scopes", column("term_longest_step_scopes")),
-        row("steps beyond the scope", "–", column("term_oversized_steps")),
-        row("CPU time of its search", "s", run_measures.search_seconds),
-        row("evaluations per second of search", "1/s", run_measures.evaluations_per_second),
-    )
+    own = {"residuals": measures.residuals, "num_steps": measures.num_steps}
+    return PAPER.quantities(results, "effort", own)
 
 
 def tables(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Table, ...]:
     """Return the tables of tasks, and of the phases of those that have several."""
     level = settings.confidence
     phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
-    beside, released = _beside_empty(results, level), tuple(map(_release_row, _releasing(results)))
+    letting_go = filter(measures.lets_go, measures.among_obstacles(results.main))
+    released = tuple(_release_row(c) for c in letting_go if measures.releases(c))
     rows = tuple(_task_row(c, level) for c in results.with_data)
     found = (
         PAPER.table("tasks", rows, level=100 * level),
-        PAPER.table("beside", beside),
+        PAPER.table("beside", _beside_empty(results, level)),
         PAPER.table("phases", phases),
         PAPER.table("released", released),
     )
@@ -90,7 +74,7 @@ def tables(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Tabl
 
 def _task_row(condition: kit.ConditionResults, level: float) -> tuple[str, ...]:
     """Return the row of a task: shares of its runs, the ends of searches, efforts."""
-    counts = run_measures.success, run_values.certified, measures.refuted
+    counts = run_measures.success, kit.certified, measures.refuted
     reasons = measures.reasons(condition).items()
     efforts = measures.cycles, measures.evaluations, measures.num_steps
     return (
@@ -114,13 +98,6 @@ def _beside_empty(results: kit.Results, level: float) -> tuple[tuple[str, ...], 
         )
         for (c, e), p in zip(pairs, kit.holm(tested), strict=True)
     )
-
-
-def _releasing(results: kit.Results) -> tuple[kit.ConditionResults, ...]:
-    """Return the conditions in which an object is let go of in a run at least."""
-    main = measures.among_obstacles(results.main)
-    detaching = (c for c in main if measures.lets_go(c))
-    return tuple(c for c in detaching if measures.releases(c))
 
 
 def _release_row(condition: kit.ConditionResults) -> tuple[str, ...]:
@@ -188,30 +165,26 @@ def drawings(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Dr
         for reason in measures.REASONS
         for position, c in enumerate(every)
     ]
+    by_robot = measures.by_robot(main)
+    titled = [(c.label if len(by_robot) > 1 else "the robot", c) for c in by_robot]
+    models = PAPER.drawing("fig_3_4_models", solids.MODELS, by_robot, titled)
+    pair, samples = posture_trap.pair(main), posture_trap.SAMPLES
     return (
-        _models(main),
-        PAPER.drawing(
-            "fig_2_scope",
-            partial(posture_motions.scope_table, main[0]),
-            posture_motions.draw_scope,
-            main[:1],
-        ),
-        PAPER.drawing(
-            "history",
-            partial(posture_history.history_table, results._replace(conditions=main)),
-            posture_history.draw_history,
-            main,
-        ),
+        models,
+        PAPER.drawing("fig_2_scope", posture_motions.SCOPE, main[:1], main[0]),
+        PAPER.drawing("history", posture_history.HISTORY, main, results._replace(conditions=main)),
         PAPER.drawing(
             "stop_reasons",
-            partial(shares.shares_table, reasons, {}, settings.confidence),
-            shares.draw_shares,
+            (shares.shares_table, shares.draw_shares),
             every,
+            reasons,
+            {},
+            settings.confidence,
             level=level,
         ),
         _paths("paths", shown),
         *_manoeuvres(results, settings),
-        *_trap(main),
+        *([PAPER.drawing("trap", posture_trap.TRAP, pair, *pair, samples=samples)] if pair else ()),
     )
 
 
@@ -219,7 +192,7 @@ def _paths(name: str, shown: list[ShownPath], suffix: str = "") -> kit.Drawing:
     table = partial(posture_motions.motions_table, shown)
     draw = partial(posture_motions.draw_motions, same_scene=shown[0].by_phase)
     plays = tuple(kit.PlayedRun(one.condition, one.replicate) for one in shown)
-    drawing = PAPER.drawing(name, table, draw, [one.condition for one in shown], plays)
+    drawing = PAPER.drawing(name, (table, draw), [one.condition for one in shown], plays=plays)
     return drawing._replace(stem=drawing.stem + suffix)
 
 
@@ -231,28 +204,11 @@ def _manoeuvres(results: kit.Results, settings: kit.ReportSettings) -> list[kit.
     shown = [ShownPath(c.label, c, measures.shown_replicate(c), True) for c in several]
     phases = PAPER.drawing(
         "phases",
-        partial(posture_history.phases_table, results._replace(conditions=phased), level),
-        posture_history.draw_phases,
+        posture_history.PHASES,
         phased,
+        results._replace(conditions=phased),
+        level,
         level=100 * level,
     )
     found = [_paths("manoeuvre", [one], end) for end, one in zip(ends, shown, strict=True)]
     return [*found, phases] if phased else found
-
-
-def _trap(main: tuple[kit.ConditionResults, ...]) -> list[kit.Drawing]:
-    """Return the figure of the local minimum, where runs get stuck that a sub-goal helps."""
-    pair = posture_trap.pair(main)
-    if pair is None:
-        return []
-    table = partial(posture_trap.trap_table, *pair)
-    samples = posture_trap.SAMPLES
-    return [PAPER.drawing("trap", table, posture_trap.draw_trap, pair, samples=samples)]
-
-
-def _models(main: tuple[kit.ConditionResults, ...]) -> kit.Drawing:
-    found = measures.by_robot(main)
-    shown = [(c.label if len(found) > 1 else "the robot", c) for c in found]
-    return PAPER.drawing(
-        "fig_3_4_models", partial(solids.models_table, shown), solids.draw_models, found
-    )

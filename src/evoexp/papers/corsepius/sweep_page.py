@@ -1,13 +1,13 @@
 """Corsépius 2001: settings side by side, and the size of the population (section 5)."""
 
+from collections.abc import Callable, Mapping
 from functools import partial
 
-from evoexp.papers import run_values
-from evoexp.papers.corsepius import measures, population_claims
+from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius import page as whole_page
+from evoexp.papers.corsepius.claims import METRICS, RECOMMENDED, SizeComparison
 from evoexp.papers.corsepius.figures import population_effort
 from evoexp.papers.corsepius.measures import Task
-from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
 from evoexp.papers.corsepius.rules import PAPER, RULES
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.report import kit
@@ -20,11 +20,9 @@ EFFECTS = (
 )
 SETTING = "num_offspring"
 SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
-# quantity, first condition of a task, its comparisons with the others
-FirstComparison = tuple[str, str, tuple[kit.Comparison, ...]]
 # evaluations to the goal, and steps of the path to it, (done,); inf without it
-effort = run_values.where_solved(measures.evaluations)
-steps_to_goal = run_values.where_solved(measures.num_steps)
+effort = kit.where_solved(measures.evaluations)
+steps_to_goal = kit.where_solved(measures.num_steps)
 
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -42,24 +40,23 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
             (f"Residual floor, {task.name}", slope.format(population_effort.slope(task)))
             for task in _scopes(results)
         ),
-        comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in found),
+        comparisons=kit.headed(found),
         drawings=_drawings(results, settings, found),
     )
 
 
-def comparisons(results: kit.Results, settings: kit.ReportSettings) -> list[FirstComparison]:
+def comparisons(
+    results: kit.Results, settings: kit.ReportSettings
+) -> tuple[kit.FamilyComparison, ...]:
     """Compare the first condition of every task with each other one.
 
     P-values are adjusted over each task. If no run meets its goal, distances to it are compared.
     """
-    reaching = any(c.solved for c in results.main)
-    name = "evaluations to the goal" if reaching else "distance to the goal"
-    values = effort if reaching else measures.residuals
-    found = (
-        (name, first.label, kit.compared([(first, other) for other in others], values, settings))
-        for first, *others in kit.grouped(results.with_data, measures.scene)
-    )
-    return [one for one in found if one[2]]
+    measure = kit.Measure("distance to the goal", measures.residuals)
+    if any(c.solved for c in results.main):
+        measure = kit.Measure("evaluations to the goal", effort)
+    families = map(kit.Family.of, kit.grouped(results.with_data, measures.scene))
+    return kit.compare_families(families, [measure], settings)
 
 
 def _table(results: kit.Results, settings: kit.ReportSettings) -> kit.Table:
@@ -108,21 +105,18 @@ def _scopes(results: kit.Results) -> tuple[Task, ...]:
 
 
 def _drawings(
-    results: kit.Results, settings: kit.ReportSettings, found: list[FirstComparison]
+    results: kit.Results, settings: kit.ReportSettings, found: tuple[kit.FamilyComparison, ...]
 ) -> tuple[kit.Drawing, ...]:
     """Return the figures that the settings in which conditions differ allow."""
     scopes, parents = _scopes(results), measures.tasks(results, "num_parents")
     drawn = [
-        PAPER.drawing(
-            "floor",
-            partial(population_effort.floor_table, scopes),
-            population_effort.draw_floor,
-            tuple(c for task in scopes for c in task.conditions),
-        )
+        PAPER.drawing("floor", population_effort.FLOOR, _conditions(scopes), scopes)
         for _ in scopes[:1]
     ]
     if parents:
-        return (*drawn, _effort(parents, settings))
+        counts, efforts = {"goal met": kit.success}, {"evaluations [-]": measures.evaluations}
+        given = parents, counts, efforts, settings
+        return (*drawn, _effort("parents_effort", *given, "parents μ [-]", PRINTED_PARENTS))
     shown = results.with_data
     if any(c.solved for c in shown):
         counts = {"goal met": kit.success, "of these: touch between postures": measures.refuted}
@@ -137,7 +131,7 @@ def _drawings(
         values = {"evaluations to the goal": effort, "steps of the path to it": steps_to_goal}
         main = results._replace(conditions=results.main)
         boxes = sweep_figures.values_drawing(main, values)
-        by_name = {name: rows for name, _, rows in found}
+        by_name = {one.measure.name: one.rows for one in found if one.rows}
         first = shown[0].label
         drawn += [
             boxes._replace(conditions=shown),
@@ -146,18 +140,25 @@ def _drawings(
     return tuple(drawn)
 
 
-def _effort(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Drawing:
-    """Return the figure of success and effort by the number of parents."""
-    levels = settings.confidence, settings.num_resamples
-    counts, efforts = {"goal met": kit.success}, {"evaluations [-]": measures.evaluations}
-    return PAPER.drawing(
-        "parents_effort",
-        partial(population_effort.effort_table, found, counts, efforts, *levels),
-        partial(population_effort.draw_effort, setting="parents μ [-]", marked=PRINTED_PARENTS),
-        tuple(c for task in found for c in task.conditions),
-        level=100 * settings.confidence,
-        size=PRINTED_PARENTS,
-    )
+def _conditions(tasks: tuple[Task, ...]) -> tuple[kit.ConditionResults, ...]:
+    return tuple(c for task in tasks for c in task.conditions)
+
+
+def _effort(
+    name: str,
+    found: tuple[Task, ...],
+    counts: Mapping[str, Callable[[kit.ConditionResults], kit.Proportion]],
+    efforts: Mapping[str, kit.Values],
+    settings: kit.ReportSettings,
+    setting: str,
+    marked: float,
+) -> kit.Drawing:
+    """Return the figure of success and effort by a setting, with the printed value marked."""
+    draw = partial(population_effort.draw_effort, setting=setting, marked=marked)
+    arguments = found, counts, efforts, settings.confidence, settings.num_resamples
+    functions, level = (population_effort.effort_table, draw), 100 * settings.confidence
+    shown = _conditions(found)
+    return PAPER.drawing(name, functions, shown, *arguments, level=level, size=marked)
 
 
 def population_page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -165,14 +166,14 @@ def population_page(results: kit.Results, settings: kit.ReportSettings) -> kit.P
     found = measures.tasks(results, SETTING) if kit.planned_by(results, PostureEs) else ()
     if not found:
         return whole_page.page(results, settings)
-    sizes = {metric: population_claims.compare_sizes(found, metric, settings) for metric in METRICS}
+    sizes = {metric: claims.compare_sizes(found, metric, settings) for metric in METRICS}
     judge = judging.judge(results, settings, RULES)
     return PAPER.page(
         results,
         "sizes",
         quantities=whole_page.effort_quantities(results),
         tables=(_size_table(found, settings),),
-        claims=population_claims.judge_study(judge, found, sizes, settings),
+        claims=claims.judge_study(judge, found, sizes),
         checks=PAPER.checks("sizes"),
         drawings=_size_drawings(found, sizes, settings),
     )
@@ -192,7 +193,7 @@ def _size_table(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Ta
         for task in found
         for value, c in task.by_value.items()
     )
-    runs = sum(c.done for task in found for c in task.conditions)
+    runs = sum(c.done for c in _conditions(found))
     words = {"level": 100 * level, "resamples": settings.num_resamples, "runs": runs}
     return PAPER.table("sizes", rows, **words)
 
@@ -214,32 +215,18 @@ def _size_drawings(
     found: tuple[Task, ...], sizes: dict[str, list[SizeComparison]], settings: kit.ReportSettings
 ) -> tuple[kit.Drawing, ...]:
     """Return the figures of effort, and of ratios where there are any."""
-    level = f"{100 * settings.confidence:g} %"
-    shown = tuple(c for task in found for c in task.conditions)
     units = (f"{metric} [{'s' if metric == 'CPU time' else '-'}]" for metric in METRICS)
-    effort = dict(zip(units, METRICS.values(), strict=True))
-    shares = {"goal met": kit.success, "of these: in contact between postures": measures.refuted}
-    levels = settings.confidence, settings.num_resamples
-    names = [task.name for task in found]
-    drawn = (
-        PAPER.drawing(
-            "size_effort",
-            partial(population_effort.effort_table, found, shares, effort, *levels),
-            partial(
-                population_effort.draw_effort,
-                setting="offspring per cycle λ [-]",
-                marked=RECOMMENDED,
-            ),
-            shown,
-            level=level,
-            size=RECOMMENDED,
-        ),
-        PAPER.drawing(
-            "ratios",
-            partial(population_effort.ratios_table, sizes, names, RECOMMENDED),
-            partial(population_effort.draw_ratios, setting="λ [-]"),
-            shown,
-            size=RECOMMENDED,
-        ),
+    efforts = dict(zip(units, METRICS.values(), strict=True))
+    counts = {"goal met": kit.success, "of these: in contact between postures": measures.refuted}
+    given = found, counts, efforts, settings
+    drawn = _effort("size_effort", *given, "offspring per cycle λ [-]", RECOMMENDED)
+    if not any(sizes.values()):
+        return (drawn,)
+    ratios = (
+        population_effort.ratios_table,
+        partial(population_effort.draw_ratios, setting="λ [-]"),
     )
-    return drawn if any(sizes.values()) else drawn[:1]
+    names = [task.name for task in found]
+    arguments = sizes, names, RECOMMENDED
+    shown = _conditions(found)
+    return drawn, PAPER.drawing("ratios", ratios, shown, *arguments, size=RECOMMENDED)

@@ -1,6 +1,5 @@
 """The page of what Curkovic et al. 2013 leave open: method V beside method I and beside elites."""
 
-from evoexp.papers import run_values
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.records import FloatArray
@@ -24,8 +23,8 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         return measures.evaluations_to(condition, threshold)
 
     def against(
-        c: kit.ConditionResults, other: str, values: kit.Values
-    ) -> tuple[kit.Comparison, ...]:
+        judge: kit.Judge, c: kit.ConditionResults, other: str, values: kit.Values
+    ) -> kit.Comparison | None:
         """Compare method V with another treatment under the same numbers.
 
         Numbers of the hall are no numbers of a treatment without one: that is as assumed then.
@@ -33,17 +32,17 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         _, comma, changed = c.label.partition(", ")
         by_label = {c.label: c for c in results.with_data}
         twin = by_label.get(f"{other}{comma}{changed}", by_label.get(other))
-        return kit.compared([] if twin is None else [(c, twin)], values, settings)
+        return None if twin is None else judge.compared(c, twin, values)
 
     def faster(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
         hearing = judge.on("faster", who="", measure=EFFORT, pair=f": {METHOD} against {PLAIN}")
-        return hearing.better(next(iter(against(c, PLAIN, effort)), None), "lower")
+        return hearing.better(against(judge, c, PLAIN, effort), "lower")
 
     def beyond_elites(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
-        rows = against(c, ELITES, cost)
-        told = "; ".join(judging.evidence(row, "lower") for row in rows) or "nothing to compare"
+        row = against(judge, c, ELITES, cost)
+        told = judging.evidence(row, "lower") if row else "nothing to compare"
         hearing = judge.on("hall_beyond_elites", who="", elites=ELITES, measure="best cost")
-        return hearing.better_than_all(told, rows)
+        return hearing.better_than_all(told, [row] if row else [])
 
     cost = kit.by_column("best_cost")
     headlines = (
@@ -58,7 +57,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
 
 
 def _free(judge: kit.Judge, condition: kit.ConditionResults, controls: Controls) -> kit.Claim:
-    certified = run_values.certified(condition).having
+    certified = kit.certified(condition).having
     judged = condition.done - condition.verdicts.undecided
     hearing = judge.on(
         "free_motion",

@@ -1,18 +1,24 @@
 """The page of the hall of fame of Curkovic et al. 2013: is it the hall, or just elitism?"""
 
-from collections.abc import Sequence
-from functools import partial
+import itertools
+import textwrap
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import hall_shares, measures, sweep_page
-from evoexp.papers.curkovic.figures import elitism_shares
-from evoexp.papers.curkovic.hall_shares import EFFORT, Corner, Measure, Share
+from evoexp.papers.curkovic.hall_shares import EFFORT, Corner, Gain, Share
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.report.kit import groups, judging, markdown, marks, style
 
+COLUMNS = ["measure", "corner", "elites", "share", "lower", "upper"]
+WRAPPED = 16  # characters of a quantity's name, per line
+EDGES = (-0.6, 2.6)  # shares beyond stand at the edge, as arrows
+ALL = 1.0  # elites gain as much as the hall does
 NOTE = (
     "The gain of the hall is the quantity without hall and elites less that with the hall; the "
     "share is the gain by elites over it, with its bootstrap interval over the seeds: 100 % means "
@@ -20,6 +26,49 @@ NOTE = (
     "nothing; without an interval: its gain cannot be told from none. n: runs that count, of "
     "nothing, elites and hall."
 )
+# (reading and rate, quantity, elites, hall) → how much of the hall's gain elites have, too
+Shares = Callable[[Corner, Gain, kit.ConditionResults, kit.ConditionResults], Share]
+
+
+def draw_shares(table: pd.DataFrame) -> Figure:
+    """Draw one panel per quantity, one row per reading and rate, elites side by side."""
+    corners = list(dict.fromkeys(table["corner"]))
+    numbers = list(dict.fromkeys(table["elites"]))
+    measures = list(dict.fromkeys(table["measure"]))
+    figure, panels = style.row_of_panels(0.42 * len(corners) + 1.6, len(measures), sharey=True)
+    for axes, measure in zip(panels, measures, strict=True):
+        for edge, line in ((0.0, "-"), (ALL, (0, (4, 2)))):
+            axes.axvline(edge, color=style.FAINT, linewidth=0.9, linestyle=line, zorder=1)
+        for (elites, corner), rows in groups(
+            table[table["measure"] == measure], ["elites", "corner"]
+        ):
+            k = numbers.index(elites)
+            y = corners.index(corner) + 0.22 * (k - 0.5 * (len(numbers) - 1))
+            row, colour = rows.iloc[0], style.ARM_COLOURS[k]
+            ends = np.clip([row["lower"], row["upper"]], *EDGES)
+            if np.isfinite(ends).all():
+                axes.hlines(y, *ends, color=colour, linewidth=1.4)
+            if not np.isfinite(row["share"]):
+                axes.annotate("no gain", (0.03, y), fontsize=6, va="center", color=colour)
+                continue
+            inside = EDGES[0] <= row["share"] <= EDGES[1]
+            mark = "o" if inside else (">" if row["share"] > EDGES[1] else "<")
+            fill = colour if np.isfinite(row["lower"]) else "white"
+            place = float(np.clip(row["share"], *EDGES))
+            axes.plot(place, y, mark, color=colour, mfc=fill, ms=5, clip_on=False)
+        axes.set(xlim=EDGES, xticks=[0, 1, 2], title=textwrap.fill(measure, WRAPPED))
+        axes.set_xticklabels(["0", "100", "200"])
+        axes.set_xlabel("share of the gain [%]")
+    panels[0].set_yticks(range(len(corners)), corners)
+    panels[0].set_ylim(len(corners) - 0.5, -0.5)
+    keys = [
+        style.key(name, color=style.ARM_COLOURS[k], marker="o", ms=5, linewidth=1.4)
+        for k, name in enumerate(numbers)
+    ]
+    told = "gain of the hall not told from none"
+    open_mark = marks.point_key(told, "o", 5, mfc="white", mec=style.NEUTRAL)
+    style.keys_below(figure, [*keys, open_mark])
+    return figure
 
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -29,60 +78,45 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     if not corners:
         return base
     threshold = settings.threshold_ratio * measures.lower_bound(results.with_data[0])
-    gained = hall_shares.gain_measures(threshold, markdown.number(threshold))
-    shared = {
-        (corner.name, measure.name, elites.label, hall.label): hall_shares.share(
-            corner, measure, elites, hall, settings
-        )
-        for corner in corners
-        for measure in gained
-        for elites in corner.elites
-        for hall in _halls(corner)
-    }
+    gains = hall_shares.gain_measures(threshold, markdown.number(threshold))
+    judged = [gain for gain in gains if gain.judged is not None]
+    shares = cache(partial(hall_shares.share, settings=settings))
     drawing = PAPER.drawing(
         "elitism",
-        partial(_drawn, corners, gained, shared),
-        elitism_shares.draw_shares,
+        (_drawn, draw_shares),
         results.with_data,
+        corners,
+        gains,
+        shares,
         level=100 * settings.confidence,
     )
+    families = [kit.Family.of((*corner.halls[:1], *_rivals(corner))) for corner in corners]
+    quantities = [gain.judged for gain in judged if gain.judged is not None]
+    judge = judging.judge(results, settings, RULES)
     return PAPER.page(
         results,
         "hall",
         base,
-        claims=_claims(results, settings, corners, threshold, shared, gained),
-        tables=(_table(corners, gained, shared), *base.tables),
-        comparisons=_comparisons(settings, corners, threshold, gained),
+        claims=tuple(
+            claim
+            for gain in judged
+            for corner in corners
+            for claim in of_corner(judge, corner, gain, shares)
+        ),
+        tables=(_table(corners, gains, shares), *base.tables),
+        comparisons=kit.headed(kit.compare_families(families, quantities, settings)),
         drawings=(drawing, *(each for each in base.drawings if each.stem != "effects")),
     )
 
 
-Shared = dict[tuple[str, str, str, str], Share]
+def _rivals(corner: Corner) -> tuple[kit.ConditionResults, ...]:
+    """Return all else of a reading and rate than the hall of distinct genomes."""
+    return (corner.nothing, *corner.elites, *corner.halls[1:], *corner.others)
 
 
-def _halls(corner: Corner) -> tuple[kit.ConditionResults, ...]:
-    return (corner.hall,) if corner.by_index is None else (corner.hall, corner.by_index)
-
-
-def _comparisons(
-    settings: kit.ReportSettings,
-    corners: Sequence[Corner],
-    threshold: float,
-    gained: Sequence[Measure],
-) -> tuple[tuple[str, tuple[kit.Comparison, ...]], ...]:
-    """Compare the hall of distinct genomes with all else of its reading and rate."""
-    found = []
-    for name, values, _ in judged_by(threshold, gained):
-        for corner in corners:
-            others = (corner.nothing, *corner.elites, *_halls(corner)[1:], *corner.others)
-            rows = kit.compared([(corner.hall, other) for other in others], values, settings)
-            found.append((f"{name}: {corner.hall.label} against …", rows))
-    return tuple(found)
-
-
-def _value(measure: Measure, condition: kit.ConditionResults) -> str:
-    found = hall_shares.of_all_runs(measure, condition)
-    return markdown.number(float(np.rint(np.exp(found))) if measure.short == EFFORT else found)
+def _value(gain: Gain, condition: kit.ConditionResults) -> str:
+    found = hall_shares.of_all_runs(gain, condition)
+    return markdown.number(float(np.rint(np.exp(found))) if gain.short == EFFORT else found)
 
 
 def _told(share: Share) -> str:
@@ -94,29 +128,15 @@ def _told(share: Share) -> str:
     return text
 
 
-def _table(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared) -> kit.Table:
+def _table(corners: Sequence[Corner], gains: Sequence[Gain], shares: Shares) -> kit.Table:
     """Return the table of quantities, of shares by elitism, and of the runs behind them."""
     rows = []
-    for corner in corners:
-        for measure in gained:
-            for hall in _halls(corner):
-                kept = "genome" if hall is corner.hall else "index"
-                found = [
-                    shared[corner.name, measure.name, elites.label, hall.label]
-                    for elites in corner.elites
-                ]
-                rows.append(
-                    (
-                        corner.name,
-                        measure.name,
-                        kept,
-                        _value(measure, corner.nothing),
-                        *(_value(measure, elites) for elites in corner.elites),
-                        _value(measure, hall),
-                        *(_told(share) for share in found),
-                        "; ".join(", ".join(map(str, share.n)) for share in found[-1:]),
-                    )
-                )
+    for corner, gain in itertools.product(corners, gains):
+        for hall, kept in zip(corner.halls, ("genome", "index"), strict=False):
+            found = [shares(corner, gain, elites, hall) for elites in corner.elites]
+            values = (_value(gain, c) for c in (corner.nothing, *corner.elites, hall))
+            counts = ", ".join(map(str, found[-1].n))
+            rows.append((corner.name, gain.name, kept, *values, *map(_told, found), counts))
     elites = [
         f"{c.planner.ga.num_elites} elite" + "s" * (k > 0) for k, c in enumerate(corners[0].elites)
     ]
@@ -134,80 +154,40 @@ def _table(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared)
     return kit.Table("What elitism explains of the hall's gain", headers, tuple(rows), note)
 
 
-def _drawn(corners: Sequence[Corner], gained: Sequence[Measure], shared: Shared) -> pd.DataFrame:
+def _drawn(corners: Sequence[Corner], gains: Sequence[Gain], shares: Shares) -> pd.DataFrame:
     """Return the table of the figure: shares in the gain by a hall of distinct genomes."""
     rows = []
-    for corner in corners:
-        for measure in gained:
-            for elites in corner.elites:
-                share = shared[corner.name, measure.name, elites.label, corner.hall.label]
-                name = elites.label.rpartition(", ")[2]
-                rows.append((measure.short, corner.name, name, share.value, *share.interval))
-    return pd.DataFrame(rows, columns=elitism_shares.COLUMNS)
+    for corner, gain in itertools.product(corners, gains):
+        for elites in corner.elites:
+            share = shares(corner, gain, elites, corner.hall)
+            rows.append((gain.short, corner.name, _short(elites), share.value, *share.interval))
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _claims(
-    results: kit.Results,
-    settings: kit.ReportSettings,
-    corners: Sequence[Corner],
-    threshold: float,
-    shared: Shared,
-    gained: Sequence[Measure],
-) -> tuple[kit.Claim, ...]:
-    judge, found = judging.judge(results, settings, RULES), list[kit.Claim]()
-    for name, values, measure in judged_by(threshold, gained):
-        for corner in corners:
-            shares = []
-            for c in corner.elites:
-                share = shared[corner.name, measure.name, c.label, corner.hall.label]
-                shares.append(f"{_told(share)} ({c.label.rpartition(', ')[2]})")
-            told = f"; share of the hall's gain over nothing: {', '.join(shares)}"
-            found += of_corner(judge, settings, corner, name, values, told)
-    return tuple(found)
+def _short(elites: kit.ConditionResults) -> str:
+    return elites.label.rpartition(", ")[2]
 
 
-def judged_by(
-    threshold: float, gained: Sequence[Measure]
-) -> tuple[tuple[str, kit.Values, Measure], ...]:
-    """Return name and values of the quantities that claims are judged by, and their gains."""
-    effort = partial(measures.evaluations_to, threshold=threshold)
-    to = f"evaluations to a team of cost ≤ {markdown.number(threshold)}"
-    return (
-        ("best cost", kit.by_column("best_cost"), gained[0]),
-        (to, effort, gained[1]),
-        (measures.CERTIFIED, measures.certified_cost, gained[2]),
-    )
-
-
-def of_corner(
-    judge: kit.Judge,
-    settings: kit.ReportSettings,
-    corner: Corner,
-    name: str,
-    values: kit.Values,
-    shares: str,
-) -> list[kit.Claim]:
+def of_corner(judge: kit.Judge, corner: Corner, gain: Gain, shares: Shares) -> list[kit.Claim]:
     """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
+    assert gain.judged is not None
+    name, values, *_ = gain.judged
     who, hall = f"{corner.name}: ", corner.hall
-    elites = " and than ".join(c.label.rpartition(", ")[2] for c in corner.elites)
-    over_nothing = kit.compared([(hall, corner.nothing)], values, settings)
-    over_elites = kit.compared([(hall, c) for c in corner.elites], values, settings)
+    over_elites = kit.compared([(hall, c) for c in corner.elites], values, judge.settings)
     told = "; ".join(
         f"against {row.quantity} {judging.evidence(row, 'lower')}" for row in over_elites
     )
-    found = [
-        judge.on("hall_helps", who=who, measure=name).better(
-            next(iter(over_nothing), None), "lower"
-        ),
-        judge.on("hall_beyond_elites", who=who, elites=elites, measure=name).better_than_all(
-            told + shares, over_elites
-        ),
-    ]
-    if corner.by_index is not None:
-        row = next(iter(kit.compared([(hall, corner.by_index)], values, settings)), None)
-        found.append(judge.on("distinct_genomes", who=who, measure=name).better(row, "lower"))
-    for other in corner.others:
-        if other.planner.ga.hall_frozen:
-            row = next(iter(kit.compared([(hall, other)], values, settings)), None)
-            found.append(judge.on("frozen_hall", who=who, measure=name).better(row, "lower"))
-    return found
+    explained = ", ".join(
+        f"{_told(shares(corner, gain, c, hall))} ({_short(c)})" for c in corner.elites
+    )
+    elites = " and than ".join(map(_short, corner.elites))
+    beyond = judge.on("hall_beyond_elites", who=who, elites=elites, measure=name)
+    single = [("hall_helps", corner.nothing)]
+    single += [("distinct_genomes", c) for c in corner.halls[1:]]
+    single += [("frozen_hall", c) for c in corner.others if c.planner.ga.hall_frozen]
+    first, *more = (
+        judge.on(rule, who=who, measure=name).better(judge.compared(hall, c, values), "lower")
+        for rule, c in single
+    )
+    told += f"; share of the hall's gain over nothing: {explained}"
+    return [first, beyond.better_than_all(told, over_elites), *more]

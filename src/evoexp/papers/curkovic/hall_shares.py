@@ -1,6 +1,7 @@
 """How much of the gain by a hall of fame elitism alone explains."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,14 +24,20 @@ class Corner(NamedTuple):
     by_index: kit.ConditionResults | None  # with a hall of distinct indices; None: not run
     others: tuple[kit.ConditionResults, ...]  # other halls: those that forget, or never change
 
+    @property
+    def halls(self) -> tuple[kit.ConditionResults, ...]:
+        """The halls that never forget: of distinct genomes, then of distinct indices."""
+        return (self.hall,) if self.by_index is None else (self.hall, self.by_index)
 
-class Measure(NamedTuple):
+
+class Gain(NamedTuple):
     """A quantity whose gain is shared out."""
 
     name: str  # with unit where it has one
     short: str  # the same in a few words
     statistic: Statistic  # (condition, (resamples, runs) numbers of runs) → its value, (resamples,)
     runs: Callable[[kit.ConditionResults], int]  # the number of runs that count
+    judged: kit.Measure | None = None  # the quantity by which claims are judged; None: by none
 
 
 class Share(NamedTuple):
@@ -57,7 +64,7 @@ def corners(conditions: Sequence[kit.ConditionResults]) -> tuple[Corner, ...]:
 
 def share(
     corner: Corner,
-    measure: Measure,
+    measure: Gain,
     elites: kit.ConditionResults,
     hall: kit.ConditionResults,
     settings: kit.ReportSettings,
@@ -112,31 +119,37 @@ def log_effort(threshold: float) -> Statistic:
     return statistic
 
 
-def gain_measures(threshold: float, told: str) -> tuple[Measure, ...]:
+def gain_measures(threshold: float, told: str) -> tuple[Gain, ...]:
     """Return the quantities in which gains are shared out."""
+    best, to = kit.by_column("best_cost"), f"evaluations to a team of cost ≤ {told}"
+    effort = partial(measures.evaluations_to, threshold=threshold)
     return (
-        Measure(
-            "best cost", "best cost", medians(lambda c: c.column("best_cost")), lambda c: c.done
-        ),
-        Measure(
-            f"evaluations to a team of cost ≤ {told} (expected running time)",
+        Gain("best cost", "best cost", medians(best), _done, kit.Measure("best cost", best)),
+        Gain(
+            f"{to} (expected running time)",
             EFFORT,
             log_effort(threshold),
-            lambda c: int(np.isfinite(measures.evaluations_to(c, threshold)).sum()),
+            lambda c: int(np.isfinite(effort(c)).sum()),
+            kit.Measure(to, effort),
         ),
-        Measure(
+        Gain(
             measures.CERTIFIED,
             "cost, refuted as worst",
             medians(measures.certified_cost),
-            lambda c: c.done,
+            _done,
+            kit.Measure(measures.CERTIFIED, measures.certified_cost),
         ),
-        Measure(
+        Gain(
             "best cost among motions that are not refuted",
             "cost, not refuted only",
             medians(not_refuted),
             lambda c: int(np.isfinite(measures.certified_cost(c)).sum()),
         ),
     )
+
+
+def _done(condition: kit.ConditionResults) -> int:
+    return condition.done
 
 
 def not_refuted(condition: kit.ConditionResults) -> FloatArray:
@@ -163,7 +176,7 @@ def _corner(own: Sequence[kit.ConditionResults]) -> Corner | None:
     return Corner(name, nothing[0], tuple(elites), genomes[0], by_index, others)
 
 
-def of_all_runs(measure: Measure, condition: kit.ConditionResults) -> float:
+def of_all_runs(measure: Gain, condition: kit.ConditionResults) -> float:
     """Return a quantity over all runs of a condition."""
     return float(measure.statistic(condition, np.arange(condition.done)[None, :])[0])
 

@@ -67,11 +67,7 @@ def sampled(motion: Motion, samples: int) -> SampledMotion:
 
 
 def speed_limits(prepared: Prepared) -> FloatArray:
-    """Return how far either link of every robot may turn per sampling step (Eq. 2).
-
-    Returns:
-        (robots, 2) [deg].
-    """
+    """Return how far links may turn per sampling step (Eq. 2), (robots, 2) [deg]."""
     limit = wrapped(prepared.planner).speed_limit
     return np.array([limit.greatest_steps(arm.lengths) for arm in arms(prepared)])
 

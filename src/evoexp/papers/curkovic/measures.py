@@ -5,10 +5,11 @@ from functools import partial
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions
+from evoexp.papers.curkovic.rules import PAPER
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import generic, markdown
+from evoexp.report.kit import markdown
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 REFUTED = "collides between its configurations (exact verdict)"
@@ -60,44 +61,16 @@ def expected_seconds(condition: kit.ConditionResults, threshold: float) -> float
     return expected_evaluations(condition, threshold) * price
 
 
-def effort_quantities(results: kit.Results, threshold: float) -> tuple[kit.Quantity, ...]:
-    """Return the rows of the table of results about the effort to a team at or below a cost."""
-    row, to = partial(generic.quantity, results), f"team of cost ≤ {markdown.number(threshold)}"
-    expected = f"to a {to}, failures included (expected running time)"
-    return (
-        row(f"generations to a {to}", "generation", lambda c: generations_to(c, threshold)),
-        row(f"evaluations to a {to}", "–", lambda c: evaluations_to(c, threshold)),
-        row(
-            f"evaluations {expected}", "–", lambda c: np.rint([expected_evaluations(c, threshold)])
-        ),
-        row(
-            f"CPU time of the search {expected}",
-            "s",
-            lambda c: np.array([expected_seconds(c, threshold)]),
-        ),
-    )
-
-
-def team_quantities(
-    results: kit.Results, threshold: float, *more: kit.Quantity
-) -> tuple[kit.Quantity, ...]:
-    """Return the rows of the table of results that methods and sweeps share."""
-    row = partial(generic.quantity, results)
-    cost, _, *effort = generic.quantities(results)
-    return (
-        cost._replace(name="best cost of a collision-free team"),
-        *effort_quantities(results, threshold),
-        clearance_quantity(results),
-        *more,
-        *effort,
-        row("CPU time of a run", "s", kit.by_column("cpu_s")),
-    )
-
-
-def clearance_quantity(results: kit.Results) -> kit.Quantity:
-    """Return the row of the exact clearance."""
-    name, unit = "clearance of the bodies over the whole motion (exact)", results.with_data[0]
-    return generic.quantity(results, name, unit.condition.length_unit, kit.by_column("clearance"))
+def team_quantities(results: kit.Results, name: str, threshold: float) -> tuple[kit.Quantity, ...]:
+    """Return the rows of the table of results, those about the effort to a threshold among them."""
+    own: dict[str, kit.Values] = {
+        "generations_to": partial(generations_to, threshold=threshold),
+        "evaluations_to": partial(evaluations_to, threshold=threshold),
+        "expected_evaluations": lambda c: np.rint([expected_evaluations(c, threshold)]),
+        "expected_seconds": lambda c: np.array([expected_seconds(c, threshold)]),
+        "times_over_limit": times_over_limit,
+    }
+    return PAPER.quantities(results, name, own, threshold=markdown.number(threshold))
 
 
 def refuted(condition: kit.ConditionResults) -> FloatArray:

@@ -1,18 +1,12 @@
 """The page of motions of Curkovic et al. 2013, Figs. 7–11: curves, their defects, scenes."""
 
 import itertools
-from functools import partial
+from collections.abc import Iterator
 
 import numpy as np
 
-from evoexp.papers import run_values
 from evoexp.papers.curkovic import link_motions, measures
-from evoexp.papers.curkovic.figures import (
-    body_distances,
-    joint_values,
-    link_intersection,
-    robot_motions,
-)
+from evoexp.papers.curkovic.figures import link_intersection, motion_curves, robot_motions
 from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
@@ -28,19 +22,15 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     if not measures.fits(results):
         return generic.page(results, settings)
     base = generic.basis(results, settings)
-    unit = results.with_data[0].condition.length_unit
     tools = _tools(results, settings)
-    speed = "greatest speed of a link over what Eq. 2 allows"
-    kept = generic.quantity(results, f"{KEPT}, its centre line", unit, tool_distance)
+    own = {"times_over_limit": measures.times_over_limit, "tool_distance": tool_distance}
     return PAPER.page(
         results,
         "motion",
         base,
         quantities=(
-            base.quantities[0]._replace(name="best cost of a collision-free team"),
-            measures.clearance_quantity(results),
-            generic.quantity(results, speed, "–", measures.times_over_limit),
-            *((kept,) if tools else ()),
+            *PAPER.quantities(results, "motion", own),
+            *(PAPER.quantities(results, "tools", own) if tools else ()),
             *base.quantities[1:],
         ),
         claims=_claims(results, settings, tools),
@@ -95,15 +85,14 @@ def _by_radius(results: kit.Results) -> dict[int, list[kit.ConditionResults]]:
 
 def _tools(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Comparison, ...]:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
+
+    def named(largest: kit.ConditionResults, smallest: kit.ConditionResults) -> str:
+        substeps = largest.planner.collision.collision_substeps
+        tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
+        return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
+
     pairs = [(own[-1], own[0]) for own in _by_radius(results).values() if len(own) > 1]
-    return kit.compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
-
-
-def _pair(largest: kit.ConditionResults, smallest: kit.ConditionResults) -> str:
-    """Name the comparison of two radii."""
-    substeps = largest.planner.collision.collision_substeps
-    tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
-    return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
+    return kit.compared(pairs, tool_distance, settings, lower_is_better=False, named=named)
 
 
 def _claims(
@@ -112,7 +101,7 @@ def _claims(
     judge, found = judging.judge(results, settings, RULES), list[kit.Claim]()
     for c in results.main:
         scene, where = _scene_claim(c)
-        certified = run_values.certified(c).having
+        certified = kit.certified(c).having
         for who, holds, judged in (
             ("the paper's model", c.solved, c.done),
             ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
@@ -161,62 +150,40 @@ def _checks(results: kit.Results) -> tuple[tuple[str, str], ...]:
     return (*checks, *(("Length of the chromosome (Eqs. 2, 3)", note) for note in notes))
 
 
-def _drawings(results: kit.Results, settings: kit.ReportSettings) -> list[kit.Drawing]:
-    first, drawn = results.main[0], []
+def _drawings(results: kit.Results, settings: kit.ReportSettings) -> Iterator[kit.Drawing]:
+    first, shown, samples = results.main[0], results.main, settings.samples_per_segment
     problem = first.problem(Problem)
     if len(problem.start) == 2 and not _enveloped(first) and problem.moving.all():
-        drawn.append(
-            PAPER.drawing(
-                "fig_7_intersection",
-                partial(link_intersection.intersection_table, first),
-                link_intersection.draw_intersection,
-                (first,),
-            )
-        )
+        yield PAPER.drawing("fig_7_intersection", link_intersection.INTERSECTION, (first,), first)
     for condition, suffix in results.suffixed:
-        drawn += _of_condition(results, condition, suffix)
+        yield from _of_condition(results, condition, suffix)
     if radii := _by_radius(results):
-        shown = tuple(c for conditions in radii.values() for c in conditions)
-        drawn.append(
-            PAPER.drawing(
-                "fig_11_safety",
-                partial(robot_motions.tools_table, shown),
-                robot_motions.draw_tools,
-                shown,
-            )
-        )
-    shown = results.main
-    drawn.append(
-        PAPER.drawing(
-            "distances",
-            partial(body_distances.distances_table, shown, settings.samples_per_segment),
-            body_distances.draw_distances,
-            shown,
-        )
-    )
-    return drawn
+        by_radius = tuple(c for conditions in radii.values() for c in conditions)
+        yield PAPER.drawing("fig_11_safety", robot_motions.TOOLS, by_radius, by_radius)
+    yield PAPER.drawing("distances", motion_curves.DISTANCES, shown, shown, samples)
 
 
 def _of_condition(
     results: kit.Results, condition: kit.ConditionResults, suffix: str
-) -> list[kit.Drawing]:
-    problem = condition.problem(Problem)
+) -> Iterator[kit.Drawing]:
+    problem, best = condition.problem(Problem), kit.PlayedRun(condition, condition.best_replicate)
+    stem, title = "fig_8_motion", "Fig. 8: motion of the two robots"
     if not problem.moving.all():
-        number, title = "10", "Fig. 10: one robot stands still"
+        stem, title = "fig_10_motion", "Fig. 10: one robot stands still"
     elif len(problem.start) > 2 or _by_radius(results):
-        number, title = "", f"Motion of {len(problem.start)} robots"
-    else:
-        number, title = "8", "Fig. 8: motion of the two robots"
-    best = (kit.PlayedRun(condition, condition.best_replicate),)
-    motion = {"stem": f"fig_{number}_motion" if number else "motion", "title": title}
-    joints = {"stem": "fig_9_joints", "what": "Fig. 9: link"}
-    if number != "8":
-        joints = {"stem": "joints", "what": "Link"}
-    table, draw = partial(robot_motions.motion_table, condition), robot_motions.draw_motion
-    angles = partial(joint_values.joints_table, condition)
-    return [
-        PAPER.drawing("motion", table, draw, (condition,), best, suffix, **motion),
-        PAPER.drawing(
-            "joints", angles, joint_values.draw_joints, (condition,), (), suffix, **joints
-        ),
-    ]
+        stem, title = "motion", f"Motion of {len(problem.start)} robots"
+    yield PAPER.drawing(
+        "motion",
+        (robot_motions.motion_table, robot_motions.draw_motion),
+        (condition,),
+        condition,
+        plays=(best,),
+        suffix=suffix,
+        stem=stem,
+        title=title,
+    )
+    stem, what = ("fig_9_joints", "Fig. 9: link") if stem == "fig_8_motion" else ("joints", "Link")
+    joints = motion_curves.joints_table, motion_curves.draw_joints
+    yield PAPER.drawing(
+        "joints", joints, (condition,), condition, suffix=suffix, stem=stem, what=what
+    )

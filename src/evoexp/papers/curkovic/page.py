@@ -10,6 +10,7 @@ from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report import kit
 from evoexp.report.kit import generic, judging, markdown
 
+Rows = tuple[kit.Comparison, ...]
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 
 
@@ -26,48 +27,46 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     )
     costs = matched(kit.by_column("best_cost"))
     generations = matched(partial(measures.generations_to, threshold=threshold))
-    certified = matched(measures.certified_cost)
+    certified, to = matched(measures.certified_cost), markdown.number(threshold)
+    judged = {  # measure → the word of the better one, comparisons
+        f"a team of cost ≤ {to}": ("earlier", generations),
+        "the best cost at the end": ("lower", costs),
+        measures.CERTIFIED: ("lower", certified),
+    }
     one_scene = len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
+    drawing = PAPER.drawing(
+        "fig_6_methods", methods.METHODS, results.with_data, results, PAIRS, bound, threshold
+    )
     return PAPER.page(
         results,
         "methods",
         quantities=(
-            *measures.team_quantities(results, threshold),
+            *measures.team_quantities(results, "methods", threshold),
             *generic.term_quantities(results),
         ),
-        claims=_claims(results, settings, generations, costs, certified, threshold),
+        claims=_claims(judging.judge(results, settings, RULES), results, judged),
         checks=_checks(results, bound),
         comparisons=tuple(
             (f"{title}: matched pairs of methods", rows)
             for title, rows in (
                 ("best cost of a team", costs),
-                (f"generations to a team below {markdown.number(threshold)}", generations),
+                (f"generations to a team below {to}", generations),
                 (measures.CERTIFIED, certified),
             )
             if rows
         ),
-        drawings=(
-            _methods(results, bound, threshold) if one_scene else generic.cost_drawing(results),
-        ),
+        drawings=(drawing if one_scene else generic.cost_drawing(results),),
     )
 
 
 def _claims(
+    judge: kit.Judge,
     results: kit.Results,
-    settings: kit.ReportSettings,
-    generations: tuple[kit.Comparison, ...],
-    costs: tuple[kit.Comparison, ...],
-    certified: tuple[kit.Comparison, ...],
-    threshold: float,
+    judged: dict[str, tuple[str, Rows]],
 ) -> tuple[kit.Claim, ...]:
-    judge = judging.judge(results, settings, RULES)
     found = [
         judge.on("faster", who="", measure=title, pair=f": {row.quantity}").better(row, word)
-        for rows, title, word in (
-            (generations, f"a team of cost ≤ {markdown.number(threshold)}", "earlier"),
-            (costs, "the best cost at the end", "lower"),
-            (certified, measures.CERTIFIED, "lower"),
-        )
+        for title, (word, rows) in judged.items()
         for row in rows
     ]
     slowest = max((float(c.column("cpu_s").max()) for c in results.with_data), default=np.nan)
@@ -89,19 +88,6 @@ def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
     return (
         measures.rates_check(results, measures.REFUTED),
         measures.rates_check(results, measures.TOO_FAST),
-        (
-            "Runs whose random initial populations already hold a collision-free pair (so its "
-            "first generation says nothing about a method)",
-            at_first,
-        ),
+        *PAPER.checks("methods", at_first=at_first),
         (measures.BOUND, markdown.number(bound)),
-    )
-
-
-def _methods(results: kit.Results, bound: float, threshold: float) -> kit.Drawing:
-    return PAPER.drawing(
-        "fig_6_methods",
-        partial(methods.methods_table, results, PAIRS, bound, threshold),
-        methods.draw_methods,
-        results.with_data,
     )

@@ -1,19 +1,22 @@
-"""The page of sweeps over settings of Curkovic et al. 2013, family by family of conditions."""
+"""The page of sweeps of Curkovic et al. 2013: families of conditions, claims on settings."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.papers.curkovic import claims, families, measures
-from evoexp.papers.curkovic.families import FamilyComparison
-from evoexp.papers.curkovic.figures import cost_boxes, facets
-from evoexp.papers.curkovic.rules import PAPER
+from evoexp.papers.curkovic import measures
+from evoexp.papers.curkovic.figures import facets, methods
+from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report import kit
-from evoexp.report.kit import generic, markdown, shares, sweep_figures
+from evoexp.report.kit import generic, judging, markdown, shares, sweep_figures
 
+COLLIDES = f"solved motion {measures.REFUTED}"  # says nothing about convergence
+MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
+READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetric"}
 NAMES = {"quantity": "defect", "having": "failing", "total": "solved"}  # of shares, of defects
 SHORT = {
     measures.REFUTED: "collide in between",
@@ -23,33 +26,164 @@ SHORT = {
 EFFECTS = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
 
 
+def families(results: kit.Results) -> tuple[kit.Family, ...]:
+    """Return the families of a sweep.
+
+    Conditions that differ in collision substeps are compared with their twins; if there are none,
+    all conditions with the first one that reads Eq. 9 as they do.
+    """
+    conditions = results.with_data
+    fewest = min(_substeps(c) for c in conditions)
+    finer = [c for c in conditions if _substeps(c) > fewest]
+    if finer:
+        firsts = {_without_substeps(c): c for c in reversed(conditions) if _substeps(c) == fewest}
+        pairs = ((firsts.get(_without_substeps(c)), c) for c in finer)
+        twins = tuple((first, c) for first, c in pairs if first is not None)
+        return (kit.Family("each method, tested at its configurations only,", twins),)
+    found = []
+    for reading in dict.fromkeys(c.planner.ga.mutation_direction for c in conditions):
+        same = [c for c in conditions if c.planner.ga.mutation_direction == reading]
+        found.append(kit.Family.of(same))
+    return tuple(found)
+
+
+def tested(
+    results: kit.Results, settings: kit.ReportSettings, threshold: float
+) -> tuple[kit.FamilyComparison, ...]:
+    """Return all comparisons of a sweep."""
+    return kit.compare_families(families(results), _measures(results, threshold), settings)
+
+
+def curved(results: kit.Results) -> bool:
+    """Return whether any motion is executed as a curve."""
+    return any(c.planner.interpolation == "cubic" for c in results.with_data)
+
+
+def _measures(results: kit.Results, threshold: float) -> list[kit.Measure]:
+    to = f"to a team of cost ≤ {markdown.number(threshold)}"
+    found = [
+        kit.Measure("best cost", kit.by_column("best_cost")),
+        kit.Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
+        kit.Measure(measures.CERTIFIED, measures.certified_cost),
+    ]
+    pairs = [pair for family in families(results) for pair in family.pairs]
+    if any(len({c.planner.ga.population_size for c in pair}) > 1 for pair in pairs):
+        effort = partial(measures.evaluations_to, threshold=threshold)
+        found.append(kit.Measure(f"evaluations {to}", effort))
+    if len({_substeps(c) for c in results.with_data}) > 1 or curved(results):
+        found.append(kit.Measure(COLLIDES, measures.refuted))
+    return found
+
+
+def _substeps(condition: kit.ConditionResults) -> int:
+    return int(condition.planner.collision.collision_substeps)
+
+
+def _without_substeps(condition: kit.ConditionResults) -> str:
+    planner: dict[str, Any] = condition.planner.canonical()
+    return repr(planner | {"collision": planner["collision"] | {"collision_substeps": None}})
+
+
+def of_sweep(
+    results: kit.Results, settings: kit.ReportSettings, found: Sequence[kit.FamilyComparison]
+) -> tuple[kit.Claim, ...]:
+    """Return the claims that a sweep can judge, chosen by the settings that differ."""
+    claims_of: Callable[[kit.Judge, kit.Results, Sequence[kit.FamilyComparison]], list[kit.Claim]]
+    varied = _varied(results)
+    if varied == {"ga.hall_depth"}:
+        claims_of = _depth
+    elif varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}:
+        claims_of = _mutation
+    else:
+        return ()
+    judge = judging.judge(results, settings, RULES)
+    return tuple(claims_of(judge, results, _converging(found)))
+
+
+def _converging(found: Sequence[kit.FamilyComparison]) -> list[kit.FamilyComparison]:
+    """Return the comparisons in quantities that say how fast or how far a method converges."""
+    return [one for one in found if one.measure.name != COLLIDES]
+
+
+def _varied(results: kit.Results) -> set[str]:
+    """Return the settings of the planner in which conditions differ, `ga.…` among them."""
+    given = [c.planner.canonical() for c in results.with_data]
+    flat = [
+        {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in given
+    ]
+    return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
+
+
+def _depth(
+    judge: kit.Judge, results: kit.Results, found: Sequence[kit.FamilyComparison]
+) -> list[kit.Claim]:
+    first, *others = results.with_data
+    judged = []
+    for one in found:
+        own, *medians = (kit.spread(one.measure.values(c)).median for c in (first, *others))
+        best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
+        evidence = (
+            f"median {markdown.number(own)}; best of the others {best.label}: "
+            f"{markdown.number(median)}; {_outcomes(first, one.rows, judge.significance)}"
+        )
+        hearing = judge.on("depth", depth=first.label, measure=one.measure.name)
+        judged.append(hearing.best(evidence, one.rows, own <= min(medians)))
+    return judged
+
+
+def _mutation(
+    judge: kit.Judge, results: kit.Results, found: Sequence[kit.FamilyComparison]
+) -> list[kit.Claim]:
+    judged = []
+    for one in (one for one in found if one.rows):
+        first = one.family.pairs[0][0]
+        hearing = judge.on(
+            "falling_rate",
+            who="",
+            measure=one.measure.name,
+            reading=READINGS[first.planner.ga.mutation_direction],
+        )
+        evidence = _outcomes(first, one.rows, judge.significance)
+        judged.append(hearing.better_than_all(evidence, one.rows))
+    return judged
+
+
+def _outcomes(
+    first: kit.ConditionResults, rows: Sequence[kit.Comparison], significance: float
+) -> str:
+    """List the conditions that the first is better than, worse than, or not told from."""
+    words = {
+        1: "is significantly better than",
+        -1: "is significantly worse than",
+        0: "cannot be told from",
+    }
+    parts = []
+    for sign, word in words.items():
+        named = [
+            f"{row.quantity} (A12 {row.better.a12:.2f}, p = {markdown.p_value(row.p_adjusted)})"
+            for row in rows
+            if row.says(significance) == sign
+        ]
+        parts += [f"{word} {', '.join(named)}"] * bool(named)
+    return f"{first.label} {'; '.join(parts)}"
+
+
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of a sweep, or the generic page if there is nothing to compare."""
     if not measures.fits(results) or len(results.with_data) < 2:
         return generic.page(results, settings)
     bound = measures.lower_bound(results.with_data[0])
     threshold = settings.threshold_ratio * bound
-    found = families.tested(results, settings, threshold)
+    found = tested(results, settings, threshold)
     return PAPER.page(
         results,
         "sweep",
         generic.basis(results, settings),
-        quantities=_quantities(results, threshold),
-        claims=claims.of_sweep(results, settings, found),
+        quantities=measures.team_quantities(results, "sweep", threshold),
+        claims=of_sweep(results, settings, found),
         checks=_checks(results, bound),
-        comparisons=tuple(
-            (f"{one.measure.name}: {one.family.name} against …", one.rows)
-            for one in found
-            if one.rows
-        ),
+        comparisons=kit.headed(found),
         drawings=_drawings(results, settings, found, threshold),
-    )
-
-
-def _quantities(results: kit.Results, threshold: float) -> tuple[kit.Quantity, ...]:
-    speed = "greatest speed of a link over what Eq. 2 allows"
-    return measures.team_quantities(
-        results, threshold, generic.quantity(results, speed, "–", measures.times_over_limit)
     )
 
 
@@ -67,49 +201,36 @@ def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
 def _drawings(
     results: kit.Results,
     settings: kit.ReportSettings,
-    found: Sequence[FamilyComparison],
+    found: Sequence[kit.FamilyComparison],
     threshold: float,
 ) -> tuple[kit.Drawing, ...]:
-    names = dict.fromkeys(one.measure.name for one in found if one.measure.converges)
-    by_name = {
-        name: [row for one in found if one.measure.name == name for row in one.rows]
-        for name in names
-    }
+    by_name = kit.rows_by_name(_converging(found))
     told, shown = markdown.number(threshold), results.with_data
     bound = markdown.number(threshold / settings.threshold_ratio)
     table = partial(facets.facet_table, results, threshold)
     return (
+        PAPER.drawing("costs", methods.COSTS, shown, results, threshold, threshold=told),
+        PAPER.drawing("effort", (table, facets.draw_effort), shown, threshold=told),
         PAPER.drawing(
-            "costs",
-            partial(cost_boxes.costs_table, results, threshold),
-            cost_boxes.draw_costs,
-            shown,
-            threshold=told,
-        ),
-        PAPER.drawing("effort", table, facets.draw_effort, shown, threshold=told),
-        PAPER.drawing(
-            "convergence", table, facets.draw_convergence, shown, threshold=told, bound=bound
+            "convergence", (table, facets.draw_convergence), shown, threshold=told, bound=bound
         ),
         *sweep_figures.effects_drawings(
             results, settings, by_name, "the first condition of a family", EFFECTS
         ),
         PAPER.drawing(
             "defects",
-            partial(rates_table, results, settings.confidence),
-            draw_rates,
+            (rates_table, draw_rates),
             results.with_data,
+            results,
+            settings.confidence,
             level=100 * settings.confidence,
         ),
     )
 
 
 def rates_table(results: kit.Results, confidence: float) -> pd.DataFrame:
-    """Return the shares of solved motions that have a defect; without curves only one varies.
-
-    Returns:
-        Columns defect, position, condition, failing, solved, lower, upper, share.
-    """
-    shown = list(SHORT)[: None if families.curved(results) else 1]
+    """Return the shares of solved motions that have a defect; without curves only one varies."""
+    shown = list(SHORT)[: None if curved(results) else 1]
     found = [(position, c, measures.rates(c)) for position, c in enumerate(results.with_data)]
     rows = [(SHORT[name], k, c.label, rates[name]) for k, c, rates in found for name in shown]
     table = shares.shares_table(rows, {}, confidence).rename(columns=NAMES)

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.papers import run_values
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.redundant_ga.planner import RedundantGa
@@ -18,8 +17,9 @@ Contact = tuple[float, str]
 
 
 # position error at the end of SP2, (done,) [length unit], and evaluations; inf: no solution
-errors = run_values.where_solved(kit.by_column("term_position_error_sp2"))
-effort = run_values.where_solved(kit.by_column("evaluations"))
+errors = kit.where_solved(kit.by_column("term_position_error_sp2"))
+effort = kit.where_solved(kit.by_column("evaluations"))
+BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
 class Percentage(NamedTuple):
@@ -41,18 +41,16 @@ PRINTED = (
     Percentage(10, 1.0, 991),
     Percentage(10, 2.0, 1000),
 )
-BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
 def fits(results: kit.Results) -> bool:
     """Return whether there are results, all of arms that go by a via point into a box."""
-    found = results.with_data
-    return bool(found) and all(isinstance(c.planner, RedundantGa) for c in found)
+    return kit.planned_by(results, RedundantGa)
 
 
 def printed(condition: kit.ConditionResults) -> list[Percentage]:
     """Return the percentages that the paper prints for an arm of so many joints."""
-    return [one for one in PRINTED if one.joints == run_values.num_joints(condition)]
+    return [one for one in PRINTED if one.joints == kit.num_joints(condition)]
 
 
 def below(condition: kit.ConditionResults, bound: float) -> kit.Proportion:
@@ -66,7 +64,7 @@ def tests_per_second(condition: kit.ConditionResults) -> FloatArray:
     They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
     Chords are not counted.
     """
-    pairs = run_values.num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    pairs = kit.num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
     return np.asarray(pairs * condition.column("collision_queries") / kit.search_seconds(condition))
 
 
@@ -112,8 +110,3 @@ def refuted(condition: kit.ConditionResults) -> RefutedMotions:
     """Count the solved runs whose motion the exact verdict refutes, by sub-path."""
     paths = refuted_paths(condition)[kit.solved(condition)]
     return RefutedMotions(kit.counted(paths.any(axis=1)), *map(kit.counted, paths.T))
-
-
-def text(proportion: kit.Proportion, confidence: float) -> str:
-    """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
-    return proportion.with_interval(confidence, 1)

@@ -5,21 +5,13 @@ from functools import partial
 from typing import Any
 
 from evoexp.papers.lavoie import claims, measures
-from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
+from evoexp.papers.lavoie.figures import reaching_motions, run_distributions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import PAPER, RULES
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.report import kit
 from evoexp.report.kit import generic, judging, markdown, motion_geometry, run_measures
-
-ACCEPTED = "Accepted motions that touch an obstacle between tested positions (exact verdict)"
-REMOVED = (
-    "Remedies",
-    "more positions M, and chords from one position to the next: `evoexp run "
-    "experiment=lavoie_sweeps_positions`; an arm blind to obstacles: `evoexp run "
-    "experiment=lavoie_controls`",
-)
 
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
@@ -39,41 +31,23 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
 
 def quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
-    row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
-    cost, _, evaluations, queries = generic.quantities(results)
-    column = kit.by_column
-    tests = "tests of a link against an ellipse per second of search"
-    return (
-        row("position error of SP2 (runs without a solution: ∞)", unit, measures.errors),
-        cost._replace(name="objective of SP2"),
-        row("joint displacement of SP1", "rad", column("term_joint_displacement_sp1_rad")),
-        row("joint displacement of SP2", "rad", column("term_joint_displacement_sp2_rad")),
-        row("position error of SP1", unit, column("term_position_error_sp1")),
-        row("attempts", "–", column("term_attempts")),
-        evaluations,
-        queries,
-        row("clearance of the bodies over the whole motion (exact)", unit, column("clearance")),
-        row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
-        row("CPU time of its search", "s", run_measures.search_seconds),
-        row("evaluations per second of search", "1/s", run_measures.evaluations_per_second),
-        row(tests, "1/s", measures.tests_per_second),
-    )
+    own = {"errors": measures.errors, "tests_per_second": measures.tests_per_second}
+    return PAPER.quantities(results, "arms", own)
 
 
 def _claims(
     results: kit.Results, settings: kit.ReportSettings, refuted: dict[str, RefutedMotions]
 ) -> tuple[kit.Claim, ...]:
-    judge, level = judging.judge(results, settings, RULES), settings.confidence
-    shown = results.with_data
+    judge, shown = judging.judge(results, settings, RULES), results.with_data
     return (
-        *claims.percentages(judge, shown, level),
-        *claims.more_joints_are_better(judge, shown, level),
+        *claims.percentages(judge, shown),
+        *claims.more_joints_are_better(judge, shown),
         *(
             one
             for c in shown
             for one in (
-                claims.no_start_needed(judge, c, level),
-                claims.free_of_collision(judge, c, refuted[c.label].anywhere, level),
+                claims.no_start_needed(judge, c),
+                claims.free_of_collision(judge, c, refuted[c.label].anywhere),
             )
             if one is not None
         ),
@@ -86,29 +60,29 @@ def _checks(
 ) -> tuple[tuple[str, str], ...]:
     """Return the rows on contacts, solutions, attempts and the literal reading of the shift."""
 
-    def row(what: str, counts: dict[str, kit.Proportion]) -> tuple[str, str]:
-        texts = (f"{name}: {measures.text(p, settings.confidence)}" for name, p in counts.items())
-        return what, "; ".join(texts)
+    def told(counts: dict[str, kit.Proportion]) -> str:
+        texts = (f"{name}: {p.with_interval(settings.confidence, 1)}" for name, p in counts.items())
+        return "; ".join(texts)
 
     attempts = (
         f"{c.label}: {c.column('term_attempts').mean():.3f}, "
         f"{c.column('term_attempts').max():.0f} of at most {c.planner.num_attempts}"
         for c in results.with_data
     )
-    success = {c.label: run_measures.success(c) for c in results.with_data}
     return (
-        row(ACCEPTED, {label: found.anywhere for label, found in refuted.items()}),
-        row("… on SP1", {label: found.sp1 for label, found in refuted.items()}),
-        row("… on SP2", {label: found.sp2 for label, found in refuted.items()}),
-        REMOVED,
-        row("Runs with a solution", success),
-        ("Attempts of SP1 → SP2: mean, most", "; ".join(attempts)),
-        *PAPER.checks("arms"),
+        *PAPER.checks(
+            "arms",
+            accepted=told({label: found.anywhere for label, found in refuted.items()}),
+            sp1=told({label: found.sp1 for label, found in refuted.items()}),
+            sp2=told({label: found.sp2 for label, found in refuted.items()}),
+            solved=told({c.label: run_measures.success(c) for c in results.with_data}),
+            attempts="; ".join(attempts),
+        ),
         *(one for c in results.with_data for one in _literal_shift(c)),
     )
 
 
-def _literal_shift(condition: kit.ConditionResults) -> list[tuple[str, str]]:
+def _literal_shift(condition: kit.ConditionResults) -> tuple[tuple[str, str], ...]:
     """Return a row on the printed shift if the words vertically and horizontally are not swapped.
 
     There is none if nothing is shifted. The arm's collision model tells whether the start is free
@@ -118,43 +92,32 @@ def _literal_shift(condition: kit.ConditionResults) -> list[tuple[str, str]]:
     problem = condition.problem(Problem)
     dx, dy = scenario.obstacle_shift
     if dx == dy:
-        return []
+        return ()
     literal = scenario.model_copy(update={"obstacle_shift": (dy, dx)})
     model = condition.planner.collision.bind(problem.assembly, literal.obstacle_table())
     contact = model.contact(problem.start, problem.start)
-    told = "the start is free of collision"
-    if contact:
-        told = (
-            f"the start is not free of collision: link {contact.link} touches obstacle "
-            f"{contact.obstacle}"
-        )
-    what = f"{condition.label}: the printed shift of obstacles, read literally"
-    return [(what, f"({dy:g}, {dx:g}) instead of ({dx:g}, {dy:g}): {told}")]
+    touching = f"link {contact.link} touches obstacle {contact.obstacle}" if contact else ""
+    told = f"not free of collision: {touching}" if contact else "free of collision"
+    return PAPER.checks("shift", label=condition.label, dx=dx, dy=dy, told=told)
 
 
 def _drawings(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Drawing, ...]:
-    shown, level = results.with_data, f"{100 * settings.confidence:g} %"
+    shown, share = results.with_data, settings.confidence
+    level = f"{100 * share:g} %"
     starts = [ShownMotion(c.label, c) for c in shown]
-    distribution = partial(
-        error_distribution.distribution_table,
-        results,
-        measures.errors,
-        lambda c: [(one.bound, one.proportion) for one in measures.printed(c)],
-        settings.confidence,
-    )
+    own = measures.errors, lambda c: [(p.bound, p.proportion) for p in measures.printed(c)], share
     return (
         _postures("fig_1_start", starts),
         *_solutions(results),
         PAPER.drawing(
-            "fig_3_error", distribution, error_distribution.draw_distribution, shown, level=level
-        ),
-        PAPER.drawing(
-            "attempts",
-            partial(attempts.attempts_table, results, settings.confidence),
-            attempts.draw_attempts,
+            "fig_3_error",
+            run_distributions.DISTRIBUTION,
             shown,
+            results,
+            *own,
             level=level,
         ),
+        PAPER.drawing("attempts", run_distributions.ATTEMPTS, shown, results, share, level=level),
     )
 
 
@@ -174,7 +137,7 @@ def _solutions(results: kit.Results) -> Iterator[kit.Drawing]:
 def _postures(name: str, shown: list[ShownMotion]) -> kit.Drawing:
     table, draw = partial(reaching_motions.reaching_table, shown), reaching_motions.draw_reaching
     plays = tuple(kit.PlayedRun(c, k) for _, c, k, _ in shown if k is not None)
-    return PAPER.drawing(name, table, draw, [one.condition for one in shown], plays)
+    return PAPER.drawing(name, (table, draw), [one.condition for one in shown], plays=plays)
 
 
 def _solution(condition: kit.ConditionResults, replicate: int) -> ShownMotion:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from evoexp.papers.rana.claims import evolution_told
-from evoexp.papers.rana.drawings import AT, BETWEEN
+from evoexp.papers.rana.measures import evolution_told
 from evoexp.papers.rana.motions import problem
+from evoexp.papers.rana.page import AT, BETWEEN
 from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.records import FloatArray
 from evoexp.report import kit
@@ -16,24 +16,24 @@ Controls = tuple[kit.ConditionResults, ...]
 
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the paper's assumptions."""
-
-    def free(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
-        told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
-        hearing = judge.on("free_at_via_points", who="", source=SOURCE)
-        return hearing.every(told, c.solved, c.done, c.planned)
-
-    def evolution(judge: kit.Judge, c: kit.ConditionResults, controls: Controls) -> kit.Claim:
-        told, rows = evolution_told(c, controls, settings)
-        return judge.on("evolution_adds", who="").better_than_all(told, rows)
-
     safety = "least distance of centres over the safety distance [-]"
     hits = kit.by_column("term_collisions")
     headlines = (
-        kit.Headline("free_at_via_points", "colliding instants C5", hits, free),
+        kit.Headline("free_at_via_points", "colliding instants C5", hits, _free),
         kit.Headline("safety_between_via_points", safety, _kept_share, _safe),
-        kit.Headline("evolution_adds", "fitness F", kit.by_column("term_fitness"), evolution),
+        kit.Headline("evolution_adds", "fitness F", kit.by_column("term_fitness"), _evolution),
     )
     return assumptions.page(results, settings, RULES, PAPER.name, headlines)
+
+
+def _free(judge: kit.Judge, c: kit.ConditionResults, _: Controls) -> kit.Claim:
+    told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
+    hearing = judge.on("free_at_via_points", who="", source=SOURCE)
+    return hearing.every(told, c.solved, c.done, c.planned)
+
+
+def _evolution(judge: kit.Judge, c: kit.ConditionResults, controls: Controls) -> kit.Claim:
+    return judge.on("evolution_adds", who="").better_than_all(*evolution_told(judge, c, controls))
 
 
 def _kept_share(condition: kit.ConditionResults) -> FloatArray:

@@ -44,6 +44,12 @@ def straight_length(condition: ConditionResults) -> float:
     return float(sum(np.linalg.norm(gap[a:b]) for a, b in found.arm_slices))
 
 
+def worth(condition: ConditionResults) -> float:
+    """Return how many degrees of path cost as much as one colliding instant, k3 / k1."""
+    weights = condition.planner.objective
+    return float(weights.collision_weight / weights.length_weight)
+
+
 def paths_table(
     condition: ConditionResults,
     table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
@@ -124,11 +130,8 @@ def obstacle_distance(found: Problem) -> motion_geometry.BodyDistance:
 def approaches(condition: ConditionResults) -> pd.DataFrame:
     """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
 
-    Where all pairs are of one kind, the verdicts of the runs have said it.
-
-    Returns:
-        Columns kind (see `kinds_of_pairs`), replicate, clearance [length unit], clearance_at,
-        refuted_at [instant] (NaN: they touch nowhere), kept (whether the required distance is).
+    Where all pairs are of one kind, the verdicts of the runs have said it. `refuted_at` is NaN
+    where they touch nowhere; `kept` says whether the required distance is.
     """
     rows, kinds = [], kinds_of_pairs(condition)
     names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]

@@ -1,15 +1,41 @@
 """The page of Rana & Zalzala 1995: two planar arms (section 3), two PUMA-like arms (section 4)."""
 
-import numpy as np
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
-from evoexp.papers.rana import drawings, measures, motions, operators_page
-from evoexp.papers.rana.claims import evolution_told
-from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
+import numpy as np
+import pandas as pd
+
+from evoexp.papers.rana import motions, operators_page
+from evoexp.papers.rana.figures import planar_models, planar_motion, spatial_models
+from evoexp.papers.rana.measures import evolution_told
 from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report import kit
-from evoexp.report.kit import generic, judging, markdown, run_measures
+from evoexp.report.kit import convergence, generic, judging, markdown
 
+AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
+PLANAR = (  # figures of arms in the plane: name, table of a condition, drawing of the table
+    ("fig_1_arms", planar_models.arms_table, planar_models.draw_arms),
+    ("fig_2_via_points", planar_models.via_points_table, planar_models.draw_via_points),
+    ("fig_3_circles", planar_models.circles_table, planar_models.draw_circles),
+    ("fig_4_snapshots", planar_motion.snapshots_table, planar_motion.draw_snapshots),
+    ("fig_6_paths", planar_motion.paths_table, planar_motion.draw_paths),
+)
+SPATIAL = (  # the same of arms in space
+    ("fig_8_arm", spatial_models.arm_table, spatial_models.draw_arm),
+    ("fig_9_two_arms", spatial_models.two_arms_table, spatial_models.draw_two_arms),
+    ("fig_11_snapshots", spatial_models.snapshots_table, spatial_models.draw_snapshots),
+    *(
+        (f"fig_12b_{space}_space", spatial_models.paths_table, draw)
+        for space, draw in (
+            ("configuration", spatial_models.draw_configuration_space),
+            ("operational", spatial_models.draw_operational_space),
+        )
+    ),
+)
+PLAYED = ("fig_4_snapshots", "fig_11_snapshots")  # figures of the best replicate's motion
 CLEARANCE, COST = kit.by_column("clearance"), kit.by_column("best_cost")
 PRINTED = "as printed"  # label of the printed setting among the ablations
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
@@ -21,31 +47,124 @@ COMPARED = (  # with the controls: name, whether lower is better, values
 )
 
 
+class MeasuredMotions(NamedTuple):
+    """A condition, the end of its files' names, and the distances along its motions."""
+
+    condition: kit.ConditionResults
+    suffix: str
+    who: str  # begins a line about it: its label, or nothing if there is one condition only
+    sampled: pd.DataFrame
+
+    @property
+    def planar(self) -> bool:
+        """Return whether its arms move in a plane."""
+        return bool(motions.problem(self.condition).assembly.table.planar)
+
+    @property
+    def margin(self) -> float:
+        """The safety distance [length unit]."""
+        return motions.problem(self.condition).security_margin
+
+
+def drawings(one: MeasuredMotions) -> list[kit.Drawing]:
+    """Return the paper's figures of one condition, without those of its fitness."""
+    c = one.condition
+    median = c.spread("term_path_length_ratio").median
+    ratio = f"Median length over that of the straight line: {markdown.number(median)}."
+    played = (kit.PlayedRun(c, c.best_replicate),)
+    figures = [
+        PAPER.drawing(
+            name,
+            (table, draw),
+            (c,),
+            c,
+            plays=played if name in PLAYED else (),
+            suffix=one.suffix,
+            ratio=ratio,
+        )
+        for name, table, draw in (PLANAR if one.planar else SPATIAL)
+    ]
+    return [*figures, _distances(one)]
+
+
+def order(drawing: kit.Drawing) -> tuple[int, str]:
+    """Return the key that sorts drawings by the number of the paper's figure."""
+    return int(re.findall(r"\d+", drawing.stem)[0]), drawing.stem
+
+
+def fitness(results: kit.Results, drawn: Sequence[MeasuredMotions]) -> Iterator[kit.Drawing]:
+    """Yield Figs. 5 and 12a: one figure per scene, of all conditions and controls in it."""
+    scenes = list(dict.fromkeys(_scene(one.condition) for one in drawn))
+    for scene in scenes:
+        first = next(one for one in drawn if _scene(one.condition) == scene)
+        within = results._replace(
+            conditions=tuple(c for c in results.conditions if _scene(c) == scene)
+        )
+        stem, number = ("fig_5_fitness", "5") if first.planar else ("fig_12a_fitness", "12a")
+        suffix = first.suffix if len(scenes) > 1 else ""
+        drawing = PAPER.drawing(
+            "fitness",
+            (convergence.fitness_table, convergence.draw_fitness),
+            within.with_data,
+            within,
+            stem=stem,
+            number=number,
+        )
+        title = f"{drawing.title} ({first.condition.label})" if suffix else drawing.title
+        yield drawing._replace(stem=stem + suffix, title=title)
+
+
+def _scene(condition: kit.ConditionResults) -> tuple[Any, Any]:
+    return condition.condition.robot, condition.condition.scenario
+
+
+def _distances(one: MeasuredMotions) -> kit.Drawing:
+    """Return the figure of distances between the arms, with the least of all replicates."""
+    c = one.condition
+    at, between, clearance = (
+        markdown.number(float(c.column(name).min())) for name in (AT, BETWEEN, "clearance")
+    )
+    return PAPER.drawing(
+        "arm_distances",
+        planar_motion.DISTANCES,
+        (c,),
+        c,
+        one.sampled,
+        suffix=one.suffix,
+        number="7" if one.planar else "13",
+        at=at,
+        between=between,
+        clearance=clearance,
+        unit=c.condition.length_unit,
+    )
+
+
 def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     """Build the page of the paper, or the generic page if its figures cannot draw a robot."""
     if not results.with_data or not all(_fits(condition) for condition in results.with_data):
         return generic.page(results, settings)
     comparisons = kit.compared_with_controls(results, settings, COMPARED)
-    drawn = [measure(c, suffix, settings) for c, suffix in results.suffixed]
-    found = [claim for one in drawn for claim in _claims(results, settings, one)]
-    checks = [
-        (f"{_who(results, one)}{what}", finding) for one in drawn for what, finding in _checks(one)
+    samples, several = settings.samples_per_segment, len(results.main) > 1
+    drawn = [
+        MeasuredMotions(
+            c, suffix, f"{c.label}: " * several, planar_motion.sampled_distances(c, samples)
+        )
+        for c, suffix in results.suffixed
     ]
-    drawn_figures = [
-        *drawings.fitness(results, drawn),
-        *(d for one in drawn for d in drawings.drawings(one)),
-    ]
+    figures = [*fitness(results, drawn), *(d for one in drawn for d in drawings(one))]
     planar = {one.planar for one in drawn}
     arms = " and ".join(ARMS[flat] for flat in sorted(planar, reverse=True))
     return PAPER.page(
         results,
         "arms",
         title=f"{PAPER.name}: {arms}",
-        quantities=_quantities(results),
-        claims=tuple(found),
-        checks=tuple(checks),
+        quantities=PAPER.quantities(results, "arms"),
+        claims=tuple(claim for one in drawn for claim in _claims(results, settings, one)),
+        checks=tuple(
+            (f"{one.who}{what}", finding) for one in drawn for what, finding in _checks(one)
+        ),
         comparisons=comparisons,
-        drawings=tuple(sorted(drawn_figures, key=drawings.order)),
+        drawings=tuple(sorted(figures, key=order)),
     )
 
 
@@ -59,28 +178,6 @@ def _fits(condition: kit.ConditionResults) -> bool:
         return False
     joints = 2 if problem.assembly.table.planar else 3
     return all(stop - first >= joints for first, stop in problem.arm_slices)
-
-
-def _quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
-    unit = results.with_data[0].condition.length_unit
-    cost, _, *effort = generic.quantities(results)
-    least = "least distance of centres of circles or spheres at via-points"
-    clearance = "clearance: least distance of the bodies themselves over the whole motion (exact)"
-    rows = (
-        ("colliding instants C5 of the best", "–", "term_collisions"),
-        ("path length over that of the straight line", "–", "term_path_length_ratio"),
-        (least, unit, AT),
-        ("the same, sampled between via-points too", unit, BETWEEN),
-        (clearance, unit, "clearance"),
-    )
-    fitness = kit.by_column("term_fitness")
-    return (
-        cost,
-        generic.quantity(results, "fitness F of the best", "–", fitness),
-        generic.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible),
-        *(generic.quantity(results, name, of, kit.by_column(column)) for name, of, column in rows),
-        *effort,
-    )
 
 
 def not_judged(results: kit.Results, condition: kit.ConditionResults) -> str:
@@ -100,8 +197,8 @@ def _claims(
     results: kit.Results, settings: kit.ReportSettings, one: MeasuredMotions
 ) -> list[kit.Claim]:
     """Return the paper's claims with verdicts on one condition."""
-    c, unit, who = one.condition, one.condition.condition.length_unit, _who(results, one)
-    judge = kit.Judge(not_judged(results, c), settings.significance, RULES)
+    c, unit, who = one.condition, one.condition.condition.length_unit, one.who
+    judge = kit.Judge(not_judged(results, c), settings, RULES)
     section, figures = ("section 3.5", ("4", "7")) if one.planar else ("section 4.2", ("11", "13"))
     told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
     hearing = judge.on("free_at_via_points", who=who, source=f"{section}, Fig. {figures[0]}")
@@ -125,84 +222,45 @@ def _claims(
         )
         hearing = judge.on(name, who=who, source=f"{section}, Fig. {figures[1]}")
         found.append(hearing.every(told, safe, c.done, c.planned))
-    # the two operators, and evolution besides them
-    return [
-        *found,
-        *_operator_claims(results, settings, one, judge),
-        _evolution_claim(results, settings, one, judge),
-    ]
+    # the two operators, and what evolution adds to every control
+    found += _operator_claims(results, one, judge)
+    controls = [k for k in results.evolved if k.is_control and kit.beside(c.condition, k.condition)]
+    evolution = judge.on("evolution_adds", who=who)
+    return [*found, evolution.better_than_all(*evolution_told(judge, c, controls))]
 
 
 def _operator_claims(
-    results: kit.Results, settings: kit.ReportSettings, one: MeasuredMotions, judge: kit.Judge
+    results: kit.Results, one: MeasuredMotions, judge: kit.Judge
 ) -> list[kit.Claim]:
     """Judge the claim about the two operators from the stored ablations of the same scene."""
     experiment = f"rana_{'planar' if one.planar else 'puma'}_ablations"
-    stored, who = results.beside(experiment), _who(results, one)
+    stored = results.beside(experiment)
     reason = judge.reason or (judging.not_judged(stored) if stored.with_data else "")
     own = judge._replace(reason=reason)
-    found = operators_page.operator_claims(stored, settings, own, who, PRINTED)
-    if found:
-        return found
     told = f"its ablations are not stored: `evoexp run experiment={experiment}`"
-    return [judge.on("operators_improve", who=who, without="each alone").elsewhere(told)]
+    alone = judge.on("operators_improve", who=one.who, without="each alone")
+    return operators_page.operator_claims(stored, own, one.who, PRINTED) or [alone.elsewhere(told)]
 
 
-def _evolution_claim(
-    results: kit.Results, settings: kit.ReportSettings, one: MeasuredMotions, judge: kit.Judge
-) -> kit.Claim:
-    """Judge what evolution adds to every control, and tell how much to the best of them."""
-    c = one.condition
-    controls = [k for k in results.evolved if k.is_control and kit.beside(c.condition, k.condition)]
-    told, rows = evolution_told(c, controls, settings)
-    hearing = judge.on("evolution_adds", who=_who(results, one))
-    return hearing.better_than_all(told, rows)
-
-
-def _who(results: kit.Results, one: MeasuredMotions) -> str:
-    """Return the label that begins a line about a condition, or nothing if there is one only."""
-    return f"{one.condition.label}: " if len(results.main) > 1 else ""
-
-
-def _checks(one: MeasuredMotions) -> list[tuple[str, str]]:
+def _checks(one: MeasuredMotions) -> tuple[tuple[str, str], ...]:
     """Return known defects and checks of the scene, as numbers."""
-    c, unit = one.condition, one.condition.condition.length_unit
-    line = c.evaluate(motions.straight_line(c))
+    c, number = one.condition, markdown.number
+    line, total = c.evaluate(motions.straight_line(c)), motions.straight_length(c)
     straight = one.sampled[one.sampled["series"] == motions.STRAIGHT]
-    dips = int(np.count_nonzero(c.column(BETWEEN) < one.margin))
-    closer = int(np.count_nonzero(c.column("clearance") < one.margin))
-    verdicts = c.verdicts
-    weights, total = c.planner.objective, motions.straight_length(c)
     longer = kit.spread(total * (c.column("term_path_length_ratio") - 1.0))
-    redistributed, both = (motions.colliding_after(c, relaxed) for relaxed in (False, True))
-    return [
-        (
-            "The scene is not trivial: colliding instants of the straight line in configuration "
-            "space",
-            f"C5 = {line['collisions']:.0f} of {c.planner.num_via_points} instants, fitness F = "
-            f"{markdown.number(line['fitness'])}; its least distance of centres is "
-            f"{markdown.number(float(straight['centres'].min()))} {unit} (safety {one.margin:g} "
-            f"{unit})",
-        ),
-        (
-            "A colliding instant against a longer path: how many degrees of path cost as much "
-            "(k3 / k1)",
-            f"{markdown.number(weights.collision_weight / weights.length_weight)}°; the straight "
-            f"paths of all arms are {markdown.number(total)}° long and collide at "
-            f"{line['collisions']:.0f} instants, the best motions are longer by "
-            f"{markdown.spread(longer)}° and collide at none in {c.solved} of {c.done} runs",
-        ),
-        (
-            "Runs that dip below the safety distance between via-points, where the algorithm "
-            "does not test",
-            f"centres of circles or spheres: {dips} of {c.done}; the bodies themselves: {closer} "
-            f"of {c.done}; bodies in contact (refuted): {verdicts.refuted} of {verdicts.judged}, "
-            f"of these {verdicts.solved_refuted} solved by the paper's model",
-        ),
-        (
-            "Redistribution and relaxation are blind to collisions: applied once more to final, "
-            "collision-free strings",
-            f"of {c.solved} strings {redistributed} collide at a via-point after redistribution, "
-            f"{both} after redistribution and relaxation",
-        ),
-    ]
+    return PAPER.checks(
+        "arms",
+        c=c,
+        unit=c.condition.length_unit,
+        margin=one.margin,
+        hits=line["collisions"],
+        fitness=number(line["fitness"]),
+        least=number(float(straight["centres"].min())),
+        worth=number(motions.worth(c)),
+        straight=number(total),
+        longer=markdown.spread(longer),
+        dips=int(np.count_nonzero(c.column(BETWEEN) < one.margin)),
+        closer=int(np.count_nonzero(c.column("clearance") < one.margin)),
+        redistributed=motions.colliding_after(c, relaxed=False),
+        both=motions.colliding_after(c, relaxed=True),
+    )

@@ -75,12 +75,12 @@ def _drawings(condition: kit.ConditionResults, suffix: str, samples: int) -> Ite
     """Yield snapshots and paths of one condition, and distances if it has several arms."""
     c, played = condition, (kit.PlayedRun(condition, condition.best_replicate),)
     snapshots, draw = partial(planar_motion.snapshots_table, c), planar_motion.draw_snapshots
-    yield PAPER.drawing("snapshots", snapshots, draw, (c,), played, suffix)
+    yield PAPER.drawing("snapshots", (snapshots, draw), (c,), plays=played, suffix=suffix)
     paths = partial(planar_motion.paths_table, c)
-    yield PAPER.drawing("paths", paths, planar_motion.draw_paths, (c,), suffix=suffix)
+    yield PAPER.drawing("paths", (paths, planar_motion.draw_paths), (c,), suffix=suffix)
     if c.problem(Problem).assembly.num_arms > 1:
         sampled = planar_motion.sampled_distances(c, samples)
         distances = partial(planar_motion.distances_table, c, sampled)
         yield PAPER.drawing(
-            "distances", distances, planar_motion.draw_distances, (c,), suffix=suffix
+            "distances", (distances, planar_motion.draw_distances), (c,), suffix=suffix
         )

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from evoexp.papers.rana import measures, motions
+from evoexp.papers.rana import motions, operators_page
 from evoexp.papers.rana.rules import PAPER, RULES
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.records import FloatArray
 from evoexp.report import kit
 from evoexp.report.kit import generic, judging, markdown, run_measures, sweep_figures
 
-LENGTH, HITS = "path length of the best, all arms", "colliding instants C5 of the best"
+LENGTH = "path length of the best, all arms"
 COLLIDING = (
     "Share of runs whose best string collides at a via-point by the paper's model, or whose "
     "bodies touch somewhere on the whole motion, with Wilson's interval."
@@ -22,19 +22,15 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         return generic.page(results, settings)
     first, *others = results.with_data
     judge = judging.judge(results, settings, RULES)
-    _, _, *effort = generic.quantities(results)
-    quantities = (
-        generic.quantity(results, LENGTH, "deg", length),
-        generic.quantity(results, HITS, "–", kit.by_column("term_collisions")),
-        generic.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible),
-        *effort,
-    )
     rows = kit.compared([(first, other) for other in others], length, settings)
-    counts = [(c, *_colliding(c)) for c in results.with_data]
+    counts = [  # runs that end in a collision: at a via-point, anywhere
+        (c, kit.Proportion(c.done - c.solved, c.done), operators_page.refuted(c))
+        for c in results.with_data
+    ]
     return PAPER.page(
         results,
         "weights",
-        quantities=quantities,
+        quantities=PAPER.quantities(results, "weights", {"length": length}),
         claims=tuple(_claims(judge, first)),
         comparisons=((f"{LENGTH}: {first.label} against …", rows),) if rows else (),
         tables=(_table(counts),),
@@ -67,39 +63,22 @@ def length(condition: kit.ConditionResults) -> FloatArray:
     return np.asarray(motions.straight_length(condition) * ratio)
 
 
-def worth(condition: kit.ConditionResults) -> float:
-    """Return how many degrees of path cost as much as one colliding instant, k3 / k1."""
-    weights = condition.planner.objective
-    return float(weights.collision_weight / weights.length_weight)
-
-
-def _colliding(condition: kit.ConditionResults) -> tuple[kit.Proportion, kit.Proportion]:
-    """Count the runs that end in a collision: at a via-point, anywhere."""
-    counts = condition.verdicts
-    return (
-        kit.Proportion(condition.done - condition.solved, condition.done),
-        kit.Proportion(counts.refuted, counts.judged),
-    )
-
-
 def _claims(judge: kit.Judge, printed: kit.ConditionResults) -> list[kit.Claim]:
-    straight = motions.straight_length(printed)
-    line = printed.evaluate(motions.straight_line(printed))
+    straight, worth = motions.straight_length(printed), motions.worth(printed)
+    hits = printed.evaluate(motions.straight_line(printed))["collisions"]
     told = f"{markdown.share(printed.solved, printed.done)} finished runs end free at via-points"
-    done, planned = printed.done, printed.planned
-    rule = judge.on("collisions_outweigh_paths")
-    share = worth(printed) / straight
+    done, planned, share = printed.done, printed.planned, worth / straight
     evidence = (
-        f"one colliding instant costs as much as {markdown.number(worth(printed))}° of path, "
+        f"one colliding instant costs as much as {markdown.number(worth)}° of path, "
         f"{100 * share:.1f} % of the straight paths' {markdown.number(straight)}°; the straight "
-        f"line collides at {line['collisions']:.0f} instants, the best strings are longer by "
+        f"line collides at {hits:.0f} instants, the best strings are longer by "
         f"{markdown.number(float(np.median(length(printed))) - straight)}° in the median"
     )
-    least = rule.rule.limits["share"]
-    holds = True if share >= 1.0 else False if share < least else None
+    outweighs = judge.on("collisions_outweigh_paths")
+    least = outweighs.rule.limits["share"]
     return [
         judge.on("collisions_avoided").every(told, printed.solved, done, planned),
-        rule.own(evidence, done, holds),
+        outweighs.own(evidence, done, True if share >= 1.0 else False if share < least else None),
     ]
 
 
@@ -107,7 +86,7 @@ def _table(counts: list[tuple[kit.ConditionResults, kit.Proportion, kit.Proporti
     rows = tuple(
         (
             c.label,
-            f"{markdown.number(worth(c))}°",
+            f"{markdown.number(motions.worth(c))}°",
             markdown.share(at.having, at.total),
             markdown.share(anywhere.having, anywhere.total),
             f"{markdown.number(float(np.median(length(c))))}°",

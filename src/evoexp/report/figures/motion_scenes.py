@@ -176,7 +176,10 @@ def _deep(
     high: FloatArray,
 ) -> Any:
     """Draw a scene in space: all surfaces in one collection, which sorts them by depth."""
-    axes: Any = figure.add_subplot(*place, projection="3d")
+    spans, unit = high - low, rows["length_unit"].iloc[0]
+    pad = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
+    look: dict[str, Any] = {"zoom": 1.05, "label_pads": (-7, -7, -7), "ticks": (3, 3)}
+    axes = surfaces.space(figure, place, low, high, pad, unit, view=VIEW, pale=True, **look)
     middle, radius = 0.5 * (low + high), float(np.sqrt(((high - low) ** 2).sum())) / 2.0
     found, colours = [], []
     for row in records(rows[rows["kind"].notna()]):
@@ -189,19 +192,6 @@ def _deep(
     surface.set_rasterized(True)  # tens of thousands of triangles
     axes.add_collection3d(surface)
     _lines(axes, rows, ["x", "y", "z"])
-    spans = high - low
-    least = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
-    for name, a, b in zip("xyz", low - least, high + least, strict=True):
-        getattr(axes, f"set_{name}lim")(a, b)
-        unit = rows["length_unit"].iloc[0]
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
-    axes.set_box_aspect(spans + 2.0 * least, zoom=1.05)
-    axes.patch.set_visible(False)
-    axes.tick_params(labelsize=6, pad=-2)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(nbins=3))
-        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
-    axes.view_init(elev=VIEW[0], azim=VIEW[1])
     return axes
 
 

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
@@ -14,6 +16,8 @@ from evoexp.records import FloatArray
 AROUND, ALONG = 14, 4  # pieces of a round surface around its axis, and of each of its ends
 MOST_CORNERS = 150  # of a mesh, which is drawn by the hull of the corners farthest out
 LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, length 1
+NARROW = 0.6  # [-] of the longest side of a box, below which a side has few ticks
+PALE = (0.97, 0.97, 0.97, 1.0)  # behind shaded bodies
 DARKEST = 0.45  # [-] of a colour's brightness, where a surface is turned from the light
 
 
@@ -136,3 +140,52 @@ def _turned(radii: FloatArray, heights: FloatArray) -> FloatArray:
     x, y, z = found.transpose(1, 0, 2)
     areas = np.cross(y - x, z - x)
     return np.asarray(found[(areas**2).sum(axis=1) > 0.0])
+
+
+def space(
+    figure: Figure,
+    place: tuple[Any, ...],
+    low: FloatArray,
+    high: FloatArray,
+    pad: FloatArray,
+    unit: str,
+    *,
+    view: tuple[float, float],
+    zoom: float,
+    label_pads: tuple[float, float, float],
+    ticks: tuple[int, int],
+    pale: bool = False,
+) -> Any:
+    """Return axes in space with equal scales that hold a box (3,) and room beyond it.
+
+    Args:
+        figure: The figure that they are put into.
+        place: As `add_subplot` takes it.
+        low: (3,) the least coordinates that they hold.
+        high: (3,) the greatest ones.
+        pad: (3,) room beyond them.
+        unit: Of lengths.
+        view: Elevation and azimuth [deg].
+        zoom: Of the box in its panel [-].
+        label_pads: From the numbers along x, y and z to their labels [pt].
+        ticks: At most, along a narrow side and along a wide one.
+        pale: Whether the panes are, behind shaded bodies.
+    """
+    axes: Any = figure.add_subplot(*place, projection="3d")
+    sides = high - low + 2.0 * pad
+    for name, least, greatest, label_pad in zip(
+        "xyz", low - pad, high + pad, label_pads, strict=True
+    ):
+        getattr(axes, f"set_{name}lim")(least, greatest)
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=label_pad, fontsize=7)
+    axes.set_box_aspect(sides, zoom=zoom)
+    axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
+    axes.tick_params(labelsize=6, pad=-2)
+    for axis, is_narrow in zip(
+        (axes.xaxis, axes.yaxis, axes.zaxis), sides < NARROW * sides.max(), strict=True
+    ):
+        axis.set_major_locator(MaxNLocator(nbins=ticks[0] if is_narrow else ticks[1]))
+        if pale:
+            axis.set_pane_color(PALE)
+    axes.view_init(elev=view[0], azim=view[1])
+    return axes

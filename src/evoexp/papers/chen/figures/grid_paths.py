@@ -9,11 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from evoexp.papers import marks
-from evoexp.papers.chen.path_measures import Group, boxes, gaps, median_path, paths
+from evoexp.papers.chen.path_claims import Group, boxes, gaps, median_path, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, groups, spread, style
+from evoexp.report.kit import ConditionResults, groups, marks, spread, style
 
 OBSTACLE = "obstacle"
 FAINT, MEDIAN, EXACT = "all runs", "run of median cost", "best path known (reference)"
@@ -46,10 +45,6 @@ def paths_table(panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]]) 
 
     Args:
         panels: (title, a condition of the workspace, lines in the order in which they are drawn).
-
-    Returns:
-        Columns panel, unit, kind, text, number (of the line), share, x, y; an obstacle has two
-        rows, its corners.
     """
     rows: list[tuple[object, ...]] = []
     for title, c, lines in panels:
@@ -119,11 +114,7 @@ def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def places_table(shown: Sequence[Group]) -> pd.DataFrame:
-    """Count the nodes of every unsafeness on the paths of each first condition.
-
-    Returns:
-        Columns position, condition, unsafeness, nodes (mean over the runs), runs.
-    """
+    """Count the nodes of every unsafeness on the paths of each first condition."""
     rows: list[tuple[object, ...]] = []
     for position, group in enumerate(shown):
         fields, found = group.main.problem(Problem).fields, paths(group.main).values()
@@ -157,12 +148,7 @@ def draw_places(table: pd.DataFrame) -> Figure:
 
 
 def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
-    """Return median and quartiles of costs over replicates by weighting, condition, generation.
-
-    Returns:
-        Columns panel, position (of the condition in its panel), condition, quantity (best so far,
-        average, and of references two lines of one row), generation, median, lower, upper.
-    """
+    """Return median and quartiles of costs over replicates by weighting, condition, generation."""
     rows: list[tuple[object, ...]] = []
     for group in found:
         for position, c in enumerate(group.conditions):
@@ -207,12 +193,7 @@ def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None
 
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
-    """Return every run's gap to the best path known.
-
-    Returns:
-        Columns panel, position, condition, replicate, gap_percent, bound_percent (gap of the bound
-        below all paths).
-    """
+    """Return every run's gap to the best path known."""
     parts = [
         pd.DataFrame(
             {
@@ -253,3 +234,10 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
 def _name(condition: ConditionResults, group: Group) -> str:
     """Return the part of a label that the condition adds to its group's: "elitism"."""
     return condition.label.removeprefix(group.name).strip(" ,·") or "genetic algorithm"
+
+
+COSTS = costs_table, draw_costs
+GAPS = gaps_table, draw_gaps
+PATHS = paths_table, draw_paths
+PLACES = places_table, draw_places
+ROUTES = paths_table, draw_routes

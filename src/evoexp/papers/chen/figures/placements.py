@@ -10,10 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import MultipleLocator
 
-from evoexp.papers import marks
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.records import FloatArray
-from evoexp.report.kit import groups, quantiles, records, rounded, style
+from evoexp.report.kit import groups, marks, quantiles, records, rounded, style
 
 RUNS = ("GA", "GA, elitism", "random search")
 ORDER = (*RUNS, *METHODS)  # the place of a method gives its colour
@@ -23,7 +22,7 @@ OPTIMUM_LINE: dict[str, Any] = {
     "linewidth": 1.0,
 }
 LEAST_GAP = 1e-6  # [-] smaller gaps are drawn as this one
-POSTURES = ("exact optimum", "best run", "paper's angles")
+POSTURE_NAMES = ("exact optimum", "best run", "paper's angles")
 # colour and width of each posture
 POSTURE_LOOKS = (style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": style.ARM_COLOURS[2], "linewidth": 1.4}
@@ -39,7 +38,7 @@ LABEL = "E [-], lower is better"
 # range of a colour bar → its ticks, both in units of the least E
 TICKS = {20.0: [1.0, 2.0, 5.0, 10.0, 20.0], 3.0: [1.0, 1.5, 2.0, 3.0]}
 GIVEN = "panel", "case", "quantity"
-LANDSCAPE = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
+LANDSCAPE_COLUMNS = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
 
 
 def _colour(method: str) -> str:
@@ -53,10 +52,6 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
     """Return median and quartiles over runs of the best fitness f = E_m − E so far.
 
     For the criterion of the least torque norm it is that norm itself, as in the paper.
-
-    Returns:
-        Columns panel, case, quantity, method, generation, median, lower, upper, average (of a
-        generation, median over runs), runs, optimum.
     """
     parts = []
     for panel, case in enumerate(cases):
@@ -112,11 +107,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
 
 
 def gaps_table(cases: list[Case]) -> pd.DataFrame:
-    """Return the gap of every run, and of every start of a conventional method, to the optimum.
-
-    Returns:
-        Columns panel, case, method, at (place of the method in the legend), gap.
-    """
+    """Return the gap of every run, and of every start of a conventional method, to the optimum."""
     parts = []
     for panel, case in enumerate(cases):
         costs = {method: c.column("best_cost") for method, c in case.evolved.items()}
@@ -163,12 +154,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
 
 
 def postures_table(cases: list[Case]) -> pd.DataFrame:
-    """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles.
-
-    Returns:
-        Columns panel, case, element (platform, link, obstacle, force), posture, x, y, x_end, y_end,
-        size (of an obstacle its radius, of a link its number).
-    """
+    """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles."""
     rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
         scenario: Any = case.conditions[0].condition.scenario
@@ -184,7 +170,7 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
         run = case.elitist or case.plain
         best = run.solutions[run.best_replicate] if run is not None else None
         shown = case.optimal_angles, best, case.printed.angles
-        for posture, angles in zip(POSTURES, shown, strict=True):
+        for posture, angles in zip(POSTURE_NAMES, shown, strict=True):
             found = {} if angles is None else case.measured(angles)
             if found.get("branch", -1.0) >= 0.0:
                 own += _links(case, posture, found)
@@ -218,7 +204,7 @@ def draw_postures(table: pd.DataFrame) -> Figure:
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         style.operational_axes(axes, "unit")
         axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
-        for posture, look in zip(POSTURES, POSTURE_LOOKS, strict=True):
+        for posture, look in zip(POSTURE_NAMES, POSTURE_LOOKS, strict=True):
             own = rows[rows["posture"] == posture]
             if len(own):
                 _draw_posture(axes, own, posture, *look)
@@ -251,11 +237,7 @@ def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width
 
 
 def landscape_table(cases: list[Case]) -> pd.DataFrame:
-    """Return E over the angles, and the points that are marked.
-
-    Returns:
-        Columns panel, case, element, theta_1_deg, theta_2_deg, cost (NaN: infeasible).
-    """
+    """Return E over the angles, and the points that are marked."""
     parts = []
     for panel, case in enumerate(cases):
         assert case.landscape is not None
@@ -268,7 +250,7 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
         }
         for element, (angles, costs) in ({GRID: (grid, cost.ravel())} | marked).items():
             columns = panel, case.name, element, angles[:, 0], angles[:, 1], costs
-            parts.append(pd.DataFrame(dict(zip(LANDSCAPE, columns, strict=True))))
+            parts.append(pd.DataFrame(dict(zip(LANDSCAPE_COLUMNS, columns, strict=True))))
     return rounded(pd.concat(parts, ignore_index=True))
 
 
@@ -333,3 +315,9 @@ def _draw_points(axes: Axes, rows: pd.DataFrame) -> None:
             axes.plot(x, y, linestyle="none", label=element, **look)
     axes.set(xlabel="θ₁ [deg]", ylabel="θ₂ [deg]", aspect="equal")
     axes.grid(False)
+
+
+FITNESS = fitness_table, draw_fitness
+GAPS = gaps_table, draw_gaps
+LANDSCAPE = landscape_table, draw_landscape
+POSTURES = postures_table, draw_postures

@@ -39,11 +39,6 @@ def effort_table(
         effort: Name with unit → effort of each run, (done,).
         confidence: Level of the intervals: Wilson's of shares, bootstrapped ones of efforts.
         num_resamples: Of the bootstrap.
-
-    Returns:
-        Columns quantity, kind (share, effort), position (of the task), task, value (of the
-        setting), expected (a share, or the effort spent per success; inf without one, NaN of no
-        runs), lower, upper, having, total.
     """
     points = [
         (position, task.name, value, c)
@@ -94,12 +89,7 @@ def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
 def ratios_table(
     rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float
 ) -> pd.DataFrame:
-    """Return the effort of every value over that of the recommended one.
-
-    Returns:
-        Columns quantity, kind (ratio), position, task, value, expected (the ratio), lower, upper,
-        bound, reference.
-    """
+    """Return the effort of every value over that of the recommended one."""
     found = [
         (metric, RATIO, names.index(r.task), r.task, r.value, r.ratio, *r.interval, r.bound)
         for metric, own in rows.items()
@@ -173,13 +163,7 @@ def _keys(table: pd.DataFrame) -> list[Line2D]:
 
 
 def floor_table(found: Sequence[Task]) -> pd.DataFrame:
-    """Return residual distances and cycles per kind of goal and scope.
-
-    Returns:
-        Columns position, task (the kind of goal), quantity (residual, cycles, point), scope [rad],
-        median, lower, upper (a point: the residual of one run three times), runs, slope (of log
-        residual over log scope, medians), length_unit.
-    """
+    """Return residual distances and cycles per kind of goal and scope."""
     rows: list[tuple[object, ...]] = []
     for position, task in enumerate(found):
         for scope, c in task.by_value.items():
@@ -248,3 +232,6 @@ def _draw_floor_of(left: Axes, right: Axes, table: pd.DataFrame, colour: str) ->
     # a proportional line through the middle
     x, middle = residuals["scope"], len(residuals) // 2
     left.plot(x, residuals["median"].iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)
+
+
+FLOOR = floor_table, draw_floor

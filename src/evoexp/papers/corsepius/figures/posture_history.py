@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
-from evoexp.report.kit import Results, counted, groups, quantile, quantiles, records, style
+from evoexp.report.kit import Results, counted, groups, marks, quantile, quantiles, records, style
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels
@@ -26,11 +25,6 @@ def history_table(results: Results) -> pd.DataFrame:
 
     A search that has ended keeps its last value, so that every cycle counts all runs that began the
     phase.
-
-    Returns:
-        Columns position, condition, phase (name), order (of phases), quantity, cycle, median,
-        lower, upper, begun (runs that began the phase), running (of them still searching),
-        tolerance, length_unit.
     """
     parts = []
     for position, c in enumerate(results.main):
@@ -93,9 +87,9 @@ def draw_history(table: pd.DataFrame) -> Figure:
         label = f"distance [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]"
         axes.set(xlabel="cycle of the phase", ylabel=label)
     # distances on one scale
-    low, high = (bound(limit) for bound, limit in zip((min, max), _limits(drawn), strict=True))
+    limits = np.array([axes.get_ylim() for axes in drawn])
     for axes in drawn:
-        axes.set_ylim(low, high)
+        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
     colours = {name: style.condition_colour(k) for k, name in enumerate(names)}
     keys = [style.key(name.replace("_", " "), color=c) for name, c in colours.items()]
     if (table["tolerance"] >= VISIBLE).any():
@@ -104,15 +98,10 @@ def draw_history(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _limits(panels: list[Axes]) -> tuple[list[float], list[float]]:
-    """Return the lower and the upper limits of the vertical axes."""
-    limits = [axes.get_ylim() for axes in panels]
-    return [low for low, _ in limits], [high for _, high in limits]
-
-
 def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> None:
     """Draw one curve per condition or phase; numbers of runs at the ends, equal ones once."""
-    longest = {rows["begun"].iloc[0]: name for _, name, rows in _by_length(table, by)}
+    by_length = sorted(groups(table, by), key=lambda curve: int(curve[1]["cycle"].max()))
+    longest = {rows["begun"].iloc[0]: name for name, rows in by_length}
     for name, curve in groups(table, by):
         x, median = curve["cycle"], curve["median"]
         colour = style.condition_colour(names.index(name))
@@ -127,19 +116,8 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
 
 
-def _by_length(table: pd.DataFrame, by: str) -> list[tuple[int, str, pd.DataFrame]]:
-    """Return length, name and rows of the curves, the longest last."""
-    found = [(int(rows["cycle"].max()), str(name), rows) for name, rows in groups(table, by)]
-    return sorted(found, key=lambda one: one[0])
-
-
 def phases_table(results: Results, confidence: float) -> pd.DataFrame:
-    """Return success and cycles of each phase, over all conditions with several.
-
-    Returns:
-        Columns position, condition, order, phase, begun, reached, share, lower, upper (of those
-        that began it), cycles, cycles_lower, cycles_upper (quartiles).
-    """
+    """Return success and cycles of each phase, over all conditions with several."""
     rows = []
     for position, c in enumerate(results.main):
         for phase, own in groups(measures.phase_cycles(c), "phase"):
@@ -185,3 +163,7 @@ def draw_phases(table: pd.DataFrame) -> Figure:
     )
     right.set(xlim=(0, None), xlabel="cycles (median, quartiles)", title="b  cycles")
     return figure
+
+
+HISTORY = history_table, draw_history
+PHASES = phases_table, draw_phases

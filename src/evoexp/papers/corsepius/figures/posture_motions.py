@@ -42,13 +42,7 @@ class ShownPath(NamedTuple):
 
 
 def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
-    """Return links at every posture, tips, goals, obstacles where they are, objects that are held.
-
-    Returns:
-        Columns panel, title, element (link, tip, goal, obstacle, held), instant (posture of the
-        path), name, x, y, z, x_end, y_end, z_end (of a link), those of `solids` (of obstacles and
-        objects), length_unit.
-    """
+    """Return links at every posture, tips, goals, obstacles, objects that are held."""
     panels: list[list[dict[str, Any]]] = []
     for one in shown:
         problem = measures.problem(one.condition)
@@ -177,11 +171,6 @@ def scope_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the shown path in its two liveliest joints, and the tool's reach at the start.
 
     The reach is told by hulls of the tool's places after one random step.
-
-    Returns:
-        Columns element (posture, reach, tool), order, x, y (joint angles [deg] of postures, places
-        of the others), half_x, half_y (scope [deg] of the two joints), factor (of the scope),
-        joint_x, joint_y (from 1), length_unit.
     """
     replicate = measures.shown_replicate(condition)
     problem, q = measures.problem(condition), measures.paths(condition)[replicate]
@@ -238,3 +227,6 @@ def _draw_ends(axes: Axes, path: pd.DataFrame) -> None:
     look: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
     axes.plot(path["x"].iloc[:1], path["y"].iloc[:1], "s", markersize=6, label="start", **look)
     axes.plot(path["x"].iloc[-1:], path["y"].iloc[-1:], "*", markersize=9, label="end", **look)
+
+
+SCOPE = scope_table, draw_scope

@@ -10,14 +10,13 @@ from matplotlib.patches import Rectangle
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import style
+from evoexp.report.kit import marks, style
 
 TOOL, CELL, ESCAPE, OBSTACLE, GOAL = "tool", "cell", "escape", "obstacle", "goal"
 CELLS = 81  # of the landscape, along each joint
@@ -33,11 +32,7 @@ Rows = list[dict[str, object]]
 def pair(
     shown: tuple[kit.ConditionResults, ...],
 ) -> tuple[kit.ConditionResults, kit.ConditionResults] | None:
-    """Return a task of one phase in which runs get stuck, and the same with sub-goals, solved.
-
-    Returns:
-        (without sub-goals, with sub-goals); None if either is missing.
-    """
+    """Return a task of one phase in which runs get stuck, and with sub-goals, solved."""
     return next(
         (
             (stuck, helped)
@@ -57,13 +52,6 @@ def trap_table(stuck: kit.ConditionResults, helped: kit.ConditionResults) -> pd.
 
     That posture is the end of the median run that is stuck. The planner's own `cost` judges all
     postures, by the only phase of the task without sub-goals.
-
-    Returns:
-        Columns element (tool, cell, escape, obstacle, goal), series (stuck, helped), replicate,
-        order, value, those of `solids`, x_end, y_end, scope_deg, joint_x, joint_y, length_unit.
-        Tools: places and distances to the last goal. Cells: two joint angles [deg] and the cost
-        (NaN: infeasible), with the stuck posture and its scope. Escapes: half the edge of a box
-        [scopes], the stuck posture's cost, the least one found in the box.
     """
     rows: Rows = []
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
@@ -202,3 +190,6 @@ def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
         title="d  random postures around it",
         ylim=(0.0, None),
     )
+
+
+TRAP = trap_table, draw_trap

@@ -9,11 +9,10 @@ import pandas as pd
 import pinocchio as pin
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-from scipy.spatial import ConvexHull
 
-from evoexp.papers import marks
 from evoexp.papers.corsepius import measures
 from evoexp.records import FloatArray
+from evoexp.report.figures import surfaces
 from evoexp.report.kit import ConditionResults, groups, records, rounded, style
 
 BALL, BRICK, ROD, DRUM = "sphere", "box", "capsule", "cylinder"
@@ -23,7 +22,6 @@ COLUMNS = ["shape", "x", "y", "z", *TURN, *SIZES]
 BODY, COVER = "body", "cover"
 MODEL_VIEW = (18.0, -55.0)  # [deg]
 KINDS = {BALL: "spheres", ROD: "capsules"}
-AROUND, ALONG = 12, 4  # pieces of a round surface, and of each of its ends
 
 
 # shapes that have a row of their own: its name, and the function that gives its sizes
@@ -54,47 +52,34 @@ def solid(shape: Any, placement: Any) -> dict[str, Any]:
     return dict(zip(COLUMNS, (name, *where, *turn.ravel(), *size), strict=True))
 
 
-def _read(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return rotation (3, 3), size (3,) and place (3,) of a row of `COLUMNS`."""
+def triangles(row: Any) -> FloatArray:
+    """Return the surface of a row of `COLUMNS` in space, (triangles, 3, 3)."""
     turn, size, place = (
         np.array([getattr(row, name) for name in names], dtype=np.float64)
         for names in (TURN, SIZES, "xyz")
     )
-    return turn.reshape(3, 3), size, place
+    whole = 2.0 * size if row.shape == BRICK else size * (1.0, 2.0, 0.0)  # halves in the table
+    return surfaces.triangles_of(row.shape, whole, None) @ turn.reshape(3, 3).T + place
 
 
 def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS` in axes in space."""
-    turn, size, place = _read(row)
-    if row.shape == BRICK:
-        faces = [corners * size @ turn.T + place for corners in _FACES]
-        look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
-        axes.add_collection3d(Poly3DCollection(faces, zorder=1, **look))
-    else:
-        surface = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
-        smooth = {"linewidth": 0, "shade": True, "antialiased": False}
-        axes.plot_surface(*surface, color=colour, alpha=alpha, **smooth)
+    faces = triangles(row)
+    shades = surfaces.shaded(faces, colour, alpha)
+    surface = Poly3DCollection(faces, facecolors=shades, linewidth=0, zorder=1)
+    surface.set_rasterized(True)  # hundreds of triangles
+    axes.add_collection3d(surface)
 
 
 def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS` as seen along z, in plane axes."""
-    turn, size, place = _read(row)
-    brick = row.shape == BRICK
-    points = np.vstack(_FACES) * size if brick else _grid(row.shape, size).reshape(3, -1).T
-    seen = (points @ turn.T)[:, :2] + place[:2]
-    look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
-    axes.fill(*seen[ConvexHull(seen).vertices].T, **look)
+    seen = surfaces.outline_from_above(triangles(row))
+    axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
 
 
 def corners(table: pd.DataFrame) -> FloatArray:
-    """Return points (points, 3) that reach as far along x, y and z as all solids of a table."""
-    found = [np.empty((0, 3))]
-    for row in table.itertuples(index=False):
-        turn, size, place = _read(row)
-        round_reach = size[0] + np.abs(turn[:, 2]) * size[1]
-        reach = np.abs(turn) @ size if row.shape == BRICK else round_reach
-        found += [place[None] - reach, place[None] + reach]
-    return np.vstack(found)
+    """Return the corners (points, 3) of the surfaces of all solids of a table."""
+    return np.vstack([np.empty((0, 3)), *(triangles(row).reshape(-1, 3) for row in records(table))])
 
 
 def space(
@@ -105,25 +90,7 @@ def space(
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
     look: dict[str, Any] = {"zoom": 0.92, "label_pads": (-7, -7, -7), "ticks": (2, 4)}
-    axes = marks.space(figure, (place,), low, high, pad, unit, view=view, **look)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
-    return axes
-
-
-def _grid(shape: str, size: FloatArray) -> FloatArray:
-    """Return the surface of a round solid, (3, along, around)."""
-    radius, half = size[:2]
-    rise = np.linspace(0.0, 0.5 * np.pi, ALONG)
-    if shape == DRUM:
-        wide, high = np.array([radius, 0.0]), np.array([half, half])
-    else:
-        wide, high = radius * np.cos(rise), half + radius * np.sin(rise)
-    # radii and heights along the axis, each once around it
-    turned = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    radii, heights = np.append(wide[::-1], wide), np.append(-high[::-1], high)
-    sides = (radii, np.cos(turned)), (radii, np.sin(turned)), (heights, np.ones_like(turned))
-    return np.array([np.outer(along, around) for along, around in sides])
+    return surfaces.space(figure, (place,), low, high, pad, unit, view=view, pale=True, **look)
 
 
 def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
@@ -131,10 +98,6 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
 
     Args:
         shown: (title, a condition of the robot).
-
-    Returns:
-        Columns position, robot, element (body, cover), name (of the body), `COLUMNS`,
-        inflation (of all its covers), length_unit.
     """
     rows: list[tuple[Any, ...]] = []
     for position, (title, c) in enumerate(shown):
@@ -195,9 +158,4 @@ def _capsule(joint: Any, start: FloatArray, stop: FloatArray, radius: float) -> 
     return (shape, *joint.act(middle), *(joint.rotation @ turn).ravel(), radius, half, 0.0)
 
 
-_SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-_FACES = [
-    np.array([np.insert(np.array(pair, dtype=np.float64), axis, side) for pair in _SQUARE])
-    for axis in range(3)
-    for side in (-1.0, 1.0)
-]
+MODELS = models_table, draw_models

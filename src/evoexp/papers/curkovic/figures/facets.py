@@ -1,7 +1,7 @@
 """Many conditions in panels of few: the best cost so far, and runs that have reached a cost."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,42 +10,35 @@ from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, Results, groups, quantile, style
+from evoexp.report.kit import ConditionResults, Results, grouped, groups, quantile, style
 
+Trait = Callable[[ConditionResults], str]
 MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own
 DIRECTIONS = {"one_sided": "Eq. 9 one-sided", "symmetric": "Eq. 9 symmetric"}
 
 
-class Facet(NamedTuple):
-    """Conditions of one panel."""
+def facets(results: Results) -> dict[str, dict[str, ConditionResults]]:
+    """Divide conditions by collision substeps and reading of Eq. 9; by rates if they are many.
 
-    title: str  # of the panel; empty if there is one only
-    # with the part of their labels that differs within the panel
-    conditions: tuple[tuple[str, ConditionResults], ...]
-
-
-def facets(results: Results) -> tuple[Facet, ...]:
-    """Divide conditions by collision substeps and reading of Eq. 9; by rates if they are many."""
+    Returns title of a panel (empty if there is one only) → its conditions by the parts of their
+    labels that differ within the panel.
+    """
     traits = [t for t in (_substeps, _direction) if len(set(map(t, results.with_data))) > 1]
     found = _divided(results, traits)
-    if max(map(len, found.values())) > MOST:
-        found = _divided(results, [*traits, _rate])
-    return tuple(
-        Facet(", ".join(title), tuple(zip(_short(own), own, strict=True)))
-        for title, own in found.items()
-    )
+    if max(map(len, found)) > MOST:
+        traits.append(_rate)
+        found = _divided(results, traits)
+    return {
+        ", ".join(trait(own[0]) for trait in traits): dict(zip(_short(own), own, strict=True))
+        for own in found
+    }
 
 
 def facet_table(results: Results, threshold: float) -> pd.DataFrame:
-    """Return medians of the best cost so far, and shares of runs that have reached a cost.
-
-    Returns:
-        Columns panel, title, position (of the name, over all panels), name, generation, evaluations
-        (median), median, reached (share of runs by then), reaching (runs that ever do), runs.
-    """
+    """Return medians of the best cost so far, and shares of runs that have reached a cost."""
     parts, names = [], dict[str, int]()
-    for panel, facet in enumerate(facets(results)):
-        for name, c in facet.conditions:
+    for panel, (title, conditions) in enumerate(facets(results).items()):
+        for name, c in conditions.items():
             first = measures.generations_to(c, threshold)
             rows = c.generations.groupby("index")
             index = np.unique(c.generations["index"].to_numpy(np.float64))
@@ -53,7 +46,7 @@ def facet_table(results: Results, threshold: float) -> pd.DataFrame:
                 pd.DataFrame(
                     {
                         "panel": panel,
-                        "title": facet.title,
+                        "title": title,
                         "position": names.setdefault(name, len(names)),
                         "name": name,
                         "generation": index,
@@ -125,13 +118,8 @@ def _medians(rows: Any, column: str) -> FloatArray:
     return np.array([quantile(own.to_numpy(np.float64), 0.5) for _, own in rows[column]])
 
 
-def _divided(
-    results: Results, traits: Sequence[Callable[[ConditionResults], str]]
-) -> dict[tuple[str, ...], list[ConditionResults]]:
-    found: dict[tuple[str, ...], list[ConditionResults]] = {}
-    for c in results.with_data:
-        found.setdefault(tuple(trait(c) for trait in traits), []).append(c)
-    return found
+def _divided(results: Results, traits: Sequence[Trait]) -> tuple[tuple[ConditionResults, ...], ...]:
+    return grouped(results.with_data, lambda c: [trait(c) for trait in traits])
 
 
 def _short(conditions: Sequence[ConditionResults]) -> list[str]:

@@ -9,10 +9,9 @@ from matplotlib.patches import Arc
 
 from evoexp.collision.models.link_crossings import closed_form
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
-from evoexp.report.kit import ConditionResults, records, rounded, style
+from evoexp.report.kit import ConditionResults, marks, records, rounded, style
 
 SAMPLES = 200  # configurations per segment of the straight line among which one is chosen
 TOP_LINKS = 3  # of the four pairs of links that `closed_form` tells apart
@@ -20,13 +19,7 @@ VECTORS = ("a", "b", "c", "d")  # of the paper: links of robot 1, then of robot 
 
 
 def intersection_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return links and intersection of two robots that go straight, where their top links cross.
-
-    Returns:
-        Columns element (a, b, c, d: link vectors; base: from base to base; point: P), x, y, x_end,
-        y_end [length unit], angle_deg (of a link from +x), mu, nu (where P lies on b and on d),
-        instant, crossing, length_unit.
-    """
+    """Return links and intersection of two robots that go straight, where their top links cross."""
     problem = condition.problem(Problem)
     one, two = link_motions.arms(condition.prepared)
     steps = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None, None]
@@ -110,3 +103,6 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
 
 def _middle(row: Any) -> tuple[float, float]:
     return 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
+
+
+INTERSECTION = intersection_table, draw_intersection

@@ -1,24 +1,123 @@
-"""Methods side by side (Curkovic et al. 2013, Fig. 6): convergence above, boxes below."""
+"""Best costs of methods side by side (Curkovic et al. 2013, Fig. 6): curves, boxes of all runs."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from evoexp.papers import marks
 from evoexp.papers.curkovic import measures
-from evoexp.papers.curkovic.figures import cost_boxes
-from evoexp.report.kit import Results, groups, style
+from evoexp.records import FloatArray
+from evoexp.report.kit import Results, groups, marks, quantile, style
 
+SPREAD = 0.2  # [rows] over which points are spread to either side
 CURVE, FINAL, BOUND, THRESHOLD = "best so far", "final", "lower bound", "threshold"
 ORDER = ["series", "position", "method", "panel", "hall", "generation", "replicate", "value"]
-ORDER += ["deviation", "replicates", "refuted"]
 WITH, WITHOUT = style.ARM_COLOURS[0], style.ARM_COLOURS[1]
 DASHED = (0, (4, 1.5))
 LINES = {BOUND: (0, (1, 2)), THRESHOLD: (0, (4, 2))}
+
+
+def costs_table(results: Results, threshold: float) -> pd.DataFrame:
+    """Return every run's best cost."""
+    parts = [
+        pd.DataFrame(
+            {
+                "position": position,
+                "condition": c.label,
+                "replicate": c.summaries.index,
+                "cost": c.column("best_cost"),
+                "refuted": measures.refuted(c) == 1.0,
+            }
+        )
+        for position, c in enumerate(results.with_data)
+    ]
+    return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
+
+
+def draw_costs(table: pd.DataFrame) -> Figure:
+    """Draw one box per condition, the first on top."""
+    labels = table.groupby("position")["condition"].first()
+    figure = style.figure(0.25 * len(labels) + 1.3)
+    axes = figure.add_subplot()
+    names = []
+    for position, rows in groups(table, "position"):
+        costs, refuted = rows["cost"].to_numpy(), rows["refuted"].to_numpy(dtype=bool)
+        draw_cost_box(axes, position, costs, refuted, style.ARM_COLOURS[0], "horizontal")
+        names.append(f"{labels[position]}  ({counted(costs, refuted)})")
+    threshold = float(table["threshold"].iloc[0])
+    line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    axes.axvline(threshold, zorder=1, **line)
+    axes.set_yticks(range(len(names)), names)
+    axes.set(ylim=(len(names) - 0.4, -0.6), xlabel="best C₂ + C₃ + C₄ of a team")
+    style.keys_below(figure, [*run_keys(), style.key("threshold", **line)], 4)
+    return figure
+
+
+def draw_cost_box(
+    axes: Axes,
+    position: float,
+    costs: FloatArray,
+    refuted: np.ndarray,
+    colour: str,
+    orientation: Literal["horizontal", "vertical"],
+) -> None:
+    """Draw the box of all runs, their points, and the median with refuted runs as worst.
+
+    Infinite costs (runs,) are runs without a team; costs grow in the direction of `orientation`.
+    """
+    finite = np.isfinite(costs)
+    if not finite.any():
+        return
+    line = {"color": colour}
+    axes.boxplot(
+        costs[finite],
+        positions=[position],
+        orientation=orientation,
+        widths=0.6,
+        manage_ticks=False,
+        showfliers=False,
+        boxprops=line,
+        whiskerprops=line,
+        capprops=line,
+        medianprops={"color": colour, "linewidth": 2.0},
+    )
+    beside = position + SPREAD * (2.0 * ((np.arange(len(costs)) * 0.618034) % 1.0) - 1.0)
+    looks: tuple[tuple[np.ndarray, dict[str, Any]], ...] = (
+        (finite & ~refuted, {"marker": "o", "ms": 2.4, "color": colour, "mec": "none"}),
+        (finite & refuted, {"marker": "x", "ms": 4.0, "color": style.FORBIDDEN, "mew": 1.0}),
+    )
+    for shown, look in looks:
+        x, y = costs[shown], beside[shown]
+        where = (x, y) if orientation == "horizontal" else (y, x)
+        axes.plot(*where, linestyle="none", alpha=0.7, zorder=3, **look)
+    middle = quantile(np.where(refuted, np.inf, costs), 0.5)
+    if np.isfinite(middle):
+        place = (middle, position) if orientation == "horizontal" else (position, middle)
+        axes.plot(*place, "D", ms=5, color="white", mec=style.NEUTRAL, mew=1.0, zorder=5)
+
+
+def counted(costs: FloatArray, refuted: np.ndarray) -> str:
+    """Return the number of runs, of those without a team, and of the refuted: "n = 20, 3 ×"."""
+    without = int(np.count_nonzero(~np.isfinite(costs)))
+    parts = [f"n = {len(costs)}"] + [f"{without} without"] * (without > 0)
+    return ", ".join([*parts, f"{int(refuted.sum())} ×"])
+
+
+def run_keys() -> list[Line2D]:
+    """Return the entries of a legend for points and medians."""
+    grey = style.NEUTRAL
+    return [
+        marks.point_key("a run", "o", 3, color=grey),
+        marks.point_key("refuted (×)", "x", 5, color=style.FORBIDDEN),
+        marks.point_key("median, refuted as worst", "D", 5, mec=grey, mfc="white"),
+    ]
+
+
+ORDER += ["deviation", "replicates", "refuted"]
 
 
 def methods_table(
@@ -31,12 +130,6 @@ def methods_table(
         pairs: Labels of matched methods, with hall and without, which share a panel.
         bound: Lower bound of the cost.
         threshold: Cost that counts as reached.
-
-    Returns:
-        Columns series (best so far: one row per method and generation; final: one per replicate;
-        lower bound; threshold), position, method, panel, hall (whether it has one), generation,
-        replicate, value (the mean over the replicates that have a team by then, or the
-        replicate's own), deviation (standard), replicates (that have a team), refuted.
     """
     panels = {label: k for k, pair in enumerate(pairs) for label in pair}
     parts = []
@@ -93,8 +186,8 @@ def draw_methods(table: pd.DataFrame) -> Figure:
     for position, rows in groups(final, "position"):
         costs, refuted = rows["value"].to_numpy(), rows["refuted"].to_numpy(dtype=bool)
         colour = WITH if rows["hall"].iloc[0] else WITHOUT
-        cost_boxes.draw_cost_box(boxes, int(position), costs, refuted, colour, "vertical")
-        labels.append(f"{rows['method'].iloc[0]}\n{cost_boxes.counted(costs, refuted)}")
+        draw_cost_box(boxes, int(position), costs, refuted, colour, "vertical")
+        labels.append(f"{rows['method'].iloc[0]}\n{counted(costs, refuted)}")
     _lines(boxes, table)
     boxes.set_title("b  at the end of each run")
     boxes.set(xlim=(-0.6, len(labels) - 0.4), ylabel="best C₂ + C₃ + C₄ of a team")
@@ -102,7 +195,7 @@ def draw_methods(table: pd.DataFrame) -> Figure:
     keys = [
         style.key("hall of fame, Eq. 10", color=WITH),
         style.key("no hall, constant rate", color=WITHOUT, linestyle=DASHED),
-        *cost_boxes.keys(),
+        *run_keys(),
         *(style.key(name, color=style.NEUTRAL, lw=1.0, ls=kind) for name, kind in LINES.items()),
     ]
     style.keys_below(below, keys, 4)
@@ -134,3 +227,7 @@ def _lines(axes: Axes, table: pd.DataFrame) -> None:
     low, high = axes.get_ylim()
     bound = float(table.loc[table["series"] == BOUND, "value"].iloc[0])
     axes.set_ylim(min(low, bound - 0.04 * (high - bound)), high)
+
+
+COSTS = costs_table, draw_costs
+METHODS = methods_table, draw_methods

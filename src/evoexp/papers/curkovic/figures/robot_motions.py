@@ -12,10 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from evoexp.condition import Prepared
-from evoexp.papers import marks
 from evoexp.papers.curkovic import link_motions, measures
 from evoexp.report import kit
-from evoexp.report.kit import motion_geometry, style
+from evoexp.report.kit import marks, motion_geometry, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
@@ -28,14 +27,7 @@ DASHES: Any = (0, (2, 1))
 
 
 def motion_table(condition: kit.ConditionResults) -> pd.DataFrame:
-    """Return the trail of the best replicate, and end-effector paths and contacts of all.
-
-    Returns:
-        Columns element (posture, configuration: links of the best replicate; path: between points
-        of an end-effector; contact: first contact of bodies; obstacle: edges of its outline),
-        replicate, robot, link, instant, x, y, x_end, y_end, radius (half of a link's thickness)
-        [length unit], best, length_unit.
-    """
+    """Return the trail of the best replicate, and end-effector paths and contacts of all."""
     prepared, best = condition.prepared, condition.best_replicate
     parts = [_obstacles(condition)]
     for replicate, solution in condition.solutions.items():
@@ -84,13 +76,7 @@ def draw_motion(table: pd.DataFrame) -> Figure:
 
 
 def tools_table(conditions: Sequence[kit.ConditionResults]) -> pd.DataFrame:
-    """Return the end-effector paths of conditions that differ in the end-effector's radius.
-
-    Returns:
-        Columns condition, position, tcp_radius, collision_substeps, robot, instant, x, y, x_end,
-        y_end [length unit], at_configuration, refuted, length_unit; of each condition's cheapest
-        motion that is not refuted, if there is one.
-    """
+    """Return the end-effector paths of conditions that differ in the end-effector's radius."""
     parts = []
     for position, c in enumerate(conditions):
         shown = measures.exemplar(c)
@@ -252,3 +238,6 @@ def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
         *_end_keys(),
         *([contact] if contacts else []),
     ]
+
+
+TOOLS = tools_table, draw_tools

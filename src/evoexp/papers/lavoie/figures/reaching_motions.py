@@ -10,11 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers import marks
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import motion_geometry, style
+from evoexp.report.kit import marks, motion_geometry, style
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
 LINK, TOUCHING, CONTACT = "link", "touching", "contact"
@@ -50,13 +49,7 @@ class ShownMotion(NamedTuple):
 
 
 def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
-    """Return scenes, postures and contacts.
-
-    Returns:
-        Columns panel, title, element, name, sub_path (0: the start posture), instant (of the
-        motion: 1 at posture A, 2 at posture B), link, x, y, x_end, y_end (an ellipse: its centre in
-        x, y; a box: its corners), semi_a, semi_b, angle_deg, length_unit.
-    """
+    """Return scenes, postures and contacts."""
     parts = []
     for panel, one in enumerate(shown):
         rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]

@@ -11,13 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers import marks
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import motion_geometry, style
+from evoexp.report.kit import marks, motion_geometry, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
@@ -58,14 +57,7 @@ LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
 def snapshots_table(condition: kit.ConditionResults) -> pd.DataFrame:
-    """Return all links at every instant of the best replicate's motion.
-
-    Returns:
-        Columns stage, first, last (instants of the stage), instant, arm, link, x, y, x_end, y_end
-        [length unit], length_unit. An instant between two stages belongs to both; the last stage
-        holds all. Obstacles are rows of stage −1: arm is −1, link the obstacle, one row per edge of
-        its outline.
-    """
+    """Return all links at every instant of the best replicate's motion."""
     problem = motions.problem(condition)
     links = motion_geometry.links_table(problem.assembly, motions.best_motion(condition))
     table = motion_geometry.in_stages(links.sort_values("instant", kind="stable"), STAGES)
@@ -123,12 +115,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
 
 
 def paths_table(condition: kit.ConditionResults) -> pd.DataFrame:
-    """Return the paths of all replicates and the straight line, in configuration space.
-
-    Returns:
-        Columns series (replicate, best, straight line), replicate (−1: none), arm, instant,
-        joint_1_deg, joint_2_deg.
-    """
+    """Return the paths of all replicates and the straight line, in configuration space."""
     return motions.paths_table(condition, path_table, "best")
 
 
@@ -145,11 +132,8 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 def sampled_distances(condition: kit.ConditionResults, samples: int) -> pd.DataFrame:
     """Return the distances along the best motion and the straight line, and their range over all.
 
-    Returns:
-        Columns series (straight line, best replicate, lowest and highest of all replicates),
-        instant (a fraction between via-points), centres and links: least distances between two
-        arms, of circle centres and of the links themselves; where there are obstacles, also
-        centres_to_obstacles and links_to_obstacles [length unit].
+    They are the least distances between two arms, and to obstacles where there are any: of circle
+    centres and of the links themselves. An instant is a fraction between via-points.
     """
     prepared = condition.prepared
     measures = _measures(condition)
@@ -208,12 +192,7 @@ def _in_radians(measure: Measure) -> Measure:
 
 
 def distances_table(condition: kit.ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
-    """Return the distances that Fig. 7 shows.
-
-    Returns:
-        Columns kind (between arms, to obstacles), measure (circle centres, links), series, instant,
-        distance, safety_distance (of the kind) [length unit], length_unit.
-    """
+    """Return the distances that Fig. 7 shows."""
     found = {name: rows.set_index("instant") for name, rows in kit.groups(sampled, "series")}
     best = found[BEST]
     found[AT_VIA_POINTS] = best[best.index == best.index.to_numpy().round()]
@@ -298,3 +277,6 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
         )
         marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)
+
+
+DISTANCES = distances_table, draw_distances

@@ -1,4 +1,4 @@
-"""Drawings of arms in space: bodies and spheres, named points, motions stage by stage."""
+"""Drawings of arms in space: bodies and spheres, named points, stages of a motion, its paths."""
 
 from typing import Any
 
@@ -8,38 +8,36 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evoexp.numeric.elementary import DEGREE, sincos
-from evoexp.papers import marks
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
+from evoexp.report import kit
+from evoexp.report.figures import surfaces
+from evoexp.report.kit import marks, motion_geometry, style
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 VIEW = (24.0, -35.0)  # [deg] elevation, azimuth
 POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
+BEST = "best replicate"
 
 
-def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
+def links_table(condition: kit.ConditionResults, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion.
 
     Returns:
         Columns of `motion_geometry.links_table`, length_unit.
     """
     table = motion_geometry.links_table(motions.problem(condition).assembly, q)
-    return rounded(table).assign(length_unit=condition.condition.length_unit)
+    return kit.rounded(table).assign(length_unit=condition.condition.length_unit)
 
 
-def arm_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return links and spheres of the first arm at its start.
-
-    Returns:
-        Columns of `links_table`, element (link, sphere) and radius; a sphere stands at x, y, z.
-    """
+def arm_table(condition: kit.ConditionResults) -> pd.DataFrame:
+    """Return links and spheres of the first arm at its start."""
     problem = motions.problem(condition)
     links = links_table(condition, problem.start[:, None])
     spheres = problem.sphere_centres(problem.start)[0]
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
     rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
-    added = rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
+    added = kit.rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
     added = added.assign(
         element="sphere", radius=problem.sphere_radius, length_unit=first["length_unit"].iloc[0]
     )
@@ -53,11 +51,11 @@ def draw_arm(table: pd.DataFrame) -> Figure:
     for k, title in enumerate(
         ("a  touching spheres of the collision model", "b  line segments: the links themselves")
     ):
-        axes = _space(figure, (1, 2, k + 1), [links, spheres], table["length_unit"].iloc[0])
+        axes = _space(figure, (1, 2, k + 1), table)
         axes.set_title(title)
         _arm(axes, 0, links, width=1.2 if k == 0 else 2.6)
         if k == 0:
-            for row in records(spheres):
+            for row in kit.records(spheres):
                 axes.plot_surface(
                     *_ball(row), color=style.arm_colour(0), alpha=0.25, linewidth=0, shade=True
                 )
@@ -66,13 +64,10 @@ def draw_arm(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
+def two_arms_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return the links of all arms at start (instant 0) and goal (instant 1), and their reach.
 
     The reach of an arm is the length of its links that move, from its shoulder on.
-
-    Returns:
-        Columns of `links_table` and reach [length unit].
     """
     problem = motions.problem(condition)
     table = links_table(condition, np.column_stack([problem.start, problem.goal]))
@@ -88,11 +83,11 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     """Draw the arms at start and goal, and from above the part of the workspace they share."""
     figure = style.figure(4.3)
     unit = table["length_unit"].iloc[0]
-    axes = _space(figure, (1, 2, 1), [table], unit)
+    axes = _space(figure, (1, 2, 1), table)
     axes.set_title("a  start (full) and goal (dashed)")
     above = figure.add_subplot(1, 2, 2)
     above.set_title("b  from above, with each arm's reach")
-    for (arm, instant), rows in groups(table, ["arm", "instant"]):
+    for (arm, instant), rows in kit.groups(table, ["arm", "instant"]):
         _arm(axes, arm, rows, dashed=instant == 1)
         x, y = [rows["x"].iloc[0], *rows["x_end"]], [rows["y"].iloc[0], *rows["y_end"]]
         colour, dashes = style.arm_colour(arm), (0, (2, 1)) if instant else "-"
@@ -109,13 +104,8 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return all links at every instant of the best replicate's motion, stage by stage.
-
-    Returns:
-        Columns of `links_table`, stage, first, last (instants of the stage); the last stage holds
-        all instants.
-    """
+def snapshots_table(condition: kit.ConditionResults) -> pd.DataFrame:
+    """Return all links at every instant of the best replicate's motion, stage by stage."""
     links = links_table(condition, motions.best_motion(condition))
     return motion_geometry.in_stages(links, STAGES)
 
@@ -126,16 +116,15 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     lines = -(-len(stages) // 3)
     figure = style.figure(2.1 * lines + 0.4)
     for k, stage in enumerate(stages):
-        place, unit = (lines, 3, k + 1), table["length_unit"].iloc[0]
-        axes = _space(figure, place, [table], unit, zoom=1.08, label_pad=-7.0)
+        axes = _space(figure, (lines, 3, k + 1), table, zoom=1.08, label_pad=-7.0)
         rows = table[table["stage"] == stage]
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
         axes.set_title(motions.stage_title(rows, whole=k == len(stages) - 1))
-        for (arm, instant), links in groups(rows, ["arm", "instant"]):
+        for (arm, instant), links in kit.groups(rows, ["arm", "instant"]):
             newest = instant == last
             shade = 1.0 if newest else 0.15 + 0.45 * (instant - first) / max(1, last - first)
             _arm(axes, arm, links, width=2.4 if newest else 0.9, alpha=shade, joints=newest)
-        for arm, links in groups(rows[rows["link"] == rows["link"].max()], "arm"):
+        for arm, links in kit.groups(rows[rows["link"] == rows["link"].max()], "arm"):
             tips = (links[f"{name}_end"] for name in "xyz")
             axes.plot(*tips, ":", color=style.arm_colour(arm), linewidth=1.0)
     _legend(figure, table, style.key("trace of the tip", color=style.NEUTRAL, lw=1.0, ls=":"))
@@ -151,22 +140,19 @@ def _offsets(assembly: Any) -> np.ndarray:
 def _space(
     figure: Figure,
     place: tuple[int, int, int],
-    tables: list[pd.DataFrame],
-    unit: str,
-    *,
+    table: pd.DataFrame,
     zoom: float = 1.0,
     label_pad: float = -3.0,
 ) -> Any:
-    """Return axes in space with equal scales that hold all links of the tables."""
-    columns = ([name, f"{name}_end"] for name in "xyz")
-    values = [
-        np.concatenate([table[pair].to_numpy().ravel() for table in tables]) for pair in columns
-    ]
-    low, high = np.min(values, axis=1), np.max(values, axis=1)
+    """Return axes in space with equal scales that hold all links of a table."""
+    values = [table[[name, f"{name}_end"]].to_numpy() for name in "xyz"]
+    low, high = np.array([v.min() for v in values]), np.array([v.max() for v in values])
     pad = 0.05 + 0.5 * np.maximum(0.0, 0.5 - (high - low))
     pads = label_pad, label_pad, label_pad - 4.0  # else z's meets the panel beside it
-    look: dict[str, Any] = {"view": VIEW, "zoom": zoom, "label_pads": pads, "ticks": (2, 3)}
-    return marks.space(figure, place, low, high, pad, unit, **look)
+    unit, ticks = table["length_unit"].iloc[0], (2, 3)
+    return surfaces.space(
+        figure, place, low, high, pad, unit, view=VIEW, zoom=zoom, label_pads=pads, ticks=ticks
+    )
 
 
 def _arm(
@@ -212,3 +198,68 @@ def _legend(figure: Figure, table: pd.DataFrame, more: Line2D) -> None:
     """Put a legend of the arms and of a further entry below the figure."""
     arms = style.arm_keys(sorted(table["arm"].unique()), linewidth=2.4)
     style.keys_below(figure, [*arms, more])
+
+
+def paths_table(condition: kit.ConditionResults) -> pd.DataFrame:
+    """Return the paths of all replicates and the straight line in both spaces."""
+    table = kit.rounded(motions.paths_table(condition, _path, BEST))
+    return table.assign(length_unit=condition.condition.length_unit)
+
+
+def draw_configuration_space(table: pd.DataFrame) -> Figure:
+    """Draw the paths through the first three joint angles of every arm."""
+    arms = sorted(table["arm"].unique())
+    figure = style.figure(4.0)
+    for k, arm in enumerate(arms):
+        axes: Any = figure.add_subplot(1, len(arms), k + 1, projection="3d")
+        rows = table[table["arm"] == arm]
+        columns = [f"joint_{j}_deg" for j in (1, 2, 3)]
+        motions.draw_paths(axes, rows, columns, BEST, style.arm_colour(arm))
+        labels = [f"{style.joint_symbol(arm, j)} [deg]" for j in range(3)]
+        _label(axes, labels, f"arm {arm + 1}")
+    style.keys_below(figure, motions.path_keys(table))
+    return figure
+
+
+def draw_operational_space(table: pd.DataFrame) -> Figure:
+    """Draw the paths of the tips of all arms."""
+    unit = table["length_unit"].iloc[0]
+    figure = style.figure(4.2, 5.6)
+    axes: Any = figure.add_subplot(projection="3d")
+    for arm, rows in kit.groups(table, "arm"):
+        motions.draw_paths(axes, rows, ["x", "y", "z"], BEST, style.arm_colour(arm))
+    _label(axes, [f"{name} [{unit}]" for name in "xyz"], "")
+    spans = [float(np.ptp(table[name])) for name in "xyz"]
+    axes.set_box_aspect([max(span, 0.15 * max(spans)) for span in spans], zoom=1.1)
+    arms = style.arm_keys(sorted(table["arm"].unique()), lw=2.2)
+    style.keys_below(figure, [*arms, *motions.path_keys(table)], 4)
+    return figure
+
+
+def _path(condition: kit.ConditionResults, solution: FloatArray) -> pd.DataFrame:
+    """Return one solution's joint angles and tips."""
+    problem = motions.problem(condition)
+    q = motion_geometry.configurations(condition.prepared, solution)
+    places = motion_geometry.joint_positions(problem.assembly, q)
+    tips = {arm: end for arm, _, _, end in places}  # the last link's end stays
+    frames = []
+    for arm, (first, stop) in enumerate(problem.arm_slices):
+        columns = {
+            "arm": arm,
+            "instant": np.arange(q.shape[1]),
+            **dict(zip("xyz", tips[arm].T, strict=True)),
+            **{f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)},
+        }
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _label(axes: Any, labels: list[str], title: str) -> None:
+    axes.set_title(title)
+    axes.tick_params(labelsize=6, pad=-1)
+    for axis, label in zip((axes.xaxis, axes.yaxis, axes.zaxis), labels, strict=True):
+        axis.set_label_text(label)
+        axis.labelpad = -2
+        axis.set_major_locator(style.few_ticks())
+    axes.view_init(elev=24.0, azim=-50.0)
+    axes.set_box_aspect(None, zoom=0.82)

@@ -45,7 +45,6 @@ def cluster_fan_out(
     dies: the last time, a replicate runs beside no other.
 
     Args:
-        jobs: The replicates.
         settings: Address of the scheduler, or the number of workers of a cluster on this machine.
         limits: Of each replicate.
 

@@ -28,7 +28,6 @@ def fan_out(
     end, beside no other.
 
     Args:
-        jobs: The replicates.
         workers: Worker processes; None: they run in this process.
         limits: Of each replicate.
         curves: Folder for the convergence of those that are running; None: it is not told.
@@ -49,7 +48,6 @@ class Replicates:
         """Let all of them wait.
 
         Args:
-            jobs: The replicates.
             num_workers: Tasks that are done at the same time.
             limits: Of each replicate.
         """

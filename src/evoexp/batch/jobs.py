@@ -65,8 +65,6 @@ def run_jobs(
     """Run replicates in this process, one after the other; a failure is an outcome.
 
     Args:
-        jobs: The replicates.
-        limits: Of each.
         in_worker: Whether this process is a worker.
         curves: Folder for their convergence while they run; None: it is not told.
 

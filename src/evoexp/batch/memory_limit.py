@@ -46,7 +46,6 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates would take too much memory, or too long a log.
 
     Args:
-        condition: The condition.
         allowed: Memory of one replicate [B].
         label: Of the condition, for the error.
 

@@ -31,7 +31,6 @@ def run_replicate(
 
     Args:
         condition: What to run.
-        index: Of the replicate.
         config_json: The condition's canonical form, if the caller has it; making it takes as long
             as a short run.
         hear: Told every block of generations, after the log was.

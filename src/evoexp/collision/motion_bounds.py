@@ -71,7 +71,6 @@ def joint_twists(
     frame moves at v + ω × x.
 
     Args:
-        chain: The joints.
         coefficients: (4, nq) of the segment.
         u: Place on the segment, in [0, 1].
         frames: (joints, FRAME) from `joint_frames` at u.
@@ -104,7 +103,6 @@ def moved_by_one(chain: KinematicChain, joint: IntArray, pairs: IntArray) -> Boo
     """Return (pairs,) true where no joint carries both bodies.
 
     Args:
-        chain: The joints.
         joint: (bodies,) index of the joint that carries a body, −1 for none.
         pairs: (pairs, 2) indices of bodies.
     """
@@ -132,7 +130,6 @@ def reaches(
     """Bound the distance of every body's points from every joint's axis.
 
     Args:
-        chain: The joints.
         joint: (bodies,) index into the table of the joint that carries a body, −1 for none.
         from_origin: (bodies,) greatest distance of a body's points from the origin of that joint.
         from_axis: (bodies,) the same from its axis.
@@ -194,7 +191,6 @@ def approach_bounds(
     Coriolis.
 
     Args:
-        chain: The joints.
         coefficients: (4, nq) of the segment.
         begin: u where the part begins.
         end: u where it ends.

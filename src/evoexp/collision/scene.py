@@ -174,7 +174,6 @@ def obstacle_shapes(
     """Return every obstacle as a coal shape and its placement, a `pin.SE3`.
 
     Args:
-        table: The obstacles.
         hulls: Row → points (points, 3) in its frame, of those that are no box but a hull.
 
     Raises:

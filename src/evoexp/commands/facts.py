@@ -47,8 +47,6 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
     """Return the facts about one condition of an experiment, whether or not it was run here.
 
     Args:
-        experiment: The experiment.
-        label: Of the condition.
         command: That runs it.
 
     Raises:

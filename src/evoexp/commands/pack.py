@@ -72,7 +72,6 @@ def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
     """Give the runs of an archive while the body runs; the store stays as it is.
 
     Args:
-        path: Of the archive.
         prefix: Of the hash of the only run to be given; empty: all.
 
     Raises:

@@ -159,7 +159,6 @@ def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH
     Args:
         costs: Of one replicate, in order.
         levels: Characters for the least to the largest of them.
-        width: The most characters.
 
     Returns:
         The characters, with the first and the last cost.

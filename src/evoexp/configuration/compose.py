@@ -142,7 +142,6 @@ class Composer:
         Args:
             root: An empty folder. It comes first in the search path and holds, beside the root, an
                 experiment that is given as a file: of a user's folders only the options count.
-            file: The experiment.
         """
         self.root, self.file = root, file
         self._known: dict[tuple[str, ...], Composed] = {}

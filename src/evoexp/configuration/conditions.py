@@ -79,7 +79,6 @@ class Builder:
         All are built even if some are kept: the labels of one condition make one label.
 
         Args:
-            overrides: Of the command line.
             only: Labels to keep; empty keeps all.
 
         Raises:

@@ -23,7 +23,6 @@ def fill_in(values: Mapping[str, Any], config: Mapping[str, Any]) -> dict[str, A
     """Return settings with others in the place of interpolations.
 
     Args:
-        values: Settings.
         config: All settings, from which they may be taken.
 
     Raises:

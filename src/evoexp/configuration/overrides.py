@@ -151,7 +151,6 @@ def sweep_texts(overrides: Choice, choice: Choice) -> dict[str, str]:
 
     Args:
         overrides: By key, as they are swept over.
-        choice: The combination.
     """
     short = short_names([key for key, override in overrides.items() if override.is_swept])
     return {
@@ -172,7 +171,6 @@ def expand_entry(
 
     Args:
         template: Label of the entry, with a `{}` per swept override or none.
-        overrides: Of the entry.
 
     Yields:
         Label and overrides with one value of each condition.

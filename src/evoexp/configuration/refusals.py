@@ -38,9 +38,7 @@ def uncomposed(
     """Return the refusal of options that cannot be composed.
 
     Args:
-        error: Of the composer.
         choices: Group → option, as far as the command line and an entry choose.
-        file: The experiment.
     """
     text, cause = str(error), error
     while cause.__cause__ is not None and not isinstance(cause, yaml.MarkedYAMLError):

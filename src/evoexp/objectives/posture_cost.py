@@ -194,7 +194,6 @@ def rate_poses(count: int, pose: FloatArray, aim: Aim, rows: FloatArray) -> None
     Args:
         count: Configurations.
         pose: (12, configurations) rotation of the controlled frame, row by row, and its origin.
-        aim: The goal.
         rows: (≥ 6, configurations) written.
     """
     turn, axis, up, local_up, edges = aim.rotation, aim.axis, aim.up, aim.local_up, aim.half_edges

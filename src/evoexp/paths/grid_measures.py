@@ -22,7 +22,6 @@ def measure_path(path: NodeArray, kinds: NodeArray, unsafeness: FloatArray) -> t
     Moves of each kind are counted, so the length does not depend on their order.
 
     Args:
-        path: See above.
         kinds: See `grids.Grid`.
         unsafeness: (nodes,).
 

@@ -137,9 +137,7 @@ def parameter(
     """Return where a target lies between two samples, in samples from the segment's begin.
 
     Args:
-        target: Lengths.
         sample: The first of both, counted within its segment.
-        speeds: Of both.
         lengths: Up to both.
     """
     v0, v1 = speeds
@@ -232,7 +230,6 @@ def redistribute_arms(
         samples_per_segment: A power of two from 8 on.
         pivots: (N + 1,) of `prepare_redistribution`.
         w: Scratch, not to be shared between threads.
-        integers: Likewise.
     """
     N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples_per_segment)
     pitch = np.uint64(via_points.shape[2])

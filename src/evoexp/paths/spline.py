@@ -31,13 +31,10 @@ def fit_splines(
     """Copy the coordinates of eight paths to the knots in w and solve for m (Thomas algorithm).
 
     Args:
-        via_points: Flat.
         first: Place of point 0 of the arm's first joint there, for the first of the paths.
         pitch: Distance of two points there.
-        joints: Of the arm.
         N: Number of segments.
         pivots: Factor of the splines' system.
-        w: Scratch.
         at: Places in it.
     """
     to_joint = (N + U1) * pitch

@@ -94,7 +94,6 @@ def of_place(name: str, given: FloatArray, wanted: FloatArray, unit: str) -> lis
         name: Of the place, as in "the start of arm 1".
         given: Its values in the solution, any shape.
         wanted: Its values in the task, of the same shape.
-        unit: Of both.
     """
     apart = float(np.max(np.abs(given - wanted)))
     return [] if apart <= SAME else [f"{name} is not the task's: {apart:.4g} {unit} away"]

@@ -190,7 +190,6 @@ def cover_notes(
     """Describe the covers of bodies, where bodies are covered.
 
     Args:
-        collision: The collision model.
         bodies: The exact bodies: the robot's first, then the obstacles.
         unit: Name of the scene's unit of length.
     """
@@ -237,7 +236,6 @@ def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmTask) -> Scene:
     """Return the exact bodies of a robot among the obstacles of a task, pairs of one arm included.
 
     Args:
-        assembly: The robot.
         task: Its obstacles, by which contacts are named.
         given: The task as the scenario has it; names the pairs that may touch.
     """

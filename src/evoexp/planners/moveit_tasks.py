@@ -85,7 +85,6 @@ def without_pairs(found: Scene, task: MoveitTask, assembly: Assembly) -> Scene:
     Args:
         found: Bodies first, then the obstacles.
         task: Names the pairs.
-        assembly: The robot.
     """
     num_bodies = assembly.geometry.ngeoms
     allowed = {(body, num_bodies + k) for body, k in touching(assembly, task)}

@@ -49,7 +49,6 @@ class Proofs:
 
         Args:
             planner: A planner whose field `acceptance` is not `model`.
-            problem: Its problem.
         """
         self.planner, self.problem = planner, problem
         self._known: dict[bytes, Verdict] = {}

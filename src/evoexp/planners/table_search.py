@@ -71,7 +71,6 @@ class TableSearch(ABC):
         """Begin a run.
 
         Args:
-            ga: Its settings.
             per_call: Generations computed per call, at most.
         """
         self.num_places = min(per_call, ga.num_generations) + 1
@@ -183,7 +182,6 @@ class ScaledSearch(TableSearch):
         """Begin a run.
 
         Args:
-            ga: Its settings.
             evolve: Kernel that computes the generations after one up to another, as far as the
                 draws suffice, and returns the last generation that was computed.
             per_call: Generations computed per call, at most.

@@ -71,7 +71,6 @@ def poses(
 
     Args:
         model: The `pin.Model`.
-        motion: The motion.
         times: (ticks,) [instants].
         parts: Pieces of the motion; each places the carried objects.
         carried: Names of the objects that have frames of their own.

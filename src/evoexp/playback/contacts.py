@@ -47,7 +47,6 @@ def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance
 
     Args:
         parts: Pieces of the motion, from `Planner.parts`.
-        motion: The motion.
         times: (ticks,) from 0 to the end [instants].
     """
     least, pairs, contacts = [], [], []

@@ -106,7 +106,6 @@ def entity(
     """Return a body as one entity.
 
     Args:
-        shape: The body.
         frame: Name of the frame that moves it.
         pose: (7,) in that frame.
         opacity: From 0 to 1.

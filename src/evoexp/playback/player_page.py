@@ -24,9 +24,6 @@ FILES = {"style": "motion_page", "geometry": "motion_geometry", "script": "motio
 def page(recordings: Sequence[Recording]) -> bytes:
     """Return a page that plays one motion, or several side by side on one clock.
 
-    Args:
-        recordings: The motions.
-
     Returns:
         HTML; the same motions give the same bytes.
     """

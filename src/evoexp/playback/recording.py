@@ -101,7 +101,6 @@ def record_motion(
     """Return the recording of a motion among the bodies of a condition.
 
     Args:
-        condition: The condition.
         motion: Of its robot; None: there is none.
         heading: Title and origin.
         limits: Speed limits of the joints, for the timing.

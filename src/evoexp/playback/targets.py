@@ -20,7 +20,6 @@ def targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
     Args:
         scenario: One that names places has a method `named_places(robot)`, which returns names and
             points, in the plane or in space.
-        robot: The robot.
     """
     if not hasattr(scenario, "named_places"):
         return ()

@@ -55,7 +55,6 @@ def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
     """Return the least time from instant to instant within all joints' limits [s].
 
     Args:
-        motion: The motion.
         limits: (nq,) greatest |dq/dt| [rad/s or length unit/s].
 
     Returns:
@@ -72,7 +71,6 @@ def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
     Where two straight lines meet, the velocity on the later one is taken.
 
     Args:
-        motion: The motion.
         times: (ticks,) [instants].
         seconds: Time from instant to instant [s].
     """
@@ -88,7 +86,6 @@ def fastest(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Ti
     """Time a motion as fast as limits permit, from rest to rest.
 
     Args:
-        motion: The motion.
         speeds: (nq,) limits [rad/s or length unit/s].
         accelerations: (nq,) limits [rad/s² or length unit/s²].
 
@@ -140,7 +137,6 @@ def _section(toppra: Any, polynomials: FloatArray, limits: list[Any]) -> TimedPo
     """Time cubics without a stop between them from rest to rest.
 
     Args:
-        toppra: The package.
         polynomials: (segments, 4, nq), lowest power first.
         limits: Constraints of toppra.
     """

@@ -61,7 +61,6 @@ def trajectory(recording: Recording, timing: Timing, limits: JointLimits) -> Tra
     """Return the points of a motion in time.
 
     Args:
-        recording: The motion.
         timing: optimal: as fast as limits of speed and acceleration permit, at rest at both ends
             and wherever two straight lines meet | uniform: equal times from instant to instant, as
             short as the limits of speed permit; its speed jumps.

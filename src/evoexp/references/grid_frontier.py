@@ -158,7 +158,6 @@ class GridFrontier(Reference):
         """Return bounds by walks below the paths of 0, 1, … nodes, and below those of more nodes.
 
         Args:
-            network: The moves.
             known: Cost of some path.
             walks: (numbers, 2) of `best_walk`.
         """
@@ -213,7 +212,6 @@ def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndar
     """Return the paths that minimise D + μ ΣS (Dijkstra), each with the first μ that leads to it.
 
     Args:
-        network: The moves.
         weights: Values of μ [cell].
     """
     from scipy.sparse import csgraph, csr_array
@@ -243,7 +241,6 @@ def best_walk(
     Numbers of nodes whose walks are shown to be no better are left out.
 
     Args:
-        network: The moves.
         epsilon: ε [1/cell].
         lam: λ.
         known: Cost of some path: numbers of nodes at which no walk can be better are left out.

@@ -55,7 +55,6 @@ def best_walks(arrivals: Arrivals, weights: FloatArray, count: int) -> tuple[Flo
     """Return the least costs of walks of 0 … `count` nodes, and the best walk of `count` nodes.
 
     Args:
-        arrivals: The moves.
         weights: (nodes,) cost of passing a node.
         count: Most nodes.
 

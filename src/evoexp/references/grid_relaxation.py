@@ -32,7 +32,6 @@ def relaxed(
     """Raise bounds below the costs of all paths without loops, by their number of nodes.
 
     Args:
-        arrivals: The moves.
         lam: λ.
         known: Cost of some path; steps are as long as if it were the optimum.
         enough: A bound as great is not raised any further.

@@ -117,7 +117,6 @@ def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArr
     Args:
         x: (3, starts) directions that reach the target [rad].
         steps: (steps,) their lengths [rad].
-        model: The criteria.
 
     Returns:
         (3, starts) and (starts,).

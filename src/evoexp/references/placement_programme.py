@@ -215,7 +215,6 @@ def measure(
 
     Args:
         z: (3,) or, with t, (4,).
-        model: The criteria.
         bounds: (m, 3) the limited quantity (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or
             −1.0: from below or above, the limit.
         values: (2 + margins,) written: objective, height, margins.

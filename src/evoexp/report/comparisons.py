@@ -153,7 +153,6 @@ def compared_with_controls(
     """Compare every condition with its controls: those that wrap the same planner.
 
     Args:
-        results: Of the experiment.
         settings: Levels and resamples.
         compared: (quantity, whether lower is better, its values).
 

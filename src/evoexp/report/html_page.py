@@ -53,7 +53,6 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
     """Return a page as HTML; the same text gives the same bytes.
 
     Args:
-        document: Its text.
         pictures: File name → content of its pictures.
     """
     sections = tuple(_places(document, pictures))

@@ -80,7 +80,6 @@ def joint_positions(
     """Yield (arm, link of the arm, start (instants, 3), end (instants, 3)) of every link.
 
     Args:
-        assembly: The robot.
         q: (nq, instants) [deg].
     """
     frames = list(_frames(assembly, q))
@@ -98,7 +97,6 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
     """Return the closed outlines of obstacles as seen along z, each (points, 2).
 
     Args:
-        table: The obstacles.
         reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth
             of it deep.
     """
@@ -179,7 +177,6 @@ def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion.
 
     Args:
-        assembly: The robot.
         q: (nq, instants) [deg].
 
     Returns:

@@ -165,7 +165,6 @@ def alike(mean_ranks: Sequence[float], difference: float) -> list[tuple[int, int
 
     Args:
         mean_ranks: In ascending order.
-        difference: The critical one.
 
     Returns:
         (first, last) position of each group of two or more.

@@ -57,7 +57,6 @@ def effects_drawings(
         settings: Significance.
         rows: Name of a quantity → its comparisons.
         first: Name of the first condition, or of the first ones.
-        caption: Of the figure.
     """
     if not any(rows.values()):
         return ()
@@ -79,7 +78,6 @@ def shares_drawing(
         results: Whose conditions are drawn.
         settings: Level of the intervals.
         rows: (quantity, position, condition, how many).
-        caption: Of the figure.
         printed: Quantity → the share that a paper prints for it.
     """
     table = partial(shares.shares_table, rows, printed or {}, settings.confidence)

@@ -94,10 +94,8 @@ def main_effects(
     """Yield the effect of each value of each setting.
 
     Args:
-        sweep: The sweep.
         values: (done,) of a condition, lower is better.
         confidence: Level of the intervals.
-        num_resamples: Of the bootstrap.
     """
     for base, (k, setting) in itertools.product(sweep.bases, enumerate(sweep.settings)):
         first, *others = sweep.levels(k)

@@ -94,7 +94,6 @@ class ArmStates(NamedTuple):
         """Return the configuration of a state [deg, m].
 
         Args:
-            name: Of the state.
             field: That names it, for errors.
 
         Raises:
@@ -124,7 +123,6 @@ class Arm:
             model: With the arm's joints.
             arm: Its number.
             first_joint: Its first joint.
-            links: Its links.
         """
         return [link_capsule(link, "") for link in links]
 
@@ -265,7 +263,6 @@ def sphere_geometry(
     """Return spheres fixed to joints as a `pin.GeometryModel`, the papers' own collision models.
 
     Args:
-        assembly: The robot.
         centres: (spheres, 3) in the frames of their joints.
         joints: (spheres,) indices of Pinocchio joints.
         radii: (spheres,).

@@ -65,7 +65,6 @@ def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
     """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`.
 
     Args:
-        body: The body.
         field: Its name in the configuration, for errors.
 
     Raises:

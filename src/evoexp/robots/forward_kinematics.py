@@ -42,11 +42,9 @@ def copy_lanes(
     Args:
         source: Rows of `stride` numbers.
         place: Of the first neighbour in a row.
-        stride: Of the source.
         count: How many neighbours.
         target: Rows of `target_stride` numbers, written.
         target_place: Of the first neighbour in a row of the target.
-        target_stride: Of the target.
     """
     source, target = borrowed((source, target))
     for row in range(len(source) // stride):
@@ -60,7 +58,6 @@ def eight_of(q: FloatArray, first: int, count: int, padded: FloatArray) -> Eight
 
     Args:
         q: Rows of `count` numbers, flat.
-        first: Of the eight.
         count: Configurations.
         padded: (nq · LANES,) written where fewer are left.
     """
@@ -84,8 +81,6 @@ def spatial_frames(chain: KinematicChain, eight: Eight, unit: float, frames: Flo
     """Compute the frames of all joints of eight configurations.
 
     Args:
-        chain: The joints.
-        eight: The configurations.
         unit: Factor of every coordinate, which makes it [rad], or a length for prismatic joints.
         frames: (joints · SPATIAL_FRAME,), written: the rotation row by row, then the origin.
     """

@@ -41,7 +41,6 @@ def whole_mesh(content: bytes, name: str, field: str) -> bytes:
     """Check a mesh's file, and write it anew if coal would join its triangles to other vertices.
 
     Args:
-        content: Of the file.
         name: By which the URDF names it.
         field: That names the URDF, for errors.
 

@@ -78,7 +78,6 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
     """Return the pieces of an OBJ file that `mesh_pieces` wrote, as coal shapes.
 
     Args:
-        content: Of the file.
         scale: (3,) by which the URDF scales the mesh.
         field: The setting, for errors.
 

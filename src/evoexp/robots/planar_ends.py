@@ -69,11 +69,9 @@ def block_ends(
     Args:
         starts: (N × LANES) joint angles [rad].
         ends: (N × LANES).
-        arm: The arm.
         position: j of Eq. 3; at j = M the end itself is taken, without any rounding.
         num_positions: M.
         x: ((N + 1) × LANES) written.
-        y: Likewise.
     """
     share, last = position / num_positions, position == num_positions
     angle, at_x, at_y = spread(arm.base_angle), spread(arm.base_x), spread(arm.base_y)
@@ -111,7 +109,6 @@ def begin_turning(
         turn: (N × 4 × LANES) written: sine and cosine of every link's direction, and of its turn
             per position.
         x: ((N + 1) × LANES) written as `block_ends` does, to the last bit.
-        y: Likewise.
     """
     share, step = position / num_positions, spread(0.0)
     angle, at_x, at_y = spread(arm.base_angle), spread(arm.base_x), spread(arm.base_y)
@@ -145,7 +142,6 @@ def turned_ends(arm: PlanarArm, turn: FloatArray, x: FloatArray, y: FloatArray) 
         arm: See `block_ends`.
         turn: See `begin_turning`, changed.
         x: ((N + 1) × LANES) written.
-        y: Likewise.
     """
     at_x, at_y = spread(arm.base_x), spread(arm.base_y)
     store(x, U(0), at_x)

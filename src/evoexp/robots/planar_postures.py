@@ -34,7 +34,6 @@ def bring_tip_to(q: FloatArray, target: FloatArray, limits: FloatArray, arm: Pla
         q: (N,) posture to begin with [rad], within its limits; changed.
         target: (2,) where the tip shall be.
         limits: (N, 2) of the joints [rad].
-        arm: The arm.
 
     Returns:
         Whether it is there; if not, q is where the last step ended.

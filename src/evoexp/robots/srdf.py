@@ -23,7 +23,6 @@ class Srdf:
         """Read the text.
 
         Args:
-            content: Of the file.
             joints: Of the URDF, by their names.
         """
         self._root = parsed_xml(content, "robot.srdf", "robot")

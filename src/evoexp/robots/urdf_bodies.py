@@ -43,7 +43,6 @@ def built_bodies(
     Args:
         model: Pinocchio's, of the same URDF.
         root: That `read_urdf` returned.
-        rules: Of the joints.
         places: Where each mesh lies.
         field: That names the URDF, for errors.
 

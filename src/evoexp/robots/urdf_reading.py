@@ -75,7 +75,6 @@ def urdf_file(content: bytes, field: str = "robot.path") -> UrdfFile:
     """Read a URDF whose links form one tree.
 
     Args:
-        content: Of the file.
         field: That names it, for errors.
 
     Raises:
@@ -92,7 +91,6 @@ def read_urdf(content: bytes, field: str) -> Any:
     """Read the links, collision bodies and joints of a URDF.
 
     Args:
-        content: Of the file.
         field: That names it, for errors.
 
     Returns:
@@ -167,7 +165,6 @@ class _Reader:
         """Return an element with the elements and attributes that are used.
 
         Args:
-            element: Of the file.
             where: Names the link or joint that it belongs to.
         """
         tag = "capsule" if element.tag == DRAKE_CAPSULE else element.tag

@@ -50,7 +50,6 @@ def parsed_xml(content: bytes, field: str, tag: str) -> Any:
     """Read XML as TinyXML does, which knows no namespaces; return its root element.
 
     Args:
-        content: The text.
         field: That names it in errors.
         tag: The root's.
 

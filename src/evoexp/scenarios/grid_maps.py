@@ -21,7 +21,6 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
     one.
 
     Args:
-        content: Of the file.
         size: How many nodes there are along x, y[, z].
         field: Name of the setting, for errors.
 

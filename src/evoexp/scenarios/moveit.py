@@ -210,7 +210,6 @@ class MoveitTask(Component):
         """Return the task as a motion from a configuration to another.
 
         Args:
-            joints: Of the robot.
             world: Of this task.
 
         Raises:
@@ -254,7 +253,6 @@ class MoveitTask(Component):
         """Return the task as one of reaching a pose.
 
         Args:
-            joints: Of the robot.
             world: Of this task.
             tool_at_goal: The tool's pose in the goal's configuration; None: the goal is a pose.
         """

@@ -76,7 +76,6 @@ class Document:
         """Read a message within limits.
 
         Args:
-            content: Of the file.
             field: The setting that names it, for errors.
             message: Its type, of `moveit_messages.FIELDS`.
 
@@ -107,7 +106,6 @@ class Document:
         """Return a list of numbers.
 
         Args:
-            value: The list.
             where: Its place, for errors.
             count: How many there must be; None: any number.
         """

@@ -51,7 +51,6 @@ def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
     """Read the fixed transforms of a scene beside the links of a robot.
 
     Args:
-        scene: The planning scene.
         links: Of the robot; None: they have no names.
 
     Raises:

@@ -37,8 +37,6 @@ def mesh_hulls(
     """Return the convex hulls of the parts of a mesh (`shape_msgs/Mesh`) that hang together.
 
     Args:
-        scene: The file.
-        given: The mesh.
         meshes: Of the files that meshes of the scene name.
         pose: Where it stands.
         where: Its place in the file, for errors.

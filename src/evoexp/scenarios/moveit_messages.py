@@ -125,7 +125,6 @@ def check_fields(value: Any, message: str, field: str, where: str = "") -> None:
 
     Args:
         value: The message, or a list of such messages.
-        message: Its type.
         field: The setting that names the file, for errors.
         where: The value's place in the file.
 

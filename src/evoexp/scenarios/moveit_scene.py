@@ -68,7 +68,6 @@ def read_world(scene: Document, links: "LinkFrames | None", meshes: Mapping[str,
     """Read the objects of a planning scene.
 
     Args:
-        scene: The planning scene.
         links: Of the robot; None: they have no names.
         meshes: Corners and triangles of meshes that the scene names, by these names.
 

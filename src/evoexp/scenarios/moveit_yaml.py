@@ -46,7 +46,6 @@ def read_message(content: bytes, field: str) -> dict[str, Any]:
     """Read the only message of a file, a mapping.
 
     Args:
-        content: Of the file.
         field: The setting that names it, for errors.
 
     Raises:

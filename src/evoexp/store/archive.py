@@ -101,7 +101,6 @@ def take_in(path: Path, outputs: Path) -> list[TakenRun]:
     """Take the runs of an archive into a store; replicates that are there already stay.
 
     Args:
-        path: Of the archive.
         outputs: Root of the store.
 
     Raises:
@@ -160,7 +159,6 @@ class _Arrival:
 
         Args:
             name: In the run's directory.
-            content: Of the file.
             sha256: Of its content.
         """
         if not name.startswith(PREFIX):

@@ -16,7 +16,6 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
     """Return the log of one replicate of a run.
 
     Args:
-        run: The run.
         choice: Index of the replicate, or "best" or "worst" (by cost), or "refuted": the first
             replicate that the certifier refutes.
 

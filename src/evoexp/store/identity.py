@@ -81,7 +81,6 @@ def whole_log(path: Path, prefix: str) -> FoundLog | None:
     """Return the first log in a run directory that is whole and of a condition, if there is one.
 
     Args:
-        path: The run directory.
         prefix: Of the condition's hash.
     """
     for log in sorted((path / REPLICATES).glob("*.mcap")):
@@ -127,12 +126,7 @@ def read_object(path: Path) -> dict[str, Any]:
 
 
 def lost_files(path: Path, config_json: bytes) -> Iterator[tuple[Path, str]]:
-    """Yield path and damage of the files that a run's configuration refers to and that are lost.
-
-    Args:
-        path: The run directory.
-        config_json: The configuration.
-    """
+    """Yield path and damage of the files that a run's configuration refers to and that are lost."""
     if SHA256.encode() not in config_json:
         return
     for sha256 in filter(_ID.fullmatch, dict.fromkeys(hashes(json.loads(config_json)))):

@@ -273,7 +273,6 @@ def damaged_files(run: RunDirectory, config_json: bytes | None = None) -> dict[s
     """Return name → what is wrong with it, of the files of a run beside its logs.
 
     Args:
-        run: Whose.
         config_json: The canonical form of its condition; None: as it is stored.
 
     Raises:
@@ -316,7 +315,6 @@ def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
     The caller holds the run's lock, and writes configuration and manifest again.
 
     Args:
-        run: Whose.
         config_json: The canonical form of its condition.
         again: Replicates that run again if their log is damaged.
 

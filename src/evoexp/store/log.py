@@ -144,7 +144,6 @@ class Log:
         """Append generations, and every best solution that is better than the last written.
 
         Args:
-            block: The generations.
             cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
                 part of any digest.
         """
@@ -233,7 +232,6 @@ class Log:
             topic: Of its channel, which is registered with its first message.
             record: Whose messages the channel has.
             generation: Its index.
-            data: The message.
             terms: Names of the terms that the record has besides its fields.
         """
         self._size += len(data)

@@ -55,7 +55,6 @@ def manifest(condition_id: str, components: Mapping[str, str] = _NO_COMPONENTS) 
 
     Args:
         condition_id: 64 hex digits.
-        components: As for `environment`.
     """
     return {"condition": condition_id, **environment(components), "git": git_state()}
 

@@ -63,10 +63,8 @@ def write_summary(
     Rows of files that did not change since the table was written are taken from it.
 
     Args:
-        run: Whose.
         written: Summaries of logs that the caller has just written, by replicate: those are not
             read again.
-        thorough: As for `summary_table`.
 
     Returns:
         One row per replicate, done or failed, in order; a failed one has condition, replicate,
@@ -146,12 +144,7 @@ def damaged_logs(run: RunDirectory) -> dict[str, str]:
 
 
 def whole_logs(run: RunDirectory, *, thorough: bool = False) -> set[int]:
-    """Return the replicates whose log is there and whole.
-
-    Args:
-        run: Whose.
-        thorough: As for `summary_table`.
-    """
+    """Return the replicates whose log is there and whole."""
     names = _current(run, thorough).row_names
     return {replicate_of(name) for name in names if _is_log(name)}
 
@@ -178,7 +171,6 @@ def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -
     Rows of logs that changed since the table was written are not looked at.
 
     Args:
-        run: Whose.
         summaries: The logs' own, by the names of their files.
     """
     stored, stamps = _stored(run), _stamps(run)

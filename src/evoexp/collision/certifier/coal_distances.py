@@ -112,9 +112,7 @@ def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> 
 
     Args:
         distance: Coal's.
-        pair: The pair.
         t: Where the sweep saw it first.
-        level: The distance.
 
     Returns:
         The instant up to `TIME_RESOLUTION`; None if coal sees no such distance there.
@@ -149,7 +147,6 @@ def walk_down(distance: CoalDistance, pair: int, t: float, step: float) -> tuple
 
     Args:
         distance: Coal's.
-        pair: The pair.
         t: Where the walk begins [instant].
         step: The first one [segments].
     """
@@ -188,7 +185,6 @@ def search_interval(
 
     Args:
         distance: Coal's.
-        pair: The pair.
         interval: Its begin and end, within one segment.
         speed: A bound of |d distance / dt| there.
         goals: The distances to be proven or found.

@@ -55,7 +55,6 @@ def distance_bounds(
     The two are equal up to rounding unless the iteration stops early.
 
     Args:
-        bodies: The bodies.
         world: (bodies, 12) frames of the bodies.
         one: Index of a body.
         two: Index of the other.
@@ -280,7 +279,6 @@ def separation_later(
     of support points in a turned direction. The gap is a concave function of `later`.
 
     Args:
-        bodies: The bodies.
         world: (bodies, 12) frames of the bodies.
         twists: (joints, 6) from `joint_twists`.
         one: Index of a body.

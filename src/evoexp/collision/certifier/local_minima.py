@@ -31,7 +31,6 @@ def polish(
     distances; a minimum at an instant, where the motion bends, takes no more.
 
     Args:
-        task: The motion.
         work: From `work_space`.
         pairs: (walks,) the pair of each walk.
         t: (walks,) where it begins; written: where it ended.
@@ -83,7 +82,6 @@ def nearest_minimum(
     """Return pair and instant of the least local minimum; of equal ones the first in time.
 
     Args:
-        task: The motion.
         work: From `work_space`.
         least: (pairs,) the distance of each that was found.
         begins: (pairs,) its instant, at which the walk begins.

@@ -76,8 +76,6 @@ def approach_weights(
     """Bound the change of each pair's distance by each joint's speed, widened against rounding.
 
     Args:
-        chain: The joints.
-        bodies: The bodies.
         pairs: (pairs, 2) indices of bodies.
         strokes: (nq,) greatest |q| in the motion.
 

@@ -108,7 +108,6 @@ def bound_obstacles(
     Args:
         lanes: How many configurations, a multiple of eight.
         units: The units.
-        obstacles: The obstacles.
         middles: (units · 3 · BATCH,).
         best: (3 · BATCH,), the first row lowered.
     """
@@ -172,9 +171,7 @@ def near_obstacle(
 
     Args:
         units: The units.
-        unit: The body.
         obstacle: Its row in `PackedObstacles.data`.
-        kind: Its class.
         first: First configuration.
         stop: One past the last, at most `WORD` on.
         middles: (units · 3 · BATCH,).
@@ -235,8 +232,6 @@ def near_pair(
 
     Args:
         units: The units.
-        one: One of them.
-        two: The other.
         row: Row of `best`.
         first: First configuration.
         stop: One past the last, at most `WORD` on.

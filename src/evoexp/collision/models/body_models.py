@@ -47,9 +47,6 @@ class CollisionModel(Component):
     def bind(self, assembly: Assembly) -> "BodyModel":
         """Return the model of a robot.
 
-        Args:
-            assembly: The robot.
-
         Raises:
             UnsupportedShape: If a body cannot be covered.
         """
@@ -169,7 +166,6 @@ class BodyModel(NamedTuple):
         """Return the collision model among obstacles.
 
         Args:
-            obstacles: The obstacles.
             ignored: Pairs (body, obstacle) that may touch.
             carried: An object that is part of the robot now; its number is one past the bodies'.
         """
@@ -197,7 +193,6 @@ class BodyModel(NamedTuple):
         """Return the model of the pairs that may touch: what is inside of bodies must stay free.
 
         Args:
-            obstacles: The obstacles.
             allowed: Pairs (body, obstacle) that may touch.
             depth: How deep they may overlap [length unit].
             carried: See `collision`.

@@ -57,7 +57,6 @@ def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
     """Sort the pairs of a robot's bodies.
 
     Args:
-        assembly: The robot.
         shapes: The covers of its bodies.
     """
     items = list(assembly.geometry.geometryObjects)
@@ -184,7 +183,6 @@ def _grid(
     """Return configurations on a grid, and a bound of a distance's change within half a step.
 
     Args:
-        assembly: The robot.
         moving: Indices of the coordinates that the grid spans.
         way: (nq,) bound of |d distance / dq| by coordinate.
         size: Values per coordinate.

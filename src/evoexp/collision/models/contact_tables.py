@@ -109,11 +109,9 @@ def contact_tables(
     """Return the tables of a robot among obstacles.
 
     Args:
-        chain: The joints.
         units: Bodies, then parts of bodies.
         shapes: Spheres of the units.
         listed: (entries, 2) obstacles that bodies are checked against; see `PackedObstacles`.
-        obstacles: The obstacles.
         pairs: (pairs, 3) of parts, those of two bodies side by side.
         bodies: (pairs,) the two bodies of each.
         parts: (bodies,) indices of the units that are each body's parts, side by side.

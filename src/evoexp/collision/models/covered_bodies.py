@@ -39,7 +39,6 @@ class CoveredBodies(Component):
         """Return the model of a robot among obstacles.
 
         Args:
-            assembly: The robot.
             obstacles: What does not move.
             ends: (nq, ends) start and goal [deg], which the model lets be free.
             ignored: Pairs (body, obstacle) that may touch.

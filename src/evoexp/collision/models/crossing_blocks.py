@@ -73,7 +73,6 @@ def fill_table(
         points: (K, 4, N) elbow x, y, tip x, y.
         base: Of the population's arm.
         other: Base of the other arm.
-        members: The individuals.
         scale: A power of two.
         is_first: Whether this is arm 1, whose reaches are written one by one; else those of blocks
             are.
@@ -124,7 +123,6 @@ def load_arms(
         num: Number of individuals there.
         members: See `fill_table`; if they are as many as there are individuals, they are in order.
         first: A multiple of eight.
-        k: The configuration.
         own: (32,) scratch.
     """
     o, last = U(4 * k * num + first), len(members) - 1

@@ -111,9 +111,6 @@ def paths_collide(
         starts: (N, individuals) joint angles at the start of each path, relative [rad].
         ends: (N, individuals) at its end.
         lanes: (≥ count) indices of the individuals to test.
-        count: How many.
-        arm: The arm.
-        ellipses: The ellipses.
         path: The positions that are tested.
         hit: (individuals,) written for those tested: whether each collides.
     """
@@ -180,13 +177,6 @@ def check_paths(
 
     Args:
         starts: As of `paths_collide`, and so are all but `checks`.
-        ends: See there.
-        lanes: See there.
-        count: See there.
-        arm: See there.
-        ellipses: See there.
-        path: See there.
-        hit: See there.
         checks: Of `prepare_checks`; given, so that inner loops count no references.
     """
     starts, ends, lanes, arm, ellipses, hit, (boxes, memory) = borrowed(
@@ -282,12 +272,9 @@ def _test_links(
     """Lower `gaps` where a link, or a chord since the position before, meets an ellipse.
 
     Args:
-        ellipses: The ellipses.
-        boxes: Theirs.
         memory: With link ends and outcodes.
         now: Where the link ends of this position are.
         chords: Whether chords are tested.
-        gaps: The least so far.
     """
     x, y, codes, before = memory.x[now], memory.y[now], memory.codes, 1 - now
     for vector in range(codes.shape[1]):

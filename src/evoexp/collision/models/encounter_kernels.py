@@ -132,11 +132,7 @@ def body_meets_obstacles(
     Args:
         at: First encounter of the list.
         kind: Class of the obstacles.
-        unit: The body.
         units: Bodies and parts.
-        shapes: Their shapes.
-        obstacles: The obstacles.
-        near: The list.
         frames: Frames of all joints and blocks.
     """
     runs, spheres, capsules = shapes.runs, shapes.spheres, shapes.capsules
@@ -187,8 +183,6 @@ def body_meets_body(
         one: First unit, whose shapes are constants.
         two: Second unit.
         units: See `body_meets_obstacles`, as for the next.
-        shapes: See there.
-        near: The list.
         frames: Frames of all joints and blocks.
         centers: (≥ most · POINT,) scratch.
     """

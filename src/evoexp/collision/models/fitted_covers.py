@@ -25,7 +25,6 @@ def fitted_covers(
 
     Args:
         bodies: The bodies, covered.
-        table: The obstacles.
         ignored: Pairs (body, obstacle) that may touch.
         q: (nq, configurations) [rad] at which nothing touches.
     """

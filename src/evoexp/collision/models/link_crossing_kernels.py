@@ -67,9 +67,7 @@ def link_points(
     Args:
         q: (K, 2, N) angles of the links from +x [rad].
         base_x: Of the first joint [length unit].
-        base_y: Likewise.
         first_length: Of the first link [length unit].
-        second_length: Of the second.
         out: (K, 4, N), written: elbow x, y, tip x, y.
     """
     num = q.shape[2]

@@ -151,8 +151,6 @@ def _first_contact(
     Args:
         start: (N,) joint angles at the start [rad].
         end: (N,) at the end.
-        arm: The arm.
-        ellipses: The ellipses.
         num_positions: M.
         chords: Whether chords are swept.
 

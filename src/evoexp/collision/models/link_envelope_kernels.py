@@ -154,14 +154,10 @@ def _lines(
 
     Args:
         across: Distance of the beginning of the second link from the first's line.
-        turned: The other way round.
         sine: Of the angle from the first link to the second.
-        cosine: Of it.
         length_1: Of the first link.
         half_1: Its half width.
-        length_2: Of the second link.
         half_2: Its half width.
-        least: So far.
     """
     shift, step = half_2 * cosine, length_2 * sine
     twist, fall = half_1 * cosine, length_1 * sine

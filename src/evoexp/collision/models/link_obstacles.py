@@ -64,7 +64,6 @@ def count_obstacle_collisions(arm: Arm, points: FloatArray, obstacles: PlanarObs
     """Count the configurations in which a link meets an obstacle, per individual, (N,).
 
     Args:
-        arm: The arm.
         points: (K, 4, N) from `Arm.points`.
         obstacles: From `planar_obstacles`.
 
@@ -125,7 +124,6 @@ def _segments(
 
     Args:
         lines: (4, n) x, y, x, y of the ends.
-        obstacles: The obstacles.
         arm_size: Greatest coordinate of a segment [length unit].
         hit: (n,), to which the numbers are added.
     """
@@ -163,7 +161,6 @@ def _circles(
     Args:
         tips: (2, n) x, y of the points.
         radius: The radius [length unit].
-        obstacles: The obstacles.
         arm_size: Greatest coordinate of a circle [length unit].
         hit: (n,), to which the numbers are added.
     """

@@ -39,8 +39,6 @@ def nearest_to_obstacle(
     """Lower a distance to the least signed one of some centres from an obstacle's surface.
 
     Args:
-        obstacles: The obstacles.
-        o: Which of them.
         centers: (spheres · POINT,).
         first: First sphere.
         stop: One past the last.

@@ -92,7 +92,6 @@ def link_lines(
     """Return the circles of every link as equal steps along a line.
 
     Args:
-        chain: The joints.
         joint: (circles,) index into the kinematic table.
         local: (circles, 3) centres in the table's frames [length unit].
         radius: Of every circle.
@@ -124,7 +123,6 @@ def contacts(tables: CircleTables, q: FloatArray, start: int, out: FloatArray) -
     """Decide which configurations collide.
 
     Args:
-        tables: The tables.
         q: (nq, configurations) [deg], contiguous.
         start: The first one that is asked for.
         out: (configurations − start,) written: negative where circles overlap.
@@ -256,8 +254,6 @@ def _between_arms(
     """Lower squared distances to the least ones of circles of two arms.
 
     Args:
-        arm_links: See `LinkBalls`.
-        line: See `LinkLines`.
         limit: Squared distance at which circles touch [length unit²].
         slack: Squared distances nearer to the limit than this are in doubt.
         lines: (links · OF_LINE,).

@@ -64,7 +64,6 @@ def spheres_to_boxes(
 
     Args:
         motion: From the body's frame to the boxes'.
-        core: Of the boxes.
         runs: (runs, 2) first and one-past-last sphere of equal radius.
         spheres: (spheres, 4) centres in the body's frame, and radii.
         first: First run of the body.
@@ -160,7 +159,6 @@ def spheres_to_spheres(
     Args:
         runs: See `spheres_to_boxes`.
         spheres: See `spheres_to_boxes`.
-        one: The run.
         other: First run of the other body.
         other_stop: One past its last.
         centers: Of `move_spheres`, of the other body.

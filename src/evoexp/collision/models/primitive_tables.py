@@ -88,8 +88,6 @@ def pack_shapes(
     """Pack the shapes of all bodies, body by body and part by part.
 
     Args:
-        table: The kinematic table.
-        shapes: All shapes.
         numbers: (bodies,) of the bodies.
         joints: (bodies,) that move them.
 
@@ -236,7 +234,6 @@ def pack_obstacles(
     A body is checked against all but the ignored ones; bodies of the world against none.
 
     Args:
-        obstacles: The obstacles.
         numbers: (bodies,) of the bodies.
         joints: (bodies,) that move them.
         ignored: Pairs (body's number, obstacle).

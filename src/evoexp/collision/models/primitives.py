@@ -133,7 +133,6 @@ class PrimitiveCollision(NamedTuple):
             model: `pin.Model` whose joints have one coordinate each.
             shapes: Its spheres and capsules; those of the world (a pedestal) are checked against
                 bodies only.
-            obstacles: The obstacle table.
             pairs: Bodies that are checked against each other, by their numbers (the joints', unless
                 shapes have others); `default_pairs` if not given.
             ignored: Pairs (body, obstacle) that are not checked: the floor that the first link

@@ -294,7 +294,6 @@ def segment_to_segments(
 
     Args:
         capsule: See `segment_to_points`.
-        segments: The others.
         other: 1 / squared length of the others.
         both: Sum of both radii [length unit].
         least: The clearance so far [length unit].

@@ -65,7 +65,6 @@ def varied_spheres(solid: Solid, inflation: float, most: int, farthest: float) -
     """Cover a convex body with balls that reach as far as asked, or as little more as they can.
 
     Args:
-        solid: The body.
         inflation: How far the balls may reach beyond it [length unit].
         most: Number of balls that is not exceeded; where so many do not suffice, the inflation
             grows.

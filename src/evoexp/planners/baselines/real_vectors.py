@@ -41,7 +41,6 @@ def check_real_coded(planner: Planner, name: str) -> None:
 
     Args:
         planner: The planner beside which a control stands.
-        name: Of the control.
 
     Raises:
         SettingError: If it is one.
@@ -56,7 +55,6 @@ def real_vectors(planner: Planner, problem: Any, drawn: FloatArray) -> RealVecto
 
     Args:
         planner: A real-coded planner, which has `bounds(problem)`.
-        problem: Its problem.
         drawn: Individuals of its `sample`, individuals last.
 
     Raises:

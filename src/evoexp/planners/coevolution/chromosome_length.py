@@ -53,7 +53,6 @@ def length_notes(
     """Compare this chromosome, line by line, with Eqs. 2 and 3 and with the paper's numbers.
 
     Args:
-        limit: Of the speed.
         lengths: (robots, 2) of the links [length unit].
         start: (robots, 2) link angles [rad].
         goal: (robots, 2) [rad].

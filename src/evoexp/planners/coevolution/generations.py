@@ -147,7 +147,6 @@ class TeamSearch(TableSearch):
 
         Args:
             planner: A `Coevolution`.
-            problem: Its problem.
         """
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size

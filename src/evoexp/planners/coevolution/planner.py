@@ -127,7 +127,6 @@ class Coevolution(PlannerDefaults, Component):
         """Evaluate everybody of populations against everybody of the other robots (Eq. 4).
 
         Args:
-            problem: The problem.
             populations: (robots, 2 K, individuals).
         """
         collision, objective = problem.collision, self.objective

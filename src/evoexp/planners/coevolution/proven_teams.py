@@ -22,7 +22,6 @@ class ProvenTeams:
 
         Args:
             planner: A `Coevolution` whose `acceptance` is not `model`.
-            problem: Its problem.
         """
         self._planner, self._problem = planner, problem
         self._proofs = Proofs(planner, problem)

@@ -82,7 +82,6 @@ class RedundantGa(PlannerDefaults, Component):
         """Yield the generations of SP1 and SP2 in turn, until both are successful.
 
         Args:
-            problem: The prepared task.
             rng: Source of all random numbers.
             kind: What searches a sub-path: the genetic algorithm, or a control in its place.
         """

@@ -69,7 +69,6 @@ class Search(TableSearch):
 
         Args:
             planner: A `RedundantGa`.
-            problem: Its problem.
             rng: Source of all random numbers.
         """
         ga, limits = planner.ga, problem.joint_limits

@@ -81,7 +81,6 @@ def judge_paths(starts: FloatArray, ends: FloatArray, judging: Judging) -> Float
     Args:
         starts: (joints, individuals) [rad].
         ends: (joints, individuals) [rad].
-        judging: See `Judging`.
     """
     count = starts.shape[1]
     results, lanes = np.empty((RESULTS, count)), np.empty(count + LANES, dtype=np.int64)

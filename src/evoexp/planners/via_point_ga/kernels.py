@@ -249,7 +249,6 @@ def judge(strings: FloatArray, arm_slices: IntArray, judging: Judging, terms: St
     Args:
         strings: (nq, N + 1, individuals).
         arm_slices: See `advance`.
-        judging: Settings.
         terms: Written.
     """
     substeps, (nq, num_points, lanes) = judging.substeps, strings.shape

@@ -23,7 +23,6 @@ class Search(TableSearch):
 
         Args:
             planner: A `ViaPointGa`.
-            problem: Its problem.
             strings: Its steps on this problem.
             per_call: Generations computed at once; None: as many as is best.
         """

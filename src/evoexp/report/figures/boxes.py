@@ -27,7 +27,6 @@ def draw_box(
         axes: To draw on.
         position: Of the box along the axis of conditions.
         values: (n,); inf: a run that never got there.
-        colour: Of the box.
         orientation: Direction in which values grow.
         never: Where infinite values are drawn: the box is that of all runs, and median, quartile or
             whisker may lie there. None: they are left out.

@@ -40,7 +40,6 @@ def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> Flo
     """Return the triangles of a body in its own frame, (triangles, 3 corners, 3).
 
     Args:
-        kind: See `Outline`.
         size: (3,) see there; what a kind does not need is ignored.
         corners: Of a mesh.
     """

@@ -38,7 +38,6 @@ def effort_table(
         shares: Name → how many runs of a condition.
         effort: Name with unit → effort of each run, (done,).
         confidence: Level of the intervals: Wilson's of shares, bootstrapped ones of efforts.
-        num_resamples: Of the bootstrap.
     """
     points = [
         (position, task.name, value, c)

@@ -1,5 +1,6 @@
 """The planner of Rana & Zalzala: its problem, its operators together, its degenerate cases."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -324,7 +325,7 @@ def test_arms_and_obstacles_have_margins_of_their_own() -> None:
         free += 1
         for share, other, expected in ((0.8, 0.8, True), (1.01, 0.8, False), (0.8, 1.01, False)):
             own = {"security_margin": share * arms, "obstacle_margin": other * obstacles}
-            found = judge_motion(planner, problem._replace(**own), motion)
+            found = judge_motion(planner, dataclasses.replace(problem, **own), motion)
             assert found.certified_margin is expected
     assert free >= 3
 

@@ -3,12 +3,11 @@
 The first signal raises `Interrupted`, by which everything is closed that a command has open. While
 that lasts, further signals do nothing: whoever presses Ctrl-C again disturbs nothing.
 
-The exception can be lost: Python drops those that are raised within callbacks of its garbage
-collector and of its imports, and a library may catch it with a bare `except:`. Closing can wait for
-somebody who is gone. A timer therefore raises it again where it is not under way any more, or where
-closing takes longer than `PATIENCE_S`; after `CLOSING_S` the signal ends the process as if nobody
-heard it, which a shell tells by the same exit code. Nothing is lost by that: finished files are
-whole at any moment.
+The exception can be lost: Python drops exceptions raised in callbacks of its garbage collector and
+import system, and a library may catch it with a bare `except:`. Closing can hang. A timer therefore
+raises the exception again when it was lost, or when closing takes longer than `PATIENCE_S`; after
+`CLOSING_S` the signal ends the process by its default action, with the same exit code in a shell.
+No result is lost: finished files are complete at any moment.
 """
 
 import os

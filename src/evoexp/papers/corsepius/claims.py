@@ -1,7 +1,7 @@
 """The claims of Corsépius 2001: on tasks, and on the size of the population, metric by metric."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -98,7 +98,8 @@ def _redundant(judge: kit.Judge, arms: list[kit.ConditionResults]) -> kit.Claim:
 
 def _planning_time(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Claim]:
     """Set the planning time that the paper prints beside ours."""
-    goals = [phase.goal for phase in condition.condition.scenario.phases]  # type: ignore[attr-defined]
+    scenario: Any = condition.condition.scenario
+    goals = [phase.goal for phase in scenario.phases]
     if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
         return
     milliseconds = 1e3 * measures.usual_seconds(condition)

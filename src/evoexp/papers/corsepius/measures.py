@@ -125,7 +125,8 @@ def reasons(condition: kit.ConditionResults) -> dict[str, kit.Proportion]:
 
 def phase_names(condition: kit.ConditionResults) -> tuple[str, ...]:
     """Return the names of the phases, sub-goals first."""
-    return tuple(phase.name for phase in condition.condition.scenario.all_phases)  # type: ignore[attr-defined]
+    scenario: Any = condition.condition.scenario
+    return tuple(phase.name for phase in scenario.all_phases)
 
 
 def tolerances(condition: kit.ConditionResults) -> tuple[float, ...]:

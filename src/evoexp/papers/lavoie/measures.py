@@ -1,6 +1,6 @@
 """Measures of Lavoie & Boudreau 2001 that several pages share: errors, effort, refuted motions."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,7 +64,8 @@ def tests_per_second(condition: kit.ConditionResults) -> FloatArray:
     They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
     Chords are not counted.
     """
-    pairs = kit.num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    scenario: Any = condition.condition.scenario
+    pairs = kit.num_joints(condition) * len(scenario.obstacles)
     return np.asarray(pairs * condition.column("collision_queries") / kit.search_seconds(condition))
 
 

@@ -301,7 +301,7 @@ def num_cores() -> int:
 
 @contextlib.contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """Block the signals that end a batch in processes started meanwhile; the parent handles them."""
+    """Block the signals that end a batch in processes started meanwhile: the parent has them."""
     numbers = [getattr(signal, name) for name in _OF_THE_PARENT]
     before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
     try:

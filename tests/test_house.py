@@ -9,6 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted(
@@ -77,6 +78,12 @@ def test_every_experiment_says_its_command_and_content() -> None:
         assert first == "# @package _global_", path
         assert second == f"# evoexp run experiment={path.stem}"
         assert third.startswith("# ") and len(third) > 20, path
+
+
+def test_no_shipped_option_names_the_choice_of_another_group() -> None:
+    """`Composer` joins compositions of shipped options because of this."""
+    for path in OPTIONS:
+        assert "${" not in str((yaml.safe_load(path.read_text()) or {}).get("defaults")), path
 
 
 def test_files_functions_and_lines_are_short() -> None:

@@ -18,7 +18,7 @@ from evoexp import shipped
 from evoexp.configuration import compose
 from evoexp.configuration.compose import expand
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.overrides import collect
+from evoexp.configuration.overrides import Override, collect
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from matrix import examples
@@ -102,6 +102,51 @@ def test_settings_are_as_hydra_itself_sets_them(words: tuple[str, ...]) -> None:
     with TemporaryDirectory() as root:
         composed = compose.Composer(Path(root), experiment)(chosen)
     assert composed.config == by_hydra
+
+
+def test_compositions_are_joined_where_each_changes_other_groups(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment = find("experiment", "chen_placement")
+    known, asked = compose.Composer(tmp_path, experiment), list[list[str]]()
+    by_hydra = known.by_hydra
+    monkeypatch.setattr(known, "by_hydra", lambda words: asked.append(words) or by_hydra(words))
+
+    def choices(*words: str) -> dict[str, Override]:
+        return collect(map(compose.parse, words))
+
+    link = ("objective=chen_minimax", "scenario=chen_docking_link")
+    single = (
+        "objective=chen_manipulability",
+        "control=random_search",
+        "reference=placement_optimum",
+    )
+    for words in ((), link, *((word,) for word in single)):
+        known.chosen(choices(*words))
+    for words in ((*link, "control=random_search"), single[:2]):
+        with TemporaryDirectory() as root:
+            fresh = compose.Composer(Path(root), experiment)
+            assert known.chosen(choices(*words)) == fresh.chosen(choices(*words))
+    assert len(asked) == 5
+
+
+def test_an_option_may_choose_another_by_the_name_of_a_third(
+    write_experiment: Callable[..., None], tmp_path: Path
+) -> None:
+    for group in ("collision", "objective/by"):
+        (tmp_path / group).mkdir(parents=True)
+    (tmp_path / "collision/mine.yaml").write_text("defaults: [rana_planar]\n")
+    (tmp_path / "objective/mine.yaml").write_text(
+        "defaults: [rana_planar, {by@_here_: '${collision}'}]\n"
+    )
+    for name, weight in (("mine", 3), ("rana_planar", 2)):
+        (tmp_path / f"objective/by/{name}.yaml").write_text(f"collision_weight: {weight}\n")
+    write_experiment(
+        "mine",
+        "  A: []\n  B: [objective=mine]\n  C: [collision=mine]\n"
+        "  D: [objective=mine, collision=mine]",
+    )
+    assert len(set(ids("experiment=mine").values())) == 3
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)

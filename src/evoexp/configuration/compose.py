@@ -144,7 +144,7 @@ class Composer:
                 experiment that is given as a file: of a user's folders only the options count.
         """
         self.root, self.file = root, file
-        self._known: dict[tuple[str, ...], Composed] = {}
+        self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options
         shutil.copy(shipped.config_directory() / "config.yaml", root)
         (root / EXPERIMENT).mkdir()
         for folder in folders():
@@ -170,9 +170,9 @@ class Composer:
         words = [_choosing(override) for override in choices.values()]
         names = {group: override.option() for group, override in choices.items()}
         if file is not None:
-            words.append(f"{EXPERIMENT}={_quoted(file.name)}")
             names[EXPERIMENT] = file.origin if is_file(file.origin) else file.name
-        key = tuple(words)
+        if (key := frozenset(words)) not in self._known and (joined := self._joined(key)):
+            self._known[key] = joined
         if key not in self._known:
             if file is not None and is_file(file.origin):
                 check_file(Path(file.path))
@@ -183,8 +183,41 @@ class Composer:
                 raise uncomposed(error, names, file) from None
         return self._known[key]
 
+    def _joined(self, words: frozenset[str]) -> Composed | None:
+        """Join known compositions of some of the words each, if each changed other groups.
+
+        None where words are left over, where two compositions changed the same group, and where a
+        user's option is taken: only of shipped ones it is known that none names another's choice.
+        """
+        pieces: list[Composed] = []
+        rest = words
+        for known in sorted(self._known, key=len, reverse=True):
+            if known and known <= rest:
+                pieces.append(self._known[known])
+                rest -= known
+        plain = self._known.get(frozenset())
+        if plain is None or rest:
+            return None
+        config, options = dict(plain.config), {each.group: each for each in plain.options}
+        changed = set[str]()
+        for piece in [plain, *pieces]:
+            if any(each.origin != shipped.ORIGIN for each in piece.options):
+                return None
+            taken = {each.group: each for each in piece.options}
+            changes = _differing(plain.config, piece.config)
+            choices = _differing({each.group: each for each in plain.options}, taken)
+            if (changes | choices) & changed:
+                return None
+            changed |= changes | choices
+            config = _replaced(config, piece.config, changes)
+            options = _replaced(options, taken, choices)
+        ordered = dict.fromkeys([EXPERIMENT, *groups()])
+        return Composed(config, tuple(options[group] for group in ordered if group in options))
+
     def by_hydra(self, words: list[str]) -> Composed:
         """Have Hydra compose options, chosen by words of its own grammar."""
+        if self.file is not None:
+            words = [*words, f"{EXPERIMENT}={_quoted(self.file.name)}"]
         words = [*words, *_NO_JOB, f"hydra.searchpath=[{self._path}]"]
         with hydra.initialize_config_dir(str(self.root), version_base="1.3"):
             composed = hydra.compose("config", overrides=words, return_hydra_config=True)
@@ -201,6 +234,18 @@ class Composer:
         named = ((group, taken.get(group)) for group in groups() if group != EXPERIMENT)
         options = tuple(find(group, name) for group, name in named if name)
         return Composed(config, options if self.file is None else (self.file, *options))
+
+
+def _differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> set[str]:
+    """Return the keys that only one of two mappings has, or with another value."""
+    both = one.keys() & other.keys()
+    return (one.keys() ^ other.keys()) | {key for key in both if one[key] != other[key]}
+
+
+def _replaced(values: dict[str, Any], other: Mapping[str, Any], keys: set[str]) -> dict[str, Any]:
+    """Return values with those of another mapping for some keys; a key it lacks is left out."""
+    rest = {key: value for key, value in values.items() if key not in keys}
+    return rest | {key: other[key] for key in keys & other.keys()}
 
 
 def _choosing(override: Override) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import cast
 
 from evoexp.commands.console import say
-from evoexp.commands.stored_runs import origin_of, stored_runs
+from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import options
 from evoexp.errors import EvoexpError, NothingStored
 from evoexp.registry import CLAIMS, names, registered
@@ -16,6 +16,7 @@ from evoexp.report.claim_rules import Rules
 from evoexp.report.home_page import Paper, StoredRun, home_page, summaries
 from evoexp.report.html_page import HTML
 from evoexp.store.files import write_file
+from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written

@@ -1,7 +1,6 @@
 """Stored runs as commands name them: by a prefix of a hash."""
 
 from pathlib import Path
-from typing import Any
 
 from evoexp import shipped
 from evoexp.configuration import compose
@@ -9,7 +8,6 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
 from evoexp.shipped import Shipped
-from evoexp.store.run_context import origin
 from evoexp.store.run_directory import RunDirectory, open_run, outputs_root, resolve, run_names
 
 MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
@@ -71,12 +69,3 @@ def _with_candidates(error: UnknownHash, prefix: str) -> UnknownHash:
     more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
     stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
     return UnknownHash(f"{error}; no shipped condition either (stored: {stored}; see: evoexp list)")
-
-
-def origin_of(run: RunDirectory) -> dict[str, Any]:
-    """Return `run_context.origin` of a run; of one whose manifest is lost by its hash alone."""
-    try:
-        notes = run.manifest()
-    except EvoexpError:
-        notes = {}
-    return origin(notes, run.condition_id)

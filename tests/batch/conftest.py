@@ -38,8 +38,11 @@ def faulty() -> Condition:
     return experiment.conditions[0].condition
 
 
-@pytest.fixture
-def undisturbed(faulty: Condition, tmp_path: Path) -> dict[int, str]:
+@pytest.fixture(scope="session")
+def undisturbed(plug_in: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[int, str]:
     """Return the digests that every way of running it must come to."""
-    run(tmp_path / "undisturbed", (faulty, 12))
-    return digests(tmp_path / "undisturbed", faulty)
+    outputs = tmp_path_factory.mktemp("undisturbed")
+    with on_path(plug_in, HERE):
+        condition = compose.expand(WORDS)[0].conditions[0].condition
+        run(outputs, (condition, 12))
+        return digests(outputs, condition)

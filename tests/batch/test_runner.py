@@ -86,20 +86,6 @@ def test_a_damaged_replicate_runs_again_though_fewer_are_asked_for(
     assert run(tmp_path, (faulty, 1)) == []
 
 
-def test_a_lost_manifest_is_taken_from_a_log_and_one_that_is_there_stays(
-    faulty: Condition, tmp_path: Path
-) -> None:
-    run(tmp_path, (faulty, 1))
-    path = RunDirectory(tmp_path, faulty.id).path / "manifest.json"
-    before = path.read_bytes()
-    run(tmp_path, (faulty, 2))
-    assert path.read_bytes() == before
-    path.unlink()
-    with pytest.warns(DamagedStore, match=r"manifest\.json"):
-        run(tmp_path, (faulty, 3))
-    assert json.loads(path.read_bytes())["restored_from"] == "0000.mcap"
-
-
 def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -293,18 +279,6 @@ def test_stopping_keeps_what_is_finished_and_leaves_no_lock(
         assert directory.completed() == {0, 1}
     assert directory.summary_path.exists()
     assert [outcome.replicate for outcome in run(tmp_path, (faulty, 4))] == [2, 3]
-
-
-def test_what_a_killed_writer_left_is_cleared_away(faulty: Condition, tmp_path: Path) -> None:
-    run(tmp_path, (faulty, 2))
-    directory = RunDirectory(tmp_path, faulty.id)
-    whole = directory.log_path(1).read_bytes()
-    directory.log_path(1).unlink()
-    left = directory.replicates / f".0001.mcap.{os.getpid()}.tmp"
-    left.write_bytes(whole[: len(whole) // 2])
-    assert read_summaries(directory)["replicate"].tolist() == [0]
-    assert [outcome.replicate for outcome in run(tmp_path, (faulty, 2))] == [1]
-    assert not left.exists()
 
 
 def test_a_clock_that_is_set_back_changes_nothing(

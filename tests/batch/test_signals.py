@@ -30,7 +30,6 @@ from matrix import examples
 
 PROGRESS = re.compile(r".{0,20}replicates|.*\d+/12 +\d+ failed")
 LINE = f"evoexp: interrupted; {KEPT}"
-MOMENTS_S = (0.2, 0.4, 0.6, 0.9, 1.2, 1.5, 2.0, 2.5, 3.5)  # after the command was started
 
 
 class Terminal:
@@ -153,6 +152,7 @@ def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path)
     assert not list(folder.rglob("*.tmp"))
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("way", WAYS)
 def test_a_batch_ends_in_one_line_and_goes_on(
     way: Callable[[Terminal], None],
@@ -181,19 +181,22 @@ def wait_for_logs(directory: RunDirectory, count: int, window: Terminal) -> None
         window.look(0.02)
 
 
-EXAMPLES = ((repeatedly, 0.2), (terminate_all, 0.9), (repeatedly, 1.5))
+STARTING = {"libraries": 1, "server": 2, "workers": 4}  # processes there are at the least
+EXAMPLES = ((repeatedly, "libraries"), (terminate_all, "server"))
 
 
 @pytest.mark.parametrize(
-    ("way", "moment_s"),
-    examples([(way, moment) for way in WAYS for moment in MOMENTS_S], EXAMPLES.__contains__),
+    ("way", "step"),
+    examples([(way, step) for way in WAYS for step in STARTING], EXAMPLES.__contains__),
 )
-def test_any_moment_will_do(
-    way: Callable[[Terminal], None], moment_s: float, tmp_path: Path, plug_in: Path
+def test_a_batch_that_starts_ends_in_one_line(
+    way: Callable[[Terminal], None], step: str, tmp_path: Path, plug_in: Path
 ) -> None:
-    """While it starts, compiles, or runs: the assertions hold at all moments."""
+    """While it loads libraries, starts its server, or has all of its workers."""
     with terminal(tmp_path / "outputs", plug_in, "hang:0,1,2,3") as window:
-        window.look(moment_s)
+        while len(alive(window.process.pid)) < STARTING[step]:
+            window.look(0.01)
+            assert window.process.poll() is None, window.shown
         way(window)
         check_ended(window, way, tmp_path)
 
@@ -236,7 +239,7 @@ def test_a_library_that_catches_everything_does_not_keep_a_batch_alive(
             signal.raise_signal(signal.SIGTERM)
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
-            time.sleep(0.01)
+            pass
 
     with pytest.raises(Interrupted):
         go_on()

@@ -133,6 +133,7 @@ sys.exit(cli.main())
 """
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
 def test_workers_end_with_their_parent_whatever_they_do(name: str) -> None:
     number = getattr(signal, name)

@@ -11,11 +11,15 @@ import pytest
 from evoexp.cli import main
 from evoexp.commands.command_process import LEAST_MB, MEGABYTE, memory_shortage
 from evoexp.errors import SettingError
-from matrix import counts
+from matrix import counts, examples
 
 RUN = ("run", "experiment=rana_planar", "budget=smoke", "--no-report", "num_replicates=2")
 SERIAL, WORKERS = (*RUN, "runner=serial"), (*RUN, "runner.num_workers=2")
-SMALL_MB = (40, 150, 200, 300, 450, 600) if counts(0, 1) == 0 else range(20, 1200, 20)
+MEGABYTES = (40, 150, 200, 300, 450, 600) if counts(0, 1) == 0 else range(20, 1200, 20)
+CASES = examples(
+    [(words, megabytes) for words in (("list",), SERIAL, WORKERS) for megabytes in MEGABYTES],
+    lambda case: case in ((("list",), 40), (SERIAL, 200), (WORKERS, 450)),
+)
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of addresses are kept here")
 
@@ -34,8 +38,7 @@ def run_within(megabytes: int, outputs: Path, *words: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("words", [("list",), SERIAL, WORKERS], ids=["list", "serial", "workers"])
-@pytest.mark.parametrize("megabytes", SMALL_MB)
+@pytest.mark.parametrize(("words", "megabytes"), CASES)
 def test_it_is_one_line(words: tuple[str, ...], megabytes: int, tmp_path: Path) -> None:
     code, complaint = run_within(megabytes, tmp_path / "outputs", *words)
     if code != 0:

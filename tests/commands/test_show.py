@@ -216,7 +216,8 @@ UNFIT = {
 
 
 @pytest.mark.parametrize(
-    ("what", "more"), zip(UNFIT, [("--json",), ("--only", "via-point GA"), ("--all",)], strict=True)
+    ("what", "more"),
+    list(zip(UNFIT, [("--json",), ("--only", "via-point GA"), ("--all",)], strict=True)),
 )
 def test_what_cannot_be_built_is_refused(
     refused: Refused, what: str, more: tuple[str, ...]

@@ -246,6 +246,7 @@ def test_where_every_replicate_failed_there_is_still_a_table_and_exit_code_1(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
+    blank_figures: None,
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
     monkeypatch.setenv("FAULTY", "raise:0,1")

@@ -151,8 +151,7 @@ def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path)
     assert not list(folder.rglob("*.tmp"))
 
 
-@pytest.mark.examples(2)
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", examples(WAYS, lambda way: way is terminate))
 def test_a_batch_ends_in_one_line_and_goes_on(
     way: Callable[[Terminal], None],
     faulty: Condition,

@@ -38,26 +38,6 @@ def blind(outputs: Path) -> ConditionResults:
     ).conditions[0]
 
 
-def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
-    directory = smoke_report(outputs, "lavoie")
-    assert {"fig_1_start", "fig_2_solution", "fig_3_error", "attempts"} <= figure_stems(directory)
-    text = (directory / "index.md").read_text()
-    assert text.count("**not judged (budget smoke)**") == 10
-    assert text.count("**not judged**") == 3  # those that need controls or a sweep
-    assert "(-15, -5) instead of (-5, -15): the start is not free of collision: link " in text
-    assert "tests of a link against an ellipse per second of search" in text
-    assert "convergence" not in figure_stems(directory)
-
-
-@pytest.mark.matrix
-def test_one_arm_has_a_page_of_its_own(outputs: Path) -> None:
-    directory = smoke_report(outputs, "lavoie_10dof")
-    text = (directory / "index.md").read_text()
-    assert "a position error below 1 in 99.1 % of runs" in text
-    assert "93.5 %" not in text
-    assert "does better than that of seven" not in text
-
-
 def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports of thousands of runs live on summaries and solutions."""
 

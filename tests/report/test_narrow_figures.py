@@ -95,6 +95,7 @@ def words(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_text().strip() and text.get_visible()]
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize(
     ("draw", "page", "column"),
     [
@@ -112,6 +113,7 @@ def test_a_column_has_half_as_many_panels_side_by_side(
     assert (columns(at_width(draw, "page")), columns(at_width(draw, "column"))) == (page, column)
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize("draw", [lambda: row(1), lambda: row(3), lines, boxes, stack, coloured])
 def test_no_text_of_a_column_is_cut_off_or_lies_upon_another(draw: Callable[[], Figure]) -> None:
     figure = at_width(draw, "column")

@@ -192,11 +192,14 @@ def test_all_its_figures_are_drawn(swept: Results, width: Any) -> None:
 
 
 def test_the_command_draws_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    blank_figures: None,
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
     words = "experiment=rana_planar", *SMALL[1:3], "budget=smoke", "ga.num_elites=0,2"
-    assert main(["run", "-m", *words, "--only", "via-point GA", "report.dpi=40"]) == 0
+    assert main(["run", "-m", *words, "--only", "via-point GA"]) == 0
     (folder,) = (tmp_path / "reports").iterdir()
     text = (folder / "index.md").read_text()
     assert "## Effect of each setting" in text and "](motion_" in text

@@ -68,12 +68,15 @@ def main(arguments: argparse.Namespace) -> int:
         experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
         swept = ["-m"] if arguments.multirun else []
         command = ["evoexp", "run", *swept, *words, *folder_words(arguments.config_dir)]
+        labelled = [(each, label) for each in experiments for label, _ in each.conditions]
+        is_table = as_table and len(labelled) > 1  # which has no notes
         found = [
-            composed_facts(experiment, label, shlex.join([*command, "--only", label]))
-            for experiment in experiments
-            for label, _ in experiment.conditions
+            composed_facts(
+                experiment, label, shlex.join([*command, "--only", label]), noted=not is_table
+            )
+            for experiment, label in labelled
         ]
-        if len(found) > 1 and as_table:
+        if is_table:
             for experiment in experiments:
                 say(_condition_table(experiment, found))
             say("one condition on a screen: --only LABEL")

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from evoexp import shipped
-from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
@@ -57,6 +56,8 @@ def stored_or_shipped(prefix: str) -> RunDirectory | Shipped:
 
 def shipped_experiment(row: Shipped) -> Experiment:
     """Return the experiment of a shipped condition, with this condition alone."""
+    from evoexp.configuration import compose  # Hydra and Pinocchio, which `list` does not need
+
     words = [f"experiment={row.experiment}", f"budget={row.budget}"]
     return compose.expand(words, only=[row.label])[0]
 

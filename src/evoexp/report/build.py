@@ -4,11 +4,8 @@ import functools
 import hashlib
 import inspect
 import json
-import re
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
@@ -27,8 +24,6 @@ from evoexp.store.files import write_files
 from evoexp.version import __version__
 
 INDEX = "index.md"
-_RETURNS = re.compile(r"^Returns:\n((?:(?: .*)?\n?)+)", re.MULTILINE)
-_NAME = re.compile(r"`([A-Za-z_][\w.]*)`")
 _KINDS = {"b": "true or false", "i": "integer", "u": "integer", "f": "number"}
 
 
@@ -166,7 +161,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
             "file": f"{drawing.stem}.csv",
             "rows": len(table),
             "sha256": _sha256(rows),
-            # kinds of its columns, and what the docstring of its source says of them
+            # kinds of its columns, and what they hold
             "columns": {
                 str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
             },
@@ -197,37 +192,7 @@ def _sha256(content: bytes) -> str:
 
 
 def description(source: Callable[..., Any]) -> str:
-    """Return the words of a function's docstring on the table that it returns, as one line.
-
-    Where it names another table (`links_table`) or a list of columns (`COLUMNS`), that is told
-    behind it.
-    """
-    return " ".join(_told(source, set()))
-
-
-def _told(source: Callable[..., Any], told: set[str]) -> Iterator[str]:
+    """Return a function's docstring as one line."""
     while isinstance(source, functools.partial):
         source = source.func
-    text = inspect.getdoc(source) or ""
-    found = _RETURNS.search(text)
-    text = " ".join((found[1] if found else text).split())
-    yield text
-    module = sys.modules.get(getattr(source, "__module__", ""))
-    for name in dict.fromkeys(_NAME.findall(text)):
-        named = _named(module, name)
-        if named is None or name in told:
-            continue
-        told.add(name)
-        if isinstance(named, list | tuple):
-            yield f"`{name}`: {', '.join(map(str, named))}."
-        elif callable(named):
-            first, *more = _told(named, told)
-            yield " ".join([f"`{name}`: {first}", *more])
-
-
-def _named(module: Any, name: str) -> Any:
-    """Return the object of a dotted name in a module; of a module its `COLUMNS`."""
-    found = module
-    for part in name.split("."):
-        found = getattr(found, part, None)
-    return getattr(found, "COLUMNS", None) if isinstance(found, ModuleType) else found
+    return " ".join((inspect.getdoc(source) or "").split())

@@ -21,6 +21,7 @@ from evoexp.report.page_parts import (
     Verdict,
     provenance,
 )
+from evoexp.report.pages.page_words import WORDS
 from evoexp.report.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
@@ -168,30 +169,19 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
             exact = (*proven, found.solved_refuted, found.margin_broken)
         name = f"`{c.condition.id[:12]}`"
         rows.append((c.label, name, c.done, c.planned, c.failed, solved, *exact))
-    exact_heads = ("certified", "refuted", "undecided", "solved, yet refuted")
-    own = ("condition", "hash", "done", "planned", "failed", "solved")
-    headers = (*own, *exact_heads, "required margin not kept")
-    level = f"{100 * settings.confidence:g} %"
-    note = (
-        "\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's "
-        f'{level} interval. "Certified", "refuted": the exact verdict on the whole continuous '
-        'motion, by the distance of the bodies themselves; "required margin not kept": certified, '
-        "yet somewhere closer than the scenario's security margin."
-    )
-    return Table("Conditions", headers, tuple(rows), note)
+    return WORDS.table("conditions", rows, level=100 * settings.confidence)
 
 
 def _quantities(page: Page, results: Results) -> Table:
     labels = [c.label for c in results.with_data]
-    note = "Median [first quartile, third quartile] over finished replicates."
     heads = [f"{c.label} (n\u00a0=\u00a0{c.done})" for c in results.with_data]
     cells = [[markdown.spread(q.spreads[label]) for label in labels] for q in page.quantities]
     if len(labels) > WIDEST:
         names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
-        below = tuple(zip(heads, *cells, strict=True)) if cells else ()
-        return Table("Results", ("condition", *names), below, note)
+        below = zip(heads, *cells, strict=True) if cells else ()
+        return WORDS.table("results", below)._replace(headers=("condition", *names))
     rows = [(q.name, q.unit, *own) for q, own in zip(page.quantities, cells, strict=True)]
-    return Table("Results", ("quantity", "unit", *heads), tuple(rows) * bool(labels), note)
+    return WORDS.table("results", rows * bool(labels), behind=heads)
 
 
 def _claims(claims: Sequence[Claim]) -> Table:
@@ -199,8 +189,7 @@ def _claims(claims: Sequence[Claim]) -> Table:
         (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
         for c in claims
     ]
-    headers = ("claim", "verdict", "evidence", "n", "rule", "paper")
-    return Table(CLAIMS, headers, tuple(rows))
+    return WORDS.table("claims", rows)
 
 
 def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettings) -> Table:
@@ -217,17 +206,8 @@ def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettin
         )
         for c in rows
     ]
-    tests = ("Wilcoxon p", "adjusted", "Mann–Whitney p", "adjusted")
-    headers = ("quantity", "common seeds", "median difference", "A12 of being better", *tests)
-    note = (
-        "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability "
-        "that a run of the first is better than one of the second, ties count half; in brackets "
-        f"the {100 * settings.confidence:g} % percentile interval of {settings.num_resamples} "
-        "resamples of seeds. Two tests, two-sided: Wilcoxon's signed-rank test of the pairs, "
-        "which verdicts follow, and Mann and Whitney's of the same values as independent "
-        "samples; adjusted: Holm over the rows of this table, test by test."
-    )
-    return Table(heading, headers, tuple(cells), note)
+    level, resamples = 100 * settings.confidence, settings.num_resamples
+    return WORDS.table("comparison", cells, heading=heading, level=level, resamples=resamples)
 
 
 def _figure(
@@ -258,8 +238,7 @@ def _parameters(results: Results) -> Table:
         for name in _ordered(by_name)
         for parameter, labels in by_name[name].items()
     ]
-    note = PARTS * have_two_parts(every)
-    return Table("Parameters", ("setting", "value", "unit", "source"), tuple(rows), note)
+    return WORDS.table("parameters", rows, note=PARTS * have_two_parts(every))
 
 
 def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
@@ -278,7 +257,7 @@ def _failures(results: Results) -> Iterator[Table]:
         for replicate, reason in c.failures.items()
     ]
     if rows:
-        yield Table(FAILURES, ("condition", "replicate", "reason"), tuple(rows))
+        yield WORDS.table("failures", rows)
 
 
 def have_two_parts(labels: Sequence[str]) -> bool:

@@ -51,6 +51,7 @@ from evoexp.report.page_parts import Table as Table
 from evoexp.report.pages import assumptions as assumptions
 from evoexp.report.pages import generic as generic
 from evoexp.report.pages.assumptions import Headline as Headline
+from evoexp.report.pages.page_words import quantity as quantity
 from evoexp.report.parameters import overridden as overridden
 from evoexp.report.parameters import parameters as parameters
 from evoexp.report.parameters import planned_replicates as planned_replicates

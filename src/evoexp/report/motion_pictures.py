@@ -1,15 +1,15 @@
 """Pictures of the motions that any planner found: scene, stages, joints, covers."""
 
 from collections.abc import Iterable, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.playback import player_page
 from evoexp.playback.recording import Heading, NoMotion, Recording, record
-from evoexp.report.figures import motion_scenes, motion_tables
+from evoexp.report.figures import motion_scenes
 from evoexp.report.page_parts import Drawing, PlayedRun, Player
+from evoexp.report.pages.page_words import WORDS
 from evoexp.report.results import ConditionResults, Results
 
 JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`
@@ -77,43 +77,21 @@ def drawings(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     if not shown:
         return ()
     best = min(shown, key=lambda each: _best_cost(each.condition))
+    given = (best.condition,), best.recording
     return (
         *scene_drawing(shown),
-        Drawing(
-            "stages",
-            "The motion, stage by stage",
-            f"The best replicate of {best.condition.label}.",
-            partial(motion_tables.stages_table, best.recording),
-            motion_scenes.draw_stages,
-            (best.condition,),
-        ),
-        Drawing(
-            "joints",
-            "Joints over the motion",
-            "Each joint between its limits (dashed) over the same motion.",
-            partial(motion_tables.joints_table, best.recording),
-            motion_scenes.draw_joints,
-            (best.condition,),
-        ),
+        WORDS.drawing("stages", motion_scenes.STAGES, *given, label=best.condition.label),
+        WORDS.drawing("joints", motion_scenes.JOINTS, *given),
         *_cover_drawing(shown),
     )
 
 
 def scene_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     """Return the figure of robots and scenes, with the motions to be played; none without any."""
-    if not shown:
-        return ()
-    found = Drawing(
-        "scene",
-        "Robot, scene and way",
-        "The best replicate of each condition: exact bodies at start and goal, and the way of "
-        "each tool. Meshes are drawn by their convex hulls.",
-        partial(motion_tables.scenes_table, [(each.title, each.recording) for each in shown]),
-        motion_scenes.draw_scenes,
-        tuple(each.condition for each in shown),
-        tuple(each.run for each in shown),
-    )
-    return (found,)
+    titled = [(each.title, each.recording) for each in shown]
+    conditions, plays = [each.condition for each in shown], [each.run for each in shown]
+    found = WORDS.drawing("scene", motion_scenes.SCENES, conditions, titled, plays=plays)
+    return (found,) if shown else ()
 
 
 def notes(shown: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
@@ -138,18 +116,8 @@ def _cover_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
         if covers and key not in rows:
             rows[key] = each.condition.label, each.recording, covers
             conditions.append(each.condition)
-    if not rows:
-        return ()
-    found = Drawing(
-        "covers",
-        "Bodies and covers",
-        "The exact bodies, which verdicts are about, beside the spheres and capsules that the "
-        "search tests in their place.",
-        partial(motion_tables.covers_table, list(rows.values())),
-        motion_scenes.draw_covers,
-        tuple(conditions),
-    )
-    return (found,)
+    found = WORDS.drawing("covers", motion_scenes.COVERS, conditions, list(rows.values()))
+    return (found,) if rows else ()
 
 
 def _best_cost(condition: ConditionResults) -> float:

@@ -41,7 +41,7 @@ class Drawing(NamedTuple):
     draw: "Callable[[pd.DataFrame], Figure]"  # draws the data
     conditions: tuple[ConditionResults, ...]  # whose results it shows
     plays: tuple[PlayedRun, ...] = ()  # runs whose motions it shows
-    columns: str = ""  # what the columns of the table are; empty: the docstring of `table` says it
+    columns: str = ""  # description of the table's columns; empty: the docstring of `table` is it
 
 
 class Quantity(NamedTuple):

@@ -2,16 +2,15 @@
 
 import itertools
 from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.report import markdown
-from evoexp.report.comparisons import Comparison, Values, by_column, compared
+from evoexp.report.comparisons import Comparison, Measure, by_column, compared
 from evoexp.report.comparisons import adjusted as adjusted_rows
 from evoexp.report.figures import matrix
 from evoexp.report.page_parts import Drawing, Table
+from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.run_measures import search_seconds, success
@@ -22,37 +21,21 @@ MOST = 6  # conditions of which every pair is tabled; of more, the first against
 Pair = tuple[ConditionResults, ConditionResults]
 
 
-class Effort(NamedTuple):
-    """A quantity that every planner records; lower is better."""
-
-    name: str
-    values: Values
-
-
-def certified(condition: ConditionResults) -> Proportion:
-    """Return how many of the motions that the exact verdict judged are certified."""
-    return Proportion(condition.verdicts.certified, condition.verdicts.judged)
-
-
-def keeping_margin(condition: ConditionResults) -> Proportion:
-    """Return how many of the judged motions are certified to keep the security margin."""
-    return Proportion(condition.verdicts.with_margin, condition.verdicts.judged)
-
-
-EFFORTS = (
-    Effort("best cost", by_column("best_cost")),
-    Effort("evaluations", by_column("evaluations")),
-    Effort("collision queries", by_column("collision_queries")),
-    Effort("CPU time, search [s]", search_seconds),
+EFFORTS = (  # quantities that every planner records; lower is better
+    Measure("best cost", by_column("best_cost")),
+    Measure("evaluations", by_column("evaluations")),
+    Measure("collision queries", by_column("collision_queries")),
+    Measure("CPU time, search [s]", search_seconds),
 )
 SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
     "solved": success,
-    "certified": certified,
-    "required margin kept": keeping_margin,
+    # of the motions that the exact verdict judged
+    "certified": lambda c: Proportion(c.verdicts.certified, c.verdicts.judged),
+    "required margin kept": lambda c: Proportion(c.verdicts.with_margin, c.verdicts.judged),
 }
 
 
-def differing(results: Results) -> list[Effort]:
+def differing(results: Results) -> list[Measure]:
     """Return the quantities that are not the same in every run."""
     return [
         one
@@ -89,25 +72,19 @@ def comparisons(
 
 def share_tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
     """Return shares of runs with intervals, and how far they differ from each other."""
-    level = f"{100 * settings.confidence:g} %"
+    level = 100 * settings.confidence
     rows = [
         (c.label, *(of(c).with_interval(settings.confidence, 0) for of in SHARES.values()))
         for c in results.with_data
     ]
-    note = f"In brackets Wilson's {level} interval; certified shares are of the motions judged."
-    own = Table("Shares of runs", ("condition", *SHARES), tuple(rows), note)
     between = [
         row for name, of in SHARES.items() for row in _differences(results, settings, name, of)
     ]
-    if not between:
-        return (own,)
-    headers = ("share", "conditions", "difference [points]", "Fisher p", "adjusted")
-    note = (
-        f"Difference: first minus second, in brackets Newcombe's {level} interval. Fisher's exact "
-        "test, two-sided; adjusted: Holm over the pairs, share by share. A share that is the same "
-        "in all conditions is left out."
+    found = (
+        WORDS.table("shares", rows, level=level),
+        WORDS.table("share_differences", between, level=level),
     )
-    return own, Table("Shares of runs compared", headers, tuple(between), note)
+    return found if between else found[:1]
 
 
 def _differences(
@@ -143,18 +120,8 @@ def matrix_drawing(results: Results, settings: ReportSettings) -> tuple[Drawing,
     ]
     tested = adjusted_rows([row for _, rows in every for row in rows])
     labels = [(a.label, b.label) for (a, b), _ in every]
-    return (
-        Drawing(
-            "matrix",
-            "How often one condition is better than another one",
-            "Vargha and Delaney's A12 of the best cost: the share of pairs of runs in which the "
-            "condition of the row has the lower cost, ties count half. Bold: Mann and Whitney's "
-            "test, adjusted by Holm over all pairs.",
-            partial(matrix.matrix_table, labels, tested, settings.significance),
-            matrix.draw_matrix,
-            results.evolved,
-        ),
-    )
+    given = results.evolved, labels, tested, settings.significance
+    return (WORDS.drawing("matrix", matrix.MATRIX, *given),)
 
 
 def _named(first: ConditionResults, second: ConditionResults) -> str:

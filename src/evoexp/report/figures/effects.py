@@ -1,7 +1,7 @@
 """Sweeps: quantities of all conditions side by side, and effect sizes of the first condition."""
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,10 @@ from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray, IntArray
 from evoexp.report import style
-from evoexp.report.comparisons import Comparison
+from evoexp.report.comparisons import Comparison, Values
 from evoexp.report.figures import groups
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import Results
 from evoexp.report.statistics import quantile
 
 WRAPPED = 24  # characters of a name in a panel, per line
@@ -28,7 +28,6 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"fillstyle": "left", "markerfacecoloralt": "white"},
     {"markerfacecolor": style.ARM_COLOURS[0]},
 )  # looks of differences that are significant by none, one and both of the tests
-Values = Callable[[ConditionResults], FloatArray]
 
 
 def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
@@ -195,3 +194,7 @@ def _clear(rows: pd.DataFrame) -> IntArray:
     below = rows[list(TESTS)].to_numpy(np.float64) < rows[["significance"]].to_numpy(np.float64)
     below[:, 0] &= (rows["direction"] * (rows["a12"] - 0.5)).to_numpy(np.float64) > 0.0
     return np.asarray(below.sum(axis=1), dtype=np.int64)
+
+
+EFFECTS = effects_table, draw_effects
+VALUES = values_table, draw_values

@@ -77,3 +77,6 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
     bar: dict[str, Any] = {"fraction": BAR / width, "aspect": SIZE * count / BAR}
     figure.colorbar(image, ax=axes, label="A12: the row is better", ticks=[0.0, 0.5, 1.0], **bar)
     return figure
+
+
+MATRIX = matrix_table, draw_matrix

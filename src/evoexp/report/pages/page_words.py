@@ -1,6 +1,7 @@
-"""A paper as its pages use it: its name and the words of pages, figures, tables and checks.
+"""The words of pages, kept as data beside the code: titles, captions, headings, notes, checks.
 
-The words stand in `words.yaml` beside the pages; words in braces are given where they are used:
+A paper has them in `words.yaml` beside its pages, evoexp's own pages in `report/pages/words.yaml`;
+words in braces are given where they are used:
 
     name: "Lavoie & Boudreau 2001"
     pages:
@@ -18,7 +19,7 @@ The words stand in `words.yaml` beside the pages; words in braces are given wher
       arms: [[attempts, "–", term_attempts]]  # or the name of a function of a run's values
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,21 +28,12 @@ import pandas as pd
 import yaml
 from matplotlib.figure import Figure
 
-from evoexp.report.claim_rules import Rules
-from evoexp.report.kit import (
-    ConditionResults,
-    Drawing,
-    Page,
-    PlayedRun,
-    Quantity,
-    Results,
-    Table,
-    Values,
-    by_column,
-    read_rules,
-    run_measures,
-)
-from evoexp.report.pages.generic import quantity
+from evoexp.report import run_measures
+from evoexp.report.claim_rules import Rules, read_rules
+from evoexp.report.comparisons import Values, by_column
+from evoexp.report.page_parts import Drawing, Page, PlayedRun, Quantity, Table
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import spread
 
 # give the table of a figure, and draw it
 Functions = tuple[Callable[..., pd.DataFrame], Callable[[pd.DataFrame], Figure]]
@@ -52,8 +44,8 @@ VALUES: dict[str, Values] = {  # of runs, that rows of the table of results may 
 }
 
 
-class Paper(NamedTuple):
-    """The name of a paper, and the words of its pages."""
+class PageWords(NamedTuple):
+    """The words of a paper's pages, or of evoexp's own."""
 
     name: str  # "Chen & Zalzala 1995"
     words: Mapping[str, Mapping[str, Any]]  # pages, figures, tables, …, by their names
@@ -68,10 +60,13 @@ class Paper(NamedTuple):
             parts: Of `Page`.
         """
         title = f"{self.name}: {results.experiment or 'stored runs'}"
-        introduction = self.words["pages"][name]
         return (base or Page("", ""))._replace(
-            **{"title": title, "introduction": introduction, **parts}
+            **{"title": title, "introduction": self.introduction(name), **parts}
         )
+
+    def introduction(self, name: str, **words: object) -> str:
+        """Return the first paragraph of a page."""
+        return str(self.words["pages"][name]).format(**words)
 
     def drawing(
         self,
@@ -107,12 +102,27 @@ class Paper(NamedTuple):
             columns=entry.get("columns", ""),
         )
 
-    def table(self, name: str, rows: Sequence[tuple[object, ...]], **words: object) -> Table:
-        """Return a table with its heading, its headers and its note."""
+    def table(
+        self,
+        name: str,
+        rows: Iterable[tuple[object, ...]],
+        before: Sequence[str] = (),
+        behind: Sequence[str] = (),
+        **words: object,
+    ) -> Table:
+        """Return a table with its heading, its headers and its note.
+
+        Args:
+            name: Of the table among the words.
+            rows: Its cells.
+            before: Headers of further columns on the left.
+            behind: Headers of further columns on the right.
+            words: Filled in for the words in braces.
+        """
         entry = self.words["tables"][name]
-        headers = tuple(header.format(**words) for header in entry["headers"])
-        note = entry.get("note", "").format(**words)
-        return Table(entry["heading"], headers, tuple(rows), note)
+        headers = (header.format(**words) for header in entry["headers"])
+        heading, note = (entry.get(part, "").format(**words) for part in ("heading", "note"))
+        return Table(heading, (*before, *headers, *behind), tuple(rows), note)
 
     def quantities(
         self,
@@ -148,8 +158,21 @@ class Paper(NamedTuple):
         )
 
 
-def read_paper(module: str) -> tuple[Paper, Rules]:
+def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity:
+    """Return a row of the table of results."""
+    return Quantity(name, unit, {c.label: spread(values(c)) for c in results.with_data})
+
+
+def read_words(path: Path) -> PageWords:
+    """Read the words of a file."""
+    words = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return PageWords(words.pop("name"), words)
+
+
+def read_paper(module: str) -> tuple[PageWords, Rules]:
     """Read the words and the rules that stand beside a module, given by its file."""
     folder = Path(module).parent
-    words = yaml.safe_load((folder / "words.yaml").read_text(encoding="utf-8"))
-    return Paper(words.pop("name"), words), read_rules(folder / "claims.yaml")
+    return read_words(folder / "words.yaml"), read_rules(folder / "claims.yaml")
+
+
+WORDS = read_words(Path(__file__).with_name("words.yaml"))  # of the pages that are no paper's

@@ -7,6 +7,7 @@ A paper keeps its claims in a file `claims.yaml` beside its pages, one entry per
       source: "section 3.5, Fig. {figure}"  # where the paper makes it
       kind: every                           # one of `KINDS`, which says when it is reproduced
       experiments: [rana, rana_planar]      # those that judge it
+      evidence: "{free} finished runs"      # the numbers; {x!n}: as text, see `markdown.filled`
     reasonable:
       claim: "100 individuals are reasonable: {metric}"
       source: "section 5"
@@ -20,11 +21,13 @@ Words in braces are limits, or are given where the claim is judged:
 
     RULES = read_rules(Path(__file__).with_name("claims.yaml"))
     judge = judging.judge(results, settings, RULES)
-    judge.on("free_at_via_points", who="", figure="4").every(evidence, holds, done, planned)
+    hearing = judge.on("free_at_via_points", who="", figure="4")
+    hearing.every({"free": share}, holds, done, planned)
     most = RULES["reasonable"].limits["most"]
     judge.on("reasonable", metric="cycles").own(evidence, n=50, holds=factor <= most)
 
-The evidence holds the numbers alone; the rule stands in a column of its own.
+The evidence holds the numbers alone; the rule stands in a column of its own. Evidence that depends
+on more than numbers is given as a text instead.
 """
 
 import functools
@@ -63,7 +66,16 @@ KINDS = {  # kind → (reproduced, contradicted); inconclusive otherwise
     ),
     OWN: ("", ""),
 }
-_KEYS = {"claim", "source", "kind", "reproduced", "contradicted", "limits", "experiments"}
+_KEYS = {
+    "claim",
+    "source",
+    "kind",
+    "reproduced",
+    "contradicted",
+    "limits",
+    "experiments",
+    "evidence",
+}
 
 
 class Rule(NamedTuple):
@@ -77,6 +89,7 @@ class Rule(NamedTuple):
     contradicted: str  # when it is contradicted, in words; empty: wherever it is not reproduced
     limits: Mapping[str, float]  # numbers that the rule needs, by name
     experiments: tuple[str, ...]  # names of the experiments that judge it
+    evidence: str = ""  # the numbers in a sentence, as `markdown.filled` takes it
 
     def about(self, **words: object) -> "Rule":
         """Return the rule with its words in braces filled in; limits are known already.
@@ -151,4 +164,5 @@ def _rule(name: str, entry: dict[str, Any]) -> Rule:
         entry.get("contradicted", contradicted),
         MappingProxyType(dict(entry.get("limits", {}))),
         tuple(entry["experiments"]),
+        entry.get("evidence", ""),
     )

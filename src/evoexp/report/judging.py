@@ -1,6 +1,6 @@
 """Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from evoexp.registry import CLAIMS, names, registered
@@ -21,6 +21,8 @@ REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
     "not judged",
 )
 ONLY_CONTROLS = "only a control was run"
+Evidence = str | Mapping[str, object]
+"""The words of the rule's sentence of evidence, or a whole text."""
 
 
 class Hearing(NamedTuple):
@@ -30,14 +32,14 @@ class Hearing(NamedTuple):
     reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
     significance: float  # below this adjusted p-value a difference counts
 
-    def every(self, evidence: str, holds: int, done: int, planned: int) -> Claim:
+    def every(self, evidence: Evidence, holds: int, done: int, planned: int) -> Claim:
         """Judge a claim about every run.
 
         One counter-example contradicts; all planned runs are needed to reproduce.
         """
         return self._claim("every", evidence, done, 0 < planned <= done, holds < done)
 
-    def majority(self, evidence: str, holds: int, done: int) -> Claim:
+    def majority(self, evidence: Evidence, holds: int, done: int) -> Claim:
         """Judge a claim that is reproduced if it holds in more than half of the runs."""
         most = holds > done / 2
         return self._claim("majority", evidence, done, most, bool(done) and not most)
@@ -58,7 +60,7 @@ class Hearing(NamedTuple):
         counted = row and row.num_seeds
         return heard._claim("better", told.replace("{}", words), counted, says == 1, says == -1)
 
-    def better_than_all(self, evidence: str, rows: Sequence[Comparison]) -> Claim:
+    def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
         """Judge a claim that a condition is better than each of several others.
 
         One that is significantly better contradicts; all must be significantly worse to reproduce.
@@ -66,7 +68,7 @@ class Hearing(NamedTuple):
         says = {row.says(self.significance) for row in rows}
         return self._claim("better than all", evidence, _seeds(rows), says == {1}, -1 in says)
 
-    def best(self, evidence: str, rows: Sequence[Comparison], best_median: bool) -> Claim:
+    def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
         """Judge a claim that one of several settings is the best.
 
         One that is significantly better contradicts; it is reproduced if it has the best median and
@@ -78,7 +80,7 @@ class Hearing(NamedTuple):
         return self._claim("best", evidence, _seeds(rows), holds, -1 in says)
 
     def greater(
-        self, evidence: str, one: Proportion, two: Proportion, p_adjusted: float | None = None
+        self, evidence: Evidence, one: Proportion, two: Proportion, p_adjusted: float | None = None
     ) -> Claim:
         """Judge a claim that `one` is greater than `two`, by Fisher's exact test.
 
@@ -90,7 +92,7 @@ class Hearing(NamedTuple):
         return self._claim("greater", evidence, counted, says == 1, says == -1)
 
     def same_share(
-        self, evidence: str, own: Proportion, printed: Proportion, p_adjusted: float
+        self, evidence: Evidence, own: Proportion, printed: Proportion, p_adjusted: float
     ) -> Claim:
         """Judge a claim that gives a share, a sample itself, by Fisher's exact test."""
         same, counted = p_adjusted >= self.significance, f"{own.total} and {printed.total}"
@@ -99,7 +101,7 @@ class Hearing(NamedTuple):
             "same share", evidence, counted, is_known and same, is_known and not same
         )
 
-    def own(self, evidence: str, n: object, holds: bool | None) -> Claim:
+    def own(self, evidence: Evidence, n: object, holds: bool | None) -> Claim:
         """Judge a claim by a rule of its own, which its `claims.yaml` states.
 
         Args:
@@ -109,12 +111,12 @@ class Hearing(NamedTuple):
         """
         return self._claim(OWN, evidence, n, holds is True, holds is False)
 
-    def elsewhere(self, evidence: str) -> Claim:
+    def elsewhere(self, evidence: Evidence) -> Claim:
         """Return the claim unjudged: another experiment judges it, or nothing can."""
         return self.made(evidence, "–", NOT_JUDGED)
 
     def _claim(
-        self, kind: str, evidence: str, n: object, reproduced: bool, contradicted: bool
+        self, kind: str, evidence: Evidence, n: object, reproduced: bool, contradicted: bool
     ) -> Claim:
         if kind != self.rule.kind:
             raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
@@ -125,10 +127,11 @@ class Hearing(NamedTuple):
         verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else INCONCLUSIVE
         return self.made(evidence, n, verdict)
 
-    def made(self, evidence: str, n: object, verdict: str) -> Claim:
+    def made(self, evidence: Evidence, n: object, verdict: str) -> Claim:
         """Return the claim with this evidence and verdict."""
         rule, counted = self.rule, "0" if n is None else str(n)
-        return Claim(rule.claim, rule.source, evidence, verdict, rule.name, rule.text, counted)
+        told = evidence if isinstance(evidence, str) else markdown.filled(rule.evidence, evidence)
+        return Claim(rule.claim, rule.source, told, verdict, rule.name, rule.text, counted)
 
 
 def _seeds(rows: Sequence[Comparison]) -> str:

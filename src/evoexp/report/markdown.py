@@ -2,7 +2,9 @@
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+import string
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from evoexp.report.page_parts import PICTURES, Document, Figures, FigureText, Table
 from evoexp.report.statistics import Interval, Spread
@@ -66,6 +68,22 @@ def number(value: float) -> str:
         return "∞" if value > 0 else "−∞"
     whole = value == round(value) and abs(value) < 1e9
     return (f"{value + 0.0:.0f}" if whole else f"{value:.4g}").replace("-", "−")  # −0.0 is 0
+
+
+def filled(template: str, words: Mapping[str, object]) -> str:
+    """Fill in the words of a sentence: `{x!n}` is written as `number` does, `{p!p}` as `p_value`.
+
+    Raises:
+        KeyError: If a word is missing.
+    """
+    return _Sentence().vformat(template, (), words)
+
+
+class _Sentence(string.Formatter):
+    def convert_field(self, value: Any, conversion: str | None) -> Any:
+        if conversion in ("n", "p"):
+            return (number if conversion == "n" else p_value)(float(value))
+        return super().convert_field(value, conversion)  # type: ignore[arg-type]
 
 
 def p_value(p: float) -> str:

@@ -63,6 +63,10 @@ class Proportion(NamedTuple):
     having: int  # runs that have it
     total: int  # all runs
 
+    def __str__(self) -> str:
+        """Return the count in words: "3 of 20"."""
+        return f"{self.having} of {self.total}"
+
     @property
     def share(self) -> float:
         """In [0, 1]; NaN without runs."""

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from evoexp.report.fitted_texts import fit_texts
-from evoexp.report.style_files import read_style_file
+from evoexp.report.style_files import own_style, read_style_file
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -62,40 +62,6 @@ _SCALES = {"page": _Scale(1.0, 1.0, 1.0), "column": _Scale(3.5 / WIDTH, 0.62, 0.
 _scale: ContextVar[_Scale] = ContextVar("_scale", default=_SCALES["page"])
 _SCALED = ("size", "labelpad", "handlelength", ".major.pad", "_pad", "linewidth")
 """Endings of the names of parameters that are sizes of text, or distances between parts."""
-
-_RC: dict[str, Any] = {
-    "svg.hashsalt": "evoexp",  # else ids in an SVG are random
-    "svg.fonttype": "none",  # text as text: found, selected, and edited in a drawing program
-    "pdf.fonttype": 42,
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 8.5,
-    "axes.titlesize": 9.0,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 8.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.4,
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "legend.fontsize": 7.5,
-    "legend.handlelength": 1.8,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
-    "xtick.major.size": 3.5,
-    "ytick.major.size": 3.5,
-    "xtick.major.pad": 3.5,
-    "ytick.major.pad": 3.5,
-    "axes.labelpad": 4.0,
-    "figure.constrained_layout.w_pad": 0.08,  # [inch]
-    "figure.constrained_layout.h_pad": 0.06,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-}
 
 PLAIN = Look()
 _FONT = b"'DejaVu Sans'"  # as matplotlib names it in an SVG
@@ -165,7 +131,7 @@ def _looking(look: Look) -> Iterator[None]:
     scale = _SCALES[look.width]
     with mpl.rc_context():
         mpl.rcdefaults()
-        for name, value in _RC.items():
+        for name, value in own_style().items():
             is_scaled = isinstance(value, float) and name.endswith(_SCALED)
             mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
         if look.style is not None:

@@ -1,12 +1,22 @@
-"""Matplotlib style files of users, which are applied over evoexp's own style."""
+"""Matplotlib style files: evoexp's own, and those of users, which are applied over it."""
 
+import functools
 import logging
 import warnings
+from collections.abc import Mapping
+from importlib import resources
 from typing import Any
 
 import matplotlib as mpl
 
 from evoexp.errors import SettingError, brief
+
+
+@functools.cache
+def own_style() -> Mapping[str, Any]:
+    """Return the parameters of evoexp's own style."""
+    with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
+        return dict(mpl.rc_params_from_file(path, use_default_template=False))
 
 
 def read_style_file(path: str) -> dict[str, Any]:

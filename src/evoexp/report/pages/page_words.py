@@ -31,6 +31,7 @@ from matplotlib.figure import Figure
 from evoexp.report import run_measures
 from evoexp.report.claim_rules import Rules, read_rules
 from evoexp.report.comparisons import Values, by_column
+from evoexp.report.markdown import filled
 from evoexp.report.page_parts import Drawing, Page, PlayedRun, Quantity, Table
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import spread
@@ -153,7 +154,7 @@ class PageWords(NamedTuple):
     def checks(self, name: str, **words: object) -> tuple[tuple[str, str], ...]:
         """Return rows of checks, (title, finding), with their words in braces filled in."""
         return tuple(
-            (title.format(**words), finding.format(**words))
+            (filled(title, words), filled(finding, words))
             for title, finding in self.words["checks"][name]
         )
 

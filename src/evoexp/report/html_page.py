@@ -5,14 +5,13 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from importlib import resources
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from evoexp.report.index import CLAIMS, FAILURES
 from evoexp.report.page_parts import Document, Figures, FigureText, Table, Verdict
+from evoexp.report.templates import asset, environment
 
 if TYPE_CHECKING:  # loaded only where a page is written
-    from jinja2 import Environment
     from markdown_it import MarkdownIt
     from markupsafe import Markup
 
@@ -136,33 +135,6 @@ def _size(picture: bytes) -> tuple[int, int] | None:
     return round(width * PIXELS_PER_POINT), round(height * PIXELS_PER_POINT)
 
 
-@functools.cache
-def asset(name: str) -> str:
-    """Return a file of `assets/site`: a template, the style sheet, the script."""
-    path = resources.files("evoexp").joinpath("assets/site", name)
-    return path.read_text(encoding="utf-8")
-
-
-@functools.cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FunctionLoader(asset),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.globals |= {
-        "is_verdict": lambda value: isinstance(value, Verdict),
-        "verdict_class": verdict_class,
-        "number_columns": number_columns,
-    }
-    return environment
-
-
 def written(template: str, runs: Mapping[str, str] | None = None, **values: Any) -> bytes:
     """Return a page.
 
@@ -185,11 +157,14 @@ def written(template: str, runs: Mapping[str, str] | None = None, **values: Any)
         return Markup('<a href="#run-{}">{}</a>').format(name, inline(str(text)))
 
     text = (
-        _environment()
+        environment()
         .get_template(template)
         .render(
             inline=lambda value: inline(str(value), known),
             label=label,
+            is_verdict=lambda value: isinstance(value, Verdict),
+            verdict_class=verdict_class,
+            number_columns=number_columns,
             style=Markup(asset("site.css")),
             script=Markup(asset("site.js")),
             **values,

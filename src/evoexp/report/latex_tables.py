@@ -1,7 +1,12 @@
 r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs}`."""
 
+import functools
 import re
 from collections.abc import Iterable, Sequence
+from importlib import resources
+
+import pandas as pd
+import yaml
 
 from evoexp.report.page_parts import Document, Table
 
@@ -10,51 +15,19 @@ NARROWEST = 14  # letters of a line in such a column
 BETWEEN = 3  # letters that the space between two columns takes
 SIZES = {"small": 84, "footnotesize": 94, "scriptsize": 108}
 """Size of the type → its letters in a line of 345 pt, the width of LaTeX's own classes."""
-_SIGNS = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "$": r"\$",
-    "&": r"\&",
-    "#": r"\#",
-    "_": r"\_",
-    "%": r"\%",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    "[": "{[}",  # behind the end of a line it would begin an option
-    "*": "{*}",
-    "–": "--",
-    "−": "$-$",
-    "∞": r"$\infty$",
-    "≥": r"$\geq$",
-    "≤": r"$\leq$",
-    "≈": r"$\approx$",
-    "·": r"$\cdot$",
-    "×": r"$\times$",
-    "→": r"$\rightarrow$",
-    "°": r"$^\circ$",
-    "√": r"$\surd$",
-    "…": r"\dots{}",
-    "“": "``",
-    "”": "''",
-    "’": "'",
-}
-_GREEK = "αβγδεζηθικλμνξπρστφχψωΔΘΛΣΦΨΩ"
-_NAMES = (
-    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
-    "varphi chi psi omega Delta Theta Lambda Sigma Phi Psi Omega"
-)
-_SIGNS |= {letter: rf"$\{name}$" for letter, name in zip(_GREEK, _NAMES.split(), strict=True)}
-_SIGNS |= {sign: f"$_{k}$" for k, sign in enumerate("₀₁₂₃₄₅₆₇₈₉")}
-_SIGNS |= {sign: f"$^{k}$" for k, sign in zip("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹", strict=True)}
 
 
 def escaped(text: str) -> str:
     """Return a text that LaTeX prints as it is."""
-    return "".join(_SIGNS.get(sign, sign) for sign in " ".join(text.split()))
+    signs = _signs()
+    return "".join(signs.get(sign, sign) for sign in " ".join(text.split()))
+
+
+@functools.cache
+def _signs() -> dict[str, str]:
+    path = resources.files("evoexp").joinpath("assets/latex_signs.yaml")
+    signs: dict[str, str] = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return signs
 
 
 def latex_tables(document: Document) -> dict[str, bytes]:
@@ -64,15 +37,8 @@ def latex_tables(document: Document) -> dict[str, bytes]:
 
 def tabular(headers: Iterable[str], rows: Iterable[Iterable[str]], columns: str) -> list[str]:
     """Return the lines of a table without its frame; heads and cells are LaTeX, columns "lrr"."""
-    return [
-        rf"\begin{{tabular}}{{{columns}}}",
-        r"\toprule",
-        " & ".join(headers) + r" \\",
-        r"\midrule",
-        *(" & ".join(row) + r" \\" for row in rows),
-        r"\bottomrule",
-        r"\end{tabular}",
-    ]
+    style = pd.DataFrame(map(tuple, rows), columns=list(headers)).style.hide(axis="index")
+    return style.to_latex(column_format=columns, hrules=True).splitlines()
 
 
 def _latex(table: Table, document: Document) -> str:

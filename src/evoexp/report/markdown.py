@@ -6,8 +6,9 @@ import string
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from evoexp.report.page_parts import PICTURES, Document, Figures, FigureText, Table
+from evoexp.report.page_parts import Document
 from evoexp.report.statistics import Interval, Spread
+from evoexp.report.templates import environment
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")
@@ -16,31 +17,8 @@ _OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json|tex|html)")
 
 def page(document: Document) -> str:
     """Return a page as Markdown."""
-    parts = [
-        f"# {document.title}\n",
-        f"{document.origin}\n",
-        *(f"> **{notice.title}.** {notice.text}\n" for notice in document.notices),
-        f"{document.introduction}\n" if document.introduction else "",
-        *(f"## {each.heading}\n\n{_section(each)}" for each in document.sections),
-    ]
-    return inert("\n".join(part for part in parts if part))
-
-
-def _section(section: Table | Figures) -> str:
-    if isinstance(section, Figures):
-        return "\n".join(map(_figure, section.figures))
-    note = f"\n{section.note}\n" * bool(section.note)
-    file = f"\n[tex]({section.file})\n" * bool(section.file)
-    return table(section.headers, section.rows) + note + file
-
-
-def _figure(figure: FigureText) -> str:
-    links = " · ".join(f"[{kind}]({name})" for kind, name in figure.files)
-    shown = figure.picture(*PICTURES)
-    picture = f"![{figure.title}]({shown})\n\n" if shown else ""
-    motions = "".join(f"- [{one.title}, in motion]({one.file})\n" for one in figure.motions)
-    after = f"\n{motions}" * bool(motions)
-    return f"### {figure.title}\n\n{picture}{figure.caption}\n\n{links}\n{after}"
+    template = environment().get_template("report_page.md")
+    return inert(template.render(document=document, table=table).rstrip("\n") + "\n")
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -15,7 +15,6 @@ from evoexp.report.statistics import Spread
 if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure
 
-PICTURES = ("png", "svg")  # kinds of files that a page can show
 MOST_NAMED = 4  # runs whose hashes a caption spells out
 
 

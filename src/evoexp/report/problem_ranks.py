@@ -81,18 +81,16 @@ def standing(runs: Sequence[PlannerRuns]) -> Standing:
         rows = [[value(cells[name, each]) for each in planners] for name in common]
         return np.array(rows, dtype=np.float64).reshape(len(common), len(planners))
 
+    def effort(same: Sequence[PlannerRuns]) -> float:
+        spent, reached = zip(*(own.first_reached() for own in same), strict=True)
+        return expected_effort(np.concatenate(spent), np.concatenate(reached))
+
+    def length(same: Sequence[PlannerRuns]) -> float:
+        return quantile(np.concatenate([own.best_lengths for own in same]), 0.5)
+
     left_out = tuple(name for name in problems if name not in common)
     outsiders = tuple(each for each in every if each not in planners)
-    return Standing(planners, common, left_out, outsiders, matrix(_effort), matrix(_length))
-
-
-def _effort(runs: Sequence[PlannerRuns]) -> float:
-    effort, reached = zip(*(own.first_reached() for own in runs), strict=True)
-    return expected_effort(np.concatenate(effort), np.concatenate(reached))
-
-
-def _length(runs: Sequence[PlannerRuns]) -> float:
-    return quantile(np.concatenate([own.best_lengths for own in runs]), 0.5)
+    return Standing(planners, common, left_out, outsiders, matrix(effort), matrix(length))
 
 
 def effort_ratios(efforts: FloatArray) -> FloatArray:

@@ -238,16 +238,14 @@ def _drawn(judged: Sequence[Judged]) -> pd.DataFrame:
         found = spread(one.headline.values(one.condition))
         shipped = spread(one.headline.values(one.family.shipped)).median
         rows.append(
-            (
-                one.headline.quantity,
-                positions[one.condition],
-                one.condition.label,
-                found.median,
-                found.lower,
-                found.upper,
-                one.claim.verdict,
-                shipped,
-                one.family.shipped.label,
-            )
+            {
+                "quantity": one.headline.quantity,
+                "position": positions[one.condition],
+                "condition": one.condition.label,
+                **{name: getattr(found, name) for name in ("median", "lower", "upper")},
+                "verdict": one.claim.verdict,
+                "shipped": shipped,
+                "family": one.family.shipped.label,
+            }
         )
-    return pd.DataFrame(rows, columns=robustness.COLUMNS)
+    return pd.DataFrame(rows)

@@ -221,7 +221,7 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
             row.runs,
             Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
             markdown.number(row.first_own),
-            f"{effort_text(row.queries)} ({_between(row.interval)})",
+            f"{effort_text(row.queries)} ({' to '.join(map(effort_text, row.interval))})",
             markdown.spread(row.lengths),
             markdown.spread(row.in_units) if row.unit > 0.0 else "–",
             f"{row.refuted} of {row.judged}" if row.judged else "–",
@@ -245,10 +245,6 @@ def _coin_table(rows: Sequence[Rated]) -> Table:
         if row.own_cost.num_values
     )
     return WORDS.table("coins", cells)
-
-
-def _between(interval: tuple[float, float]) -> str:
-    return " to ".join(effort_text(value) for value in interval)
 
 
 def effort_text(queries: float) -> str:

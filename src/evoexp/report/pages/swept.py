@@ -37,7 +37,9 @@ def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
     )
     if len({(c.condition.robot, c.condition.scenario) for c in done}) > 1:
         words += f" {generic.SCENES}"
-    shown = motion_pictures.best_motions(_best_only(results, done)) if done else []
+    # scene and motion of the condition with the lowest median cost alone
+    best = sorted(done, key=lambda c: spread(c.column("best_cost")).median)[:1]
+    shown = motion_pictures.best_motions(results._replace(conditions=tuple(best)))
     return Page(
         title=f"{results.experiment or 'stored runs'}: a sweep",
         introduction=words,
@@ -45,19 +47,9 @@ def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
         tables=(_combinations(sweep, settings), *_effect_tables(effects, settings)),
         drawings=(
             *_drawings(results, sweep, effects),
-            *(motion_pictures.drawings(shown) if shown else ()),
+            *motion_pictures.drawings(shown),
         ),
     )
-
-
-def _best_only(results: Results, done: list[ConditionResults]) -> Results:
-    """Return the results of the condition with the lowest median cost alone."""
-    best = min(done, key=_median_cost)
-    return results._replace(conditions=(best,))
-
-
-def _median_cost(condition: ConditionResults) -> float:
-    return spread(condition.column("best_cost")).median
 
 
 def _combinations(sweep: Sweep, settings: ReportSettings) -> Table:
@@ -120,7 +112,7 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
             "quantity": f"{name[0].upper()}{name[1:]}",
             "where": where,
         }
-        words["more"] = _more(_num_maps(sweep))
+        words["more"] = _more(len({(each.base, *each.values[:-2]) for each in sweep.conditions}))
         yield WORDS.drawing("grid", functions, conditions, sweep, measures()[name], **words)
     if effects:
         yield WORDS.drawing("main_effects", sweeps.EFFECTS, conditions, effects)
@@ -130,10 +122,6 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
         yield WORDS.drawing(
             "sweep_convergence", sweeps.CONVERGENCE, *given, setting=setting, more=more
         )
-
-
-def _num_maps(sweep: Sweep) -> int:
-    return len({(each.base, *each.values[:-2]) for each in sweep.conditions})
 
 
 def _more(count: int) -> str:

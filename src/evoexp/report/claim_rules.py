@@ -39,43 +39,10 @@ from typing import Any, NamedTuple
 import yaml
 
 OWN = "own"
-KINDS = {  # kind → (reproduced, contradicted); inconclusive otherwise
-    "every": ("it holds in all planned runs", "it fails in one run"),
-    "majority": ("it holds in more than half of the runs", "it holds in no more than half of them"),
-    "better": (
-        "significantly {word} by the signed-rank test of pairs of the same seed",
-        "significantly the other way round",
-    ),
-    "better than all": (
-        "significantly better than each of the others (signed-rank tests of pairs of the same "
-        "seed, adjusted by Holm)",
-        "one of the others is significantly better",
-    ),
-    "best": (
-        "its median is the best, and it is significantly better than one of the others at least "
-        "(signed-rank tests of pairs of the same seed, adjusted by Holm)",
-        "one of the others is significantly better",
-    ),
-    "greater": (
-        "the share is significantly greater by Fisher's exact test",
-        "it is significantly smaller",
-    ),
-    "same share": (
-        "Fisher's exact test cannot tell the printed share from ours",
-        "the test tells them apart",
-    ),
-    OWN: ("", ""),
-}
-_KEYS = {
-    "claim",
-    "source",
-    "kind",
-    "reproduced",
-    "contradicted",
-    "limits",
-    "experiments",
-    "evidence",
-}
+# kind → (reproduced, contradicted)
+KINDS: dict[str, tuple[str, str]] = yaml.safe_load(
+    Path(__file__).with_name("claim_kinds.yaml").read_text(encoding="utf-8")
+)
 
 
 class Rule(NamedTuple):
@@ -145,7 +112,7 @@ def read_rules(path: Path) -> Rules:
 
 def _rule(name: str, entry: dict[str, Any]) -> Rule:
     missing = {"claim", "source", "kind", "experiments"} - entry.keys()
-    unknown = entry.keys() - _KEYS
+    unknown = entry.keys() - ({*Rule._fields} - {"name"})
     if missing or unknown or entry["kind"] not in KINDS:
         raise ValueError(
             f"{name}: must have claim, source, experiments, a kind out of {', '.join(KINDS)}; "

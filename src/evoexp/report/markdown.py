@@ -61,7 +61,7 @@ class _Sentence(string.Formatter):
     def convert_field(self, value: Any, conversion: str | None) -> Any:
         if conversion in ("n", "p"):
             return (number if conversion == "n" else p_value)(float(value))
-        return super().convert_field(value, conversion)  # type: ignore[arg-type]
+        return super().convert_field(value, conversion)
 
 
 def p_value(p: float) -> str:

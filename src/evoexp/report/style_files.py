@@ -16,7 +16,8 @@ from evoexp.errors import SettingError, brief
 def own_style() -> Mapping[str, Any]:
     """Return the parameters of evoexp's own style."""
     with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
-        return dict(mpl.rc_params_from_file(path, use_default_template=False))
+        found = mpl.rc_params_from_file(path, use_default_template=False)
+    return {str(name): value for name, value in found.items()}
 
 
 def read_style_file(path: str) -> dict[str, Any]:

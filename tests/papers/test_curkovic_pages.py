@@ -17,11 +17,11 @@ from evoexp.papers.curkovic import (
     sweep_page,
 )
 from evoexp.papers.curkovic.figures import link_intersection, motion_curves, robot_motions
-from evoexp.report import judging
-from evoexp.report.comparisons import compare
-from evoexp.report.page_parts import Page
 from evoexp.report.pages import page_of
-from evoexp.report.results import ConditionResults
+from evoexp.report.pages.page_parts import Page
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.comparisons import compare
 from evoexp.store.log_reader import read_log
 from report_samples import can_be_drawn, figure_stems, page_settings, smoke_report, smoke_results
 

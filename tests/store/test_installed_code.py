@@ -11,7 +11,7 @@ import evoexp
 
 SCRIPT = """
 import sys
-from evoexp.report.proven_answers import NO_PART
+from evoexp.report.results.proven_answers import NO_PART
 from evoexp.store.installed_code import installed_code
 print(installed_code().hex(), installed_code(NO_PART).hex())
 """
@@ -32,7 +32,7 @@ def hashes(copy: Path) -> list[str]:
 @pytest.mark.parametrize(
     ("file", "changed"),
     [
-        ("report/style.py", [True, False]),
+        ("report/figures/style.py", [True, False]),
         ("papers/lavoie/measures.py", [True, False]),
         ("planners/planner.py", [True, True]),
         ("collision/certifier/verdict.py", [True, True]),

@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray, IntArray
-from evoexp.report import style
-from evoexp.report.comparisons import Comparison, Values
-from evoexp.report.figures import groups
+from evoexp.report.figures import groups, style
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.results import Results
-from evoexp.report.statistics import quantile
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import Comparison, Values
+from evoexp.report.statistics.inference import quantile
 
 WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
-from evoexp.report import style
+from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
-from evoexp.report.planner_runs import PlannerRuns
-from evoexp.report.statistics import quantiles
+from evoexp.report.results.planner_runs import PlannerRuns
+from evoexp.report.statistics.inference import quantiles
 
 POINTS = 200  # along the axis of effort
 MAX_PANELS = 24  # problems that have a panel of their own

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from evoexp.report import style
+from evoexp.report.figures import style
 
 HALO = [withStroke(linewidth=2.0, foreground="white")]  # around a text on lines
 

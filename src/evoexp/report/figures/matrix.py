@@ -7,9 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.comparisons import Comparison
-from evoexp.report.figures import records
+from evoexp.report.figures import records, style
+from evoexp.report.statistics.comparisons import Comparison
 
 SIZE = 0.44  # [inch] of a cell
 LONGEST = 28  # characters of a name beside the matrix

@@ -14,8 +14,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from evoexp.playback.colours import OBJECT, OBSTACLE
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.figures import groups, motion_tables, records, surfaces
+from evoexp.report.figures import groups, motion_tables, records, style, surfaces
 from evoexp.report.figures.motion_tables import POSE, SIZE
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth

@@ -4,9 +4,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report import style
+from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
-from evoexp.report.problem_ranks import alike, profile_table, rank_table
+from evoexp.report.statistics.problem_ranks import alike, profile_table, rank_table
 
 LINE = 0.24  # [inch] between names of planners
 BAR = 0.09  # [inch] between bars that join planners

@@ -7,9 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.figures import groups, records
-from evoexp.report.judging import CONTRADICTED, REPRODUCED
+from evoexp.report.figures import groups, records, style
+from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED
 
 WRAPPED = 30  # characters of a quantity's name, per line
 OTHERWISE = "inconclusive or not judged"

@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.figures import groups
-from evoexp.report.statistics import Proportion
+from evoexp.report.figures import groups, style
+from evoexp.report.statistics.inference import Proportion
 
 MARGIN = 0.08  # [-] of the panels' span, beyond the intervals
 NEARLY_ALL = 60.0  # [%] a span from which on the panels show all percentages, 0 to 100

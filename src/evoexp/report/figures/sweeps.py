@@ -9,14 +9,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.figures import groups, records
+from evoexp.report.figures import groups, records, style
 from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
-from evoexp.report.results import Results
-from evoexp.report.statistics import quantile
-from evoexp.report.swept_settings import MainEffect, Sweep, Values
+from evoexp.report.results.stored_results import Results
+from evoexp.report.results.swept_settings import MainEffect, Sweep, Values
+from evoexp.report.statistics.inference import quantile
 
 PER_LINE = 3  # panels side by side
 MOST_PANELS = 18

@@ -30,18 +30,18 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from evoexp.report import judging, markdown
-from evoexp.report.claim_rules import OWN, Rule, Rules
-from evoexp.report.comparisons import Values, beside
 from evoexp.report.figures import robustness
-from evoexp.report.judging import Hearing, Judge
-from evoexp.report.page_parts import Claim, Page, Table
-from evoexp.report.pages import generic
+from evoexp.report.pages import generic, markdown
+from evoexp.report.pages.page_parts import Claim, Page, Table
 from evoexp.report.pages.page_words import WORDS
-from evoexp.report.parameters import OVERRIDE, Parameter, parameters
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.results.parameters import OVERRIDE, Parameter, parameters
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.claim_rules import OWN, Rule, Rules
+from evoexp.report.statistics.comparisons import Values, beside
+from evoexp.report.statistics.inference import spread
+from evoexp.report.statistics.judging import Hearing, Judge
 
 ASSUMED = "assumed"
 SHOWN = 4  # values of a list that are written out

@@ -9,22 +9,20 @@ import numpy as np
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
-from evoexp.report import markdown
-from evoexp.report.best_known import shipped_best_known
-from evoexp.report.comparisons import Comparison, compared
 from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
-from evoexp.report.given_data import MARK, GivenData
-from evoexp.report.page_parts import Drawing, Page, Table
-from evoexp.report.pages import ranking
+from evoexp.report.pages import markdown, ranking
+from evoexp.report.pages.page_parts import Drawing, Page, Table
 from evoexp.report.pages.page_words import WORDS
-from evoexp.report.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
-from evoexp.report.problem_ranks import standing
-from evoexp.report.proven_answers import first_reached
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import search_seconds
-from evoexp.report.statistics import (
+from evoexp.report.results.best_known import shipped_best_known
+from evoexp.report.results.given_data import MARK, GivenData
+from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
+from evoexp.report.results.proven_answers import first_reached
+from evoexp.report.results.run_measures import search_seconds
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison, compared
+from evoexp.report.statistics.inference import (
     Interval,
     Proportion,
     Spread,
@@ -33,6 +31,7 @@ from evoexp.report.statistics import (
     quantile,
     spread,
 )
+from evoexp.report.statistics.problem_ranks import standing
 
 
 class Rated(NamedTuple):

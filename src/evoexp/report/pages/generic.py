@@ -1,13 +1,13 @@
 """The page of any experiment: results, convergence, all conditions compared with each other."""
 
-from evoexp.report import motion_pictures, pairwise, sweep_figures
-from evoexp.report.comparisons import by_column, compared_with_controls
 from evoexp.report.figures import convergence
-from evoexp.report.page_parts import Drawing, Page, Quantity
+from evoexp.report.pages import motion_pictures, pairwise, sweep_figures
+from evoexp.report.pages.page_parts import Drawing, Page, Quantity
 from evoexp.report.pages.page_words import WORDS, quantity
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.run_measures import first_feasible, search_seconds
+from evoexp.report.results.run_measures import first_feasible, search_seconds
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import by_column, compared_with_controls
 from evoexp.store.messages import TERM
 
 FEW = 4  # conditions whose average costs can be drawn beside the best ones

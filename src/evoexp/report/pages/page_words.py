@@ -28,13 +28,13 @@ import pandas as pd
 import yaml
 from matplotlib.figure import Figure
 
-from evoexp.report import run_measures
-from evoexp.report.claim_rules import Rules, read_rules
-from evoexp.report.comparisons import Values, by_column
-from evoexp.report.markdown import filled
-from evoexp.report.page_parts import Drawing, Page, PlayedRun, Quantity, Table
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.pages.markdown import filled
+from evoexp.report.pages.page_parts import Drawing, Page, PlayedRun, Quantity, Table
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.claim_rules import Rules, read_rules
+from evoexp.report.statistics.comparisons import Values, by_column
+from evoexp.report.statistics.inference import spread
 
 # give the table of a figure, and draw it
 Functions = tuple[Callable[..., pd.DataFrame], Callable[[pd.DataFrame], Figure]]

@@ -4,19 +4,19 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from evoexp.report import markdown
 from evoexp.report.figures import rank_diagrams
-from evoexp.report.page_parts import Drawing, Table
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Drawing, Table
 from evoexp.report.pages.page_words import WORDS
-from evoexp.report.planner_runs import PlannerRuns, stored_conditions
-from evoexp.report.problem_ranks import (
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.planner_runs import PlannerRuns, stored_conditions
+from evoexp.report.statistics.problem_ranks import (
     MIN_PLANNERS,
     MIN_PROBLEMS,
     Standing,
     critical_difference,
     friedman,
 )
-from evoexp.report.report_settings import ReportSettings
 
 
 def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.report import markdown, motion_pictures
 from evoexp.report.figures import sweeps
-from evoexp.report.page_parts import Drawing, Page, Table
-from evoexp.report.pages import generic
+from evoexp.report.pages import generic, markdown, motion_pictures
+from evoexp.report.pages.page_parts import Drawing, Page, Table
 from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Proportion, spread
-from evoexp.report.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
+from evoexp.report.statistics.inference import Proportion, spread
 
 MOST_CURVES = 60  # curves of convergence on a page
 

@@ -6,9 +6,9 @@ import string
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from evoexp.report.page_parts import Document
-from evoexp.report.statistics import Interval, Spread
-from evoexp.report.templates import environment
+from evoexp.report.pages.page_parts import Document
+from evoexp.report.pages.templates import environment
+from evoexp.report.statistics.inference import Interval, Spread
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")

@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report import markdown
-from evoexp.report.claim_rules import NO_RULES, OWN, Rule, Rules
-from evoexp.report.comparisons import Comparison, Values, compared
-from evoexp.report.page_parts import Claim
-from evoexp.report.parameters import option, planned_replicates
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Proportion, fisher_exact
+from evoexp.report.results.parameters import option, planned_replicates
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules
+from evoexp.report.statistics.comparisons import Comparison, Values, compared
+from evoexp.report.statistics.inference import Proportion, fisher_exact
 from evoexp.shipped import config_directory, shipped
 
 REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (

@@ -15,7 +15,7 @@ import yaml
 
 from evoexp.attachments import FILE, SHA256, keep
 from evoexp.condition import PARTS
-from evoexp.report.results import WRAPPED, ConditionResults, Results
+from evoexp.report.results.stored_results import WRAPPED, ConditionResults, Results
 from evoexp.shipped import Option, config_directory
 from evoexp.validation import TARGET
 

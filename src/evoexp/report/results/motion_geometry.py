@@ -19,7 +19,7 @@ from evoexp.collision.scene import Scene
 from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
-from evoexp.report.results import ConditionResults
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ELLIPSE, HALF_SPACE, SPHERE, ObstacleTable
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from evoexp.records import BoolArray, FloatArray
-from evoexp.report.comparisons import Values
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Proportion
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Values
+from evoexp.report.statistics.inference import Proportion
 
 
 def planned_by(results: Results, planner: type) -> bool:

@@ -13,8 +13,8 @@ import pandas as pd
 from scipy import stats
 
 from evoexp.records import FloatArray
-from evoexp.report.planner_runs import PlannerRuns
-from evoexp.report.statistics import expected_effort, quantile
+from evoexp.report.results.planner_runs import PlannerRuns
+from evoexp.report.statistics.inference import expected_effort, quantile
 
 MIN_PLANNERS = 3  # of a critical-difference diagram: two are compared by a test of pairs
 MIN_PROBLEMS = 5  # of it: with fewer, Friedman's test can hardly reject anything

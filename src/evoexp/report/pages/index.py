@@ -4,9 +4,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from evoexp.report import markdown
-from evoexp.report.comparisons import Comparison
-from evoexp.report.page_parts import (
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import (
     Claim,
     Document,
     Drawing,
@@ -22,10 +21,11 @@ from evoexp.report.page_parts import (
     provenance,
 )
 from evoexp.report.pages.page_words import WORDS
-from evoexp.report.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Proportion
+from evoexp.report.results.parameters import Parameter, parameters, planned_replicates
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison
+from evoexp.report.statistics.inference import Proportion
 
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other

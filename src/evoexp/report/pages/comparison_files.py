@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from evoexp.report import markdown
-from evoexp.report.latex_tables import escaped, tabular
+from evoexp.report.pages import markdown
 from evoexp.report.pages.comparison import Rated, effort_text
+from evoexp.report.pages.latex_tables import escaped, tabular
 
 HEADERS = (
     "planner",

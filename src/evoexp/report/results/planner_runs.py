@@ -11,8 +11,13 @@ import pandas as pd
 
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
-from evoexp.report.proven_answers import answers_of, best_lengths, first_reached, straight_line
-from evoexp.report.results import ConditionResults
+from evoexp.report.results.proven_answers import (
+    answers_of,
+    best_lengths,
+    first_reached,
+    straight_line,
+)
+from evoexp.report.results.stored_results import ConditionResults
 
 MULTIPLES = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of a problem's unit of length
 _SEPARATORS = re.compile(r" · |: |, | – | - ")  # between the parts of a label

@@ -15,7 +15,7 @@ import pandas as pd
 
 from evoexp.errors import SettingError, nearest, printable
 from evoexp.input_files import NUMBER, TableError, TableRow, read_bounded, read_table
-from evoexp.report.planner_runs import PlannerRuns, Problem
+from evoexp.report.results.planner_runs import PlannerRuns, Problem
 
 COLUMNS = ("planner", "problem", "seed", "queries", "cost")
 MARK = " (given)"  # behind the names of planners that were not run here

@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
-from evoexp.report import markdown
-from evoexp.report.html_page import HTML, html_page
-from evoexp.report.index import document
-from evoexp.report.latex_tables import latex_tables
-from evoexp.report.motion_pictures import players_of
-from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.pages import page_of
+from evoexp.report.pages import markdown, page_of
+from evoexp.report.pages.html_page import HTML, html_page
+from evoexp.report.pages.index import document
+from evoexp.report.pages.latex_tables import latex_tables
+from evoexp.report.pages.motion_pictures import players_of
+from evoexp.report.pages.page_parts import Drawing, Page
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, gather
-from evoexp.report.statistics import forget_resamples
+from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.statistics.inference import forget_resamples
 from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
@@ -146,7 +145,7 @@ def stale_files(report: ReportFiles) -> list[Path]:
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     """Return the files of one figure: pictures, data rows, sidecar."""
-    from evoexp.report.style import Look, drawn
+    from evoexp.report.figures.style import Look, drawn
 
     table = drawing.table()
     look = Look(settings.width, settings.style)

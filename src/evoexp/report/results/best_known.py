@@ -23,7 +23,7 @@ import yaml
 
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
-from evoexp.report.planner_runs import PlannerRuns
+from evoexp.report.results.planner_runs import PlannerRuns
 
 _HASH = re.compile("[0-9a-f]{12}")
 _HEAD = """# The shortest proven answer known of each problem, in joint space [rad, m]: targets of

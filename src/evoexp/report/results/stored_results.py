@@ -16,7 +16,7 @@ from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import FloatArray
-from evoexp.report.statistics import Spread, spread
+from evoexp.report.statistics.inference import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan

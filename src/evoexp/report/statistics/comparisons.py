@@ -8,8 +8,8 @@ import numpy as np
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, wrapped
-from evoexp.report.statistics import (
+from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
+from evoexp.report.statistics.inference import (
     Effect,
     RankSum,
     SignedRank,

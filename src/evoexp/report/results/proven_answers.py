@@ -22,7 +22,7 @@ from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_ke
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray
-from evoexp.report.results import ConditionResults
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.store.installed_code import installed_code
 from evoexp.store.log_reader import read_log
 

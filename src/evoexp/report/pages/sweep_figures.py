@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from evoexp.report.comparisons import Comparison, Values
 from evoexp.report.figures import effects, shares
-from evoexp.report.page_parts import Drawing
+from evoexp.report.pages.page_parts import Drawing
 from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.statistics import Proportion
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import Comparison, Values
+from evoexp.report.statistics.inference import Proportion
 
 CENSORED = (
     ' A run that never gets there counts as infinite ("never"), so that boxes are of all runs; '

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
 
-from evoexp.report.comparisons import Comparison
-from evoexp.report.results import ConditionResults
-from evoexp.report.statistics import Spread
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.comparisons import Comparison
+from evoexp.report.statistics.inference import Spread
 
 if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ from importlib import resources
 import pandas as pd
 import yaml
 
-from evoexp.report.page_parts import Document, Table
+from evoexp.report.pages.page_parts import Document, Table
 
 LONG_TEXT = 30  # letters of a cell, from which on its column breaks lines
 NARROWEST = 14  # letters of a line in such a column

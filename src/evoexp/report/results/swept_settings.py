@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import search_seconds
-from evoexp.report.statistics import BOOTSTRAP_SEED, Interval, percentiles, quantile
+from evoexp.report.results.run_measures import search_seconds
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles, quantile
 
 JOIN = " · "  # between the parts of a label
 _SETTING = re.compile(r"([\w.@/-]+)=(.*)")

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from evoexp.report.planner_runs import PlannerRuns
+from evoexp.report.results.planner_runs import PlannerRuns
 
 VERSION = "0.3.18"  # of IOHexperimenter, whose files these are like
 SUITE = "evoexp"

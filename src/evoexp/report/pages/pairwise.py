@@ -5,16 +5,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from evoexp.report import markdown
-from evoexp.report.comparisons import Comparison, Measure, by_column, compared
-from evoexp.report.comparisons import adjusted as adjusted_rows
 from evoexp.report.figures import matrix
-from evoexp.report.page_parts import Drawing, Table
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Drawing, Table
 from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import search_seconds, success
-from evoexp.report.statistics import Proportion, fisher_exact, holm, newcombe
+from evoexp.report.results.run_measures import search_seconds, success
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison, Measure, by_column, compared
+from evoexp.report.statistics.comparisons import adjusted as adjusted_rows
+from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 
 MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
 

@@ -8,9 +8,9 @@ import numpy as np
 from evoexp.playback import player_page
 from evoexp.playback.recording import Heading, NoMotion, Recording, record
 from evoexp.report.figures import motion_scenes
-from evoexp.report.page_parts import Drawing, PlayedRun, Player
+from evoexp.report.pages.page_parts import Drawing, PlayedRun, Player
 from evoexp.report.pages.page_words import WORDS
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results.stored_results import ConditionResults, Results
 
 JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`
 VERDICTS = {True: "certified", False: "refuted", None: "undecided"}

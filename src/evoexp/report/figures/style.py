@@ -16,8 +16,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from evoexp.report.fitted_texts import fit_texts
-from evoexp.report.style_files import own_style, read_style_file
+from evoexp.report.figures.fitted_texts import fit_texts
+from evoexp.report.figures.style_files import own_style, read_style_file
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (

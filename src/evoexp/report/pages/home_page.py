@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from pydantic import Field, TypeAdapter
 
-from evoexp.report.html_page import HTML, script_json, telling_rank, verdict_counts, written
+from evoexp.report.pages.html_page import HTML, script_json, telling_rank, verdict_counts, written
 
 MARKDOWN = "index.md"
 MAX_LINKS = 3  # reports named beside a run

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from evoexp.report.index import CLAIMS, FAILURES
-from evoexp.report.page_parts import Document, Figures, FigureText, Table, Verdict
-from evoexp.report.templates import asset, environment
+from evoexp.report.pages.index import CLAIMS, FAILURES
+from evoexp.report.pages.page_parts import Document, Figures, FigureText, Table, Verdict
+from evoexp.report.pages.templates import asset, environment
 
 if TYPE_CHECKING:  # loaded only where a page is written
     from markdown_it import MarkdownIt

@@ -4,7 +4,7 @@ A page is a function (`Results`, `ReportSettings`) → `Page`, named by an entry
 It reads `Results`: columns of summaries, generations, solutions, and the answers of the planner's
 protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 
-- `Table`, `Quantity` (of `generic.quantity`), `Claim` (of a `Judge`, by the rules of the paper's
+- `Table`, `Quantity` (of `quantity`), `Claim` (of a `Judge`, by the rules of the paper's
   `claims.yaml`, see `claim_rules` and `judging.judge`),
   `Comparison` (of `compared`) and `Drawing`, each with its words in `markdown`;
 - a `Drawing` is two functions: results → table (columns by `records`, `groups`, `rounded`), and

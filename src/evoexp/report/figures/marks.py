@@ -36,6 +36,17 @@ def band(axes: Axes, x: Any, low: Any, high: Any, colour: str, **look: Any) -> N
     axes.fill_between(x, low, high, color=colour, linewidth=0, **{"alpha": 0.18} | look)
 
 
+def beside(axes: Axes, y: Any, text: str, at: float = 1.01, **look: Any) -> None:
+    """Write a text to the right of a row, `at` a share of the width of the panel."""
+    place: dict[str, Any] = {"xycoords": axes.get_yaxis_transform(), "fontsize": 6.5}
+    axes.annotate(text, (at, y), **place | {"va": "center"} | look)
+
+
+def dashed(axes: Axes, x: float) -> None:
+    """Draw a faint vertical line below everything, of a value to compare with."""
+    axes.axvline(x, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+
+
 def point_key(label: str, marker: str, size: float, **look: Any) -> Line2D:
     """Return an entry of a legend for points without a line."""
     return style.key(label, marker=marker, ms=size, linestyle="none", **look)

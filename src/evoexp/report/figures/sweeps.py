@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report.figures import groups, records, style
+from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
@@ -142,7 +142,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         errors = [finite["difference"] - finite["low"], finite["high"] - finite["difference"]]
         look: dict[str, Any] = {"fmt": "o", "ms": 4, "capsize": 2.0, "color": style.NEUTRAL}
         axes.errorbar(finite["difference"], finite.index, xerr=errors, **look)
-        axes.axvline(0.0, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        marks.dashed(axes, 0.0)
         names = [f"{r.setting}: {r.first} → {r.other}" for r in records(own)]
         axes.set_yticks(range(len(own)), names if style.begins_line(axes) else [])
         axes.set(title=base, xlabel="change of the cost", ylim=(len(own) - 0.5, -0.5))

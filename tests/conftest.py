@@ -78,7 +78,7 @@ def composed_once() -> Iterator[None]:
 @pytest.fixture
 def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have every figure of a report blank: drawing takes nine tenths of its time."""
-    from evoexp.report import style
+    from evoexp.report.figures import style
 
     draw = style.drawn
 

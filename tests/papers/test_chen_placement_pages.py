@@ -10,7 +10,7 @@ from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import placements
-from evoexp.report import judging
+from evoexp.report.statistics import judging
 from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 

@@ -19,10 +19,10 @@ from evoexp.papers.corsepius.figures import (
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
-from evoexp.report import run_measures
 from evoexp.report.pages import page_of
-from evoexp.report.results import Results, gather
-from evoexp.report.statistics import Interval, Proportion
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.statistics.inference import Interval, Proportion
 from report_samples import (
     can_be_drawn,
     page_settings,
@@ -73,8 +73,8 @@ def test_the_study_reads_no_log(outputs: Path, monkeypatch: pytest.MonkeyPatch) 
         raise AssertionError("a log was read")
 
     results = smoke_results(outputs, "corsepius_population")
-    monkeypatch.setattr("evoexp.report.results.read_generations", refuse)
-    monkeypatch.setattr("evoexp.report.results.read_solution", refuse)
+    monkeypatch.setattr("evoexp.report.results.stored_results.read_generations", refuse)
+    monkeypatch.setattr("evoexp.report.results.stored_results.read_solution", refuse)
     for drawing in page_of(results, page_settings("corsepius_population")).drawings:
         drawing.table()
 

@@ -12,11 +12,11 @@ from evoexp.papers.lavoie.figures import reaching_motions, run_distributions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report import motion_geometry, run_measures
 from evoexp.report.figures import shares
 from evoexp.report.pages import page_of
-from evoexp.report.results import ConditionResults, gather
-from evoexp.report.statistics import Proportion
+from evoexp.report.results import motion_geometry, run_measures
+from evoexp.report.results.stored_results import ConditionResults, gather
+from evoexp.report.statistics.inference import Proportion
 from report_samples import (
     can_be_drawn,
     figure_stems,
@@ -45,7 +45,7 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         raise AssertionError("generations were read")
 
     results = smoke_results(outputs, "lavoie")
-    monkeypatch.setattr("evoexp.report.results.read_generations", refuse)
+    monkeypatch.setattr("evoexp.report.results.stored_results.read_generations", refuse)
     for drawing in page_of(results, page_settings("lavoie")).drawings:
         drawing.table()
 

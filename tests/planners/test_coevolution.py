@@ -242,7 +242,7 @@ def test_a_robot_that_stands_still_keeps_its_posture() -> None:
 
 
 def test_no_team_is_cheaper_than_the_lower_bound() -> None:
-    from evoexp.report.results import ConditionResults
+    from evoexp.report.results.stored_results import ConditionResults
 
     condition = composed("experiment=curkovic_methods", label="V")
     nothing: Any = None

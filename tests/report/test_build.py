@@ -15,9 +15,10 @@ from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.papers.rana import motions
 from evoexp.papers.rana import page as rana_page
-from evoexp.report import build, swept_settings
+from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.results import swept_settings
+from evoexp.report.results.stored_results import Results
 from evoexp.store.run_directory import RunDirectory
 from report_samples import REPORT, expand, store
 

@@ -11,8 +11,8 @@ from PIL import Image
 
 from evoexp.cli import main
 from evoexp.errors import SettingError
-from evoexp.report import style
-from evoexp.report.style import Look, drawn
+from evoexp.report.figures import style
+from evoexp.report.figures.style import Look, drawn
 from report_samples import SMALL
 
 LONG = "a name that is by far too long for the width of one of two columns of a printed page, " * 2

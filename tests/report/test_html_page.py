@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from evoexp.report import markdown
-from evoexp.report.home_page import read_summary
-from evoexp.report.html_page import html_page, inline, number_columns, verdict_counts
-from evoexp.report.page_parts import (
+from evoexp.report.pages import markdown
+from evoexp.report.pages.home_page import read_summary
+from evoexp.report.pages.html_page import html_page, inline, number_columns, verdict_counts
+from evoexp.report.pages.page_parts import (
     Document,
     Figures,
     FigureText,

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from evoexp.report import style
-from evoexp.report.style import Look, drawn
+from evoexp.report.figures import style
+from evoexp.report.figures.style import Look, drawn
 
 NAMES = ["the first of some conditions", "another one", "a third with a long name"]
 LONG = "share of the runs that were begun and came to their end [%]"

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 
 from evoexp.cli import main
 from evoexp.configuration import compose
-from evoexp.report import style
-from evoexp.report.figures import end_labels, sweeps
+from evoexp.report.figures import end_labels, style, sweeps
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, gather
-from evoexp.report.swept_settings import main_effects, sweep_of
+from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.results.swept_settings import main_effects, sweep_of
 from evoexp.shipped import shipped
 from report_samples import REPORT, SMALL, store
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import evoexp
-from evoexp.report.proven_answers import NO_PART
+from evoexp.report.results.proven_answers import NO_PART
 from evoexp.store import installed_code as module
 from evoexp.store.installed_code import installed_code
 
@@ -14,7 +14,7 @@ from evoexp.store.installed_code import installed_code
 @pytest.mark.parametrize(
     ("file", "changed"),
     [
-        ("report/style.py", [True, False]),
+        ("report/figures/style.py", [True, False]),
         ("papers/lavoie/measures.py", [True, False]),
         ("planners/planner.py", [True, True]),
         ("collision/certifier/verdict.py", [True, True]),

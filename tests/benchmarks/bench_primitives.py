@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.models.primitives import PrimitiveCollision, shapes_of_geometry
+from evoexp.collision.bodies.primitives import PrimitiveCollision, shapes_of_geometry
 from evoexp.scenarios.obstacles import obstacle_table
 from references import arms_6r, arms_7r, primitives_numpy
 

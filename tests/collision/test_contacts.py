@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 
 from composed import composed
-from evoexp.collision.models.contact_kernels import HIT, find_contacts
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
+from evoexp.collision.bodies.primitive_tables import Shapes
+from evoexp.collision.bodies.primitives import PrimitiveCollision
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,

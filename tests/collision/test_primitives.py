@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.models.primitives import (
+from evoexp.collision.bodies.primitives import (
     PrimitiveCollision,
     Shapes,
     default_pairs,

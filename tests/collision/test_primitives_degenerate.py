@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.models.primitives import PrimitiveCollision, Shapes
+from evoexp.collision.bodies.primitives import PrimitiveCollision, Shapes
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,

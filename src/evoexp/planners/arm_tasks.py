@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
+from evoexp.collision.bodies.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.collision.box_support import coal
-from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
-from evoexp.collision.models.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.collision.scene import Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from evoexp.collision.models.center_kernels import POINT
+from evoexp.collision.bodies.center_kernels import POINT
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import (
     Vector,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.primitive_distances import Core, Place
+from evoexp.collision.bodies.primitive_distances import Core, Place
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import (
     Mask,

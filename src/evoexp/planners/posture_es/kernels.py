@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.primitive_kernels import primitive_clearances
+from evoexp.collision.bodies.primitive_kernels import primitive_clearances
 from evoexp.numeric.compilation import kernel
 from evoexp.objectives.posture_cost import (
     ANGLE,

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.body_covers import Cover
-from evoexp.collision.models.body_models import BodyModel, CollisionModel
-from evoexp.collision.models.fitted_covers import fitted_covers, fitting_notes
-from evoexp.collision.models.inner_balls import inner_balls
+from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
+from evoexp.collision.bodies.fitted_covers import fitted_covers, fitting_notes
+from evoexp.collision.covers.body_covers import Cover
+from evoexp.collision.covers.inner_balls import inner_balls
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE

@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredCollision
-from evoexp.collision.models.touching_spheres import Clearance
+from evoexp.collision.bodies.covered_bodies import CoveredCollision
+from evoexp.collision.bodies.touching_spheres import Clearance
 from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ball_tests import (
+from evoexp.collision.bodies.ball_tests import (
     BATCH,
     WORD,
     bound_obstacles,
@@ -22,16 +22,16 @@ from evoexp.collision.models.ball_tests import (
     near_obstacle,
     near_pair,
 )
-from evoexp.collision.models.center_kernels import POINT
-from evoexp.collision.models.contact_kernels import find_contacts
-from evoexp.collision.models.encounter_kernels import (
+from evoexp.collision.bodies.center_kernels import POINT
+from evoexp.collision.bodies.contact_kernels import find_contacts
+from evoexp.collision.bodies.encounter_kernels import (
     Encounters,
     body_meets_body,
     body_meets_obstacles,
     fill_up,
     listed_from,
 )
-from evoexp.collision.models.packed_shapes import (
+from evoexp.collision.bodies.packed_shapes import (
     FIRST_LISTED,
     STOP_LISTED,
     ContactTables,

@@ -6,11 +6,11 @@ tested. What a search does not see any more is left to the certifier.
 
 import numpy as np
 
+from evoexp.collision.bodies.body_models import BodyModel
+from evoexp.collision.bodies.body_pairs import BodyPairs
+from evoexp.collision.bodies.primitive_tables import Shapes
+from evoexp.collision.bodies.primitives import PrimitiveCollision
 from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_models import BodyModel
-from evoexp.collision.models.body_pairs import BodyPairs
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 

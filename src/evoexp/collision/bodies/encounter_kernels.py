@@ -11,7 +11,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
-from evoexp.collision.models.packed_shapes import (
+from evoexp.collision.bodies.packed_shapes import (
     BOXES,
     CORE_SIZE,
     CYLINDERS,
@@ -25,7 +25,7 @@ from evoexp.collision.models.packed_shapes import (
     PackedShapes,
     Units,
 )
-from evoexp.collision.models.primitive_distances import (
+from evoexp.collision.bodies.primitive_distances import (
     Core,
     Motion,
     Row,

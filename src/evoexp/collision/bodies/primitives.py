@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
-from evoexp.collision.models.contact_kernels import HIT, find_contacts
-from evoexp.collision.models.contact_tables import contact_tables
-from evoexp.collision.models.packed_shapes import (
+from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
+from evoexp.collision.bodies.contact_tables import contact_tables
+from evoexp.collision.bodies.packed_shapes import (
     FIRST_LISTED,
     PackedObstacles,
     PackedShapes,
@@ -21,8 +21,8 @@ from evoexp.collision.models.packed_shapes import (
     Units,
     flat_primitives,
 )
-from evoexp.collision.models.primitive_kernels import BETWEEN, SELF, primitive_clearances
-from evoexp.collision.models.primitive_tables import (
+from evoexp.collision.bodies.primitive_kernels import BETWEEN, SELF, primitive_clearances
+from evoexp.collision.bodies.primitive_tables import (
     Pairs,
     Shapes,
     num_spheres,

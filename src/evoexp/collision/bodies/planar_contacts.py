@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.primitive_kernels import primitive_clearances
 from evoexp.collision.models.obstacle_kernels import MARGIN
-from evoexp.collision.models.primitive_kernels import primitive_clearances
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn

@@ -11,7 +11,7 @@ by a radius.
 
 import numpy as np
 
-from evoexp.collision.models.center_kernels import POINT
+from evoexp.collision.bodies.center_kernels import POINT
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import Vector, load, lower, magnitude, root, spread, store, upper
 from evoexp.records import FloatArray, IntArray

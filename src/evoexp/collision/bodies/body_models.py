@@ -9,19 +9,19 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_pairs import BodyPairs, body_pairs
+from evoexp.collision.bodies.primitive_tables import Shapes
+from evoexp.collision.bodies.primitives import PrimitiveCollision
 from evoexp.collision.box_support import coal
-from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_covers import (
+from evoexp.collision.covers.body_covers import (
     Cover,
     around_cylinder,
     capsule_cover,
     given_cover,
 )
-from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
-from evoexp.collision.models.inner_balls import inner_balls
-from evoexp.collision.models.kept_covers import kept_sphere_cover
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.covers.inner_balls import inner_balls
+from evoexp.collision.covers.kept_covers import kept_sphere_cover
+from evoexp.collision.derived_pairs import Pair
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.bodies.primitive_tables import Shapes
+from evoexp.collision.bodies.primitives import PrimitiveCollision
 from evoexp.collision.body_table import body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import (
@@ -18,8 +20,6 @@ from evoexp.collision.derived_pairs import (
     joint_limits,
     sampled_configurations,
 )
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.collision.motion_bounds import pair_reaches, reaches
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly

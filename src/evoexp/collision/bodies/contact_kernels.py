@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.center_kernels import POINT, nearest, spatial_point
-from evoexp.collision.models.contact_tables import (
+from evoexp.collision.bodies.center_kernels import POINT, nearest, spatial_point
+from evoexp.collision.bodies.contact_tables import (
     FIRST_BALL,
     FIRST_HALF_SPACE,
     FIRST_PART,
@@ -22,8 +22,8 @@ from evoexp.collision.models.contact_tables import (
     Scene,
     scene_of,
 )
+from evoexp.collision.bodies.packed_shapes import FIRST_RUN, JOINT, STOP_RUN
 from evoexp.collision.models.obstacle_kernels import MARGIN, nearest_to_obstacle
-from evoexp.collision.models.packed_shapes import FIRST_RUN, JOINT, STOP_RUN
 from evoexp.numeric.compilation import borrowed, inlined, kernel, view_part
 from evoexp.numeric.vectors import (
     LANES,

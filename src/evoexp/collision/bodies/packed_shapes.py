@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.flat_tables import (
+from evoexp.collision.bodies.flat_tables import (
     CHAIN_BLOCKS,
     chain_of,
     column_of,

@@ -8,9 +8,8 @@ bits of a word.
 
 import numpy as np
 
-from evoexp.collision.models.center_kernels import spatial_point
-from evoexp.collision.models.obstacle_kernels import MARGIN
-from evoexp.collision.models.packed_shapes import (
+from evoexp.collision.bodies.center_kernels import spatial_point
+from evoexp.collision.bodies.packed_shapes import (
     AROUND,
     BOX,
     BOX_THICKNESS,
@@ -23,6 +22,7 @@ from evoexp.collision.models.packed_shapes import (
     PackedObstacles,
     Units,
 )
+from evoexp.collision.models.obstacle_kernels import MARGIN
 from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.vectors import LANES as EIGHT
 from evoexp.numeric.vectors import (

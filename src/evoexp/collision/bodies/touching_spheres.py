@@ -11,9 +11,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.models.planar_contacts import CircleTables, contacts, link_lines
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
+from evoexp.collision.bodies.primitive_tables import Shapes
+from evoexp.collision.bodies.primitives import PrimitiveCollision
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product

@@ -14,7 +14,7 @@ import coal
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.models.body_covers import Cover
+from evoexp.collision.covers.body_covers import Cover
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.flat_tables import (
+from evoexp.collision.bodies.flat_tables import (
     CHAIN_BLOCKS,
     OBSTACLE_BLOCKS,
     chain_of,
@@ -16,8 +16,7 @@ from evoexp.collision.models.flat_tables import (
     obstacles_of,
     table_of,
 )
-from evoexp.collision.models.obstacle_kernels import MARGIN
-from evoexp.collision.models.packed_shapes import (
+from evoexp.collision.bodies.packed_shapes import (
     FIRST_LISTED,
     REACH,
     STOP_LISTED,
@@ -26,6 +25,7 @@ from evoexp.collision.models.packed_shapes import (
     PackedShapes,
     Units,
 )
+from evoexp.collision.models.obstacle_kernels import MARGIN
 from evoexp.numeric.compilation import inlined
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicChain

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.packed_shapes import (
+from evoexp.collision.bodies.packed_shapes import (
     BOXES,
     CYLINDERS,
     FIRST_RUN,

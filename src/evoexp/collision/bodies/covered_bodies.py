@@ -9,11 +9,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
+from evoexp.collision.bodies.fitted_covers import fitted_covers, fitting_notes
+from evoexp.collision.bodies.primitives import PrimitiveCollision
+from evoexp.collision.bodies.touching_spheres import Clearance
 from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_models import BodyModel, CollisionModel
-from evoexp.collision.models.fitted_covers import fitted_covers, fitting_notes
-from evoexp.collision.models.primitives import PrimitiveCollision
-from evoexp.collision.models.touching_spheres import Clearance
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly

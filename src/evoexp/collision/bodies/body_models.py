@@ -9,9 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.body_pairs import BodyPairs, body_pairs
-from evoexp.collision.bodies.primitive_tables import Shapes
-from evoexp.collision.bodies.primitives import PrimitiveCollision
+from evoexp.collision.bodies.shapes import Shapes
 from evoexp.collision.box_support import coal
 from evoexp.collision.covers.body_covers import (
     Cover,
@@ -162,7 +162,7 @@ class BodyModel(NamedTuple):
         obstacles: ObstacleTable,
         ignored: tuple[Pair, ...] = (),
         carried: "Carried | None" = None,
-    ) -> PrimitiveCollision:
+    ) -> BodyCollision:
         """Return the collision model among obstacles.
 
         Args:
@@ -181,7 +181,7 @@ class BodyModel(NamedTuple):
             shapes = Shapes(*(np.concatenate(both) for both in columns))
             pairs = (*pairs, *((body, own) for body in carried.watched))
         table = self.assembly.table
-        return PrimitiveCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
+        return BodyCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
 
     def touching(
         self,
@@ -189,7 +189,7 @@ class BodyModel(NamedTuple):
         allowed: tuple[Pair, ...],
         depth: float,
         carried: "Carried | None" = None,
-    ) -> PrimitiveCollision | None:
+    ) -> BodyCollision | None:
         """Return the model of the pairs that may touch: what is inside of bodies must stay free.
 
         Args:
@@ -218,7 +218,7 @@ class BodyModel(NamedTuple):
         ignored = tuple(pair for pair in every if pair not in allowed)
         model, table = self.assembly.model, self.assembly.table
         arms = [0] * model.njoints
-        return PrimitiveCollision.build(model, shapes, obstacles, (), ignored, arms, table)
+        return BodyCollision.build(model, shapes, obstacles, (), ignored, arms, table)
 
 
 class Carried(NamedTuple):

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.primitive_tables import Shapes
-from evoexp.collision.bodies.primitives import PrimitiveCollision
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.shapes import Shapes
 from evoexp.collision.body_table import body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import (
@@ -137,7 +137,7 @@ def _coal_touches(assembly: Assembly, pairs: list[Pair], q: FloatArray) -> np.nd
     return out
 
 
-def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
+def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> BodyCollision:
     """Return the model of two bodies alone."""
     kept = np.isin(shapes.labels, pair)
     own = Shapes(
@@ -147,7 +147,7 @@ def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision
         shapes.radius[kept],
         shapes.labels[kept],
     )
-    return PrimitiveCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
+    return BodyCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
 
 
 def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:

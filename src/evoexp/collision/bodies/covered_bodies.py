@@ -9,9 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
 from evoexp.collision.bodies.fitted_covers import fitted_covers, fitting_notes
-from evoexp.collision.bodies.primitives import PrimitiveCollision
 from evoexp.collision.bodies.touching_spheres import Clearance
 from evoexp.collision.derived_pairs import Pair
 from evoexp.numeric.elementary import DEGREE
@@ -59,7 +59,7 @@ class CoveredCollision(NamedTuple):
 
     assembly: Assembly  # the robot
     bodies: BodyModel  # its bodies, covered
-    collision: PrimitiveCollision  # the kernels' tables
+    collision: BodyCollision  # the kernels' tables
     obstacles: ObstacleTable  # the obstacle table
 
     @property

@@ -6,10 +6,10 @@ tested. What a search does not see any more is left to the certifier.
 
 import numpy as np
 
+from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.body_models import BodyModel
 from evoexp.collision.bodies.body_pairs import BodyPairs
-from evoexp.collision.bodies.primitive_tables import Shapes
-from evoexp.collision.bodies.primitives import PrimitiveCollision
+from evoexp.collision.bodies.shapes import Shapes
 from evoexp.collision.derived_pairs import Pair
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
@@ -73,11 +73,11 @@ def _shrunk(
     return shapes._replace(radius=radius), shrunk
 
 
-def _alone(bodies: BodyModel, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
+def _alone(bodies: BodyModel, shapes: Shapes, pair: Pair) -> BodyCollision:
     """Return the model of two bodies alone."""
     own = _those(shapes, np.isin(shapes.labels, pair))
     around = obstacle_table(())
-    return PrimitiveCollision.build(bodies.assembly.model, own, around, (pair,))
+    return BodyCollision.build(bodies.assembly.model, own, around, (pair,))
 
 
 def _those(shapes: Shapes, kept: BoolArray) -> Shapes:

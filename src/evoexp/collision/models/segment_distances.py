@@ -1,4 +1,4 @@
-"""Distances of capsules' axes, in encounters; see `primitive_distances`.
+"""Distances of capsules' axes, in encounters; see `bodies.distances`.
 
 The distance of a point that moves along a segment to a convex body is a convex function of its
 place on the segment: it is least where its slope changes sign. For boxes the slope (of half the
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.primitive_distances import Core, Place
+from evoexp.collision.bodies.distances import Core, Place
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import (
     Mask,

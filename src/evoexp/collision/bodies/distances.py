@@ -1,9 +1,8 @@
-"""Distances of spheres in encounters of a body with an obstacle or with another body.
+"""Distances of a body's spheres from an obstacle, or from another body's, in eight configurations.
 
 Everything here is seen from the obstacle's frame or from the other body's frame: then the shapes of
-one side are constants, and only one rigid motion per encounter is needed for the other side. Eight
-encounters are measured at a time, as vectors (`numeric.vectors`): the motions and the least
-clearances stay in registers while the shapes pass by.
+one side are constants, and only one rigid motion is needed for the other side. The motions and the
+least clearances of eight configurations stay in registers while the shapes pass by.
 
 A sphere, a capsule and a box are one shape: a box (with edges of length 0 where needed), thickened
 by a radius.
@@ -20,7 +19,7 @@ from evoexp.robots.kinematics import U
 
 Row = tuple[Vector, Vector, Vector, Vector]
 Motion = tuple[Row, Row, Row]
-"""Rigid motions of eight encounters: per coordinate a row of the rotation, and the translation."""
+"""Eight rigid motions: per coordinate a row of the rotation, and the translation."""
 
 Place = tuple[Vector, Vector, Vector]
 """Eight points or directions: x, y, z."""

@@ -12,19 +12,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.center_kernels import POINT, spatial_point
+from evoexp.collision.bodies.capsule_distances import (
+    Segments,
+    nearest_on_segments,
+    segment_to_point,
+    segment_to_segments,
+)
 from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.distances import (
+    MARGIN,
+    POINT,
     Motion,
     Place,
     Row,
-    center_at,
+    distance_from_core,
     move_spheres,
     moved_point,
-    spheres_to_boxes,
-    spheres_to_cylinders,
-    spheres_to_half_spaces,
+    place_point,
+    point_at,
+    seen_from,
     spheres_to_spheres,
+    squared_distance,
     turned,
 )
 from evoexp.collision.bodies.tables import (
@@ -44,16 +52,6 @@ from evoexp.collision.bodies.tables import (
     FlatTables,
     named_tables,
 )
-from evoexp.collision.models.obstacle_kernels import MARGIN
-from evoexp.collision.models.segment_distances import (
-    Segments,
-    segment_to_points,
-    segment_to_segments,
-    segments_to_boxes,
-    segments_to_cylinders,
-    segments_to_half_spaces,
-    segments_to_point,
-)
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import (
     LANES,
@@ -70,7 +68,7 @@ from evoexp.numeric.vectors import (
 from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, eight_of, spatial_frames
 from evoexp.robots.kinematics import SPATIAL_ROWS, U
-from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE
+from evoexp.scenarios.obstacles import HALF_SPACE
 
 
 class Memory(NamedTuple):
@@ -137,10 +135,9 @@ def _least_clearances(
         eight, sound = eight_of(q, first, count, memory.q), spread(0.0)
         spatial_frames(tables.chain, eight, 1.0, memory.frames)
         for b in range(len(units)):
-            place = U(b) * POINT
-            spatial_point(memory.frames, units[b, JOINT], tables.balls[b], middles, place, VECTOR)
-            for row in range(3):
-                sound = sound + load(middles, place + U(row) * VECTOR) * 0.0
+            place_point(memory.frames, units[b, JOINT], tables.balls[b], middles, U(b))
+            x, y, z = point_at(middles, U(b))
+            sound = sound + x * 0.0 + y * 0.0 + z * 0.0
         # the limit, NaN where q holds NaN; then exact distances where a ball is nearer
         for row in range(3):
             store(least, U(row) * VECTOR, limit + sound)
@@ -169,12 +166,6 @@ def _lower(memory: Memory, row: np.uint64, found: Vector, decide: bool) -> None:
 
 
 @inlined
-def _middle(memory: Memory, unit: int) -> Place:
-    """Return the centres of a unit's ball."""
-    return center_at(memory.middles, unit)
-
-
-@inlined
 def _is_near(tables: BodyTables, memory: Memory, unit: int, o: int) -> bool:
     """Return whether a unit's ball may be nearer to an obstacle than the clearance so far.
 
@@ -182,19 +173,18 @@ def _is_near(tables: BodyTables, memory: Memory, unit: int, o: int) -> bool:
     """
     center, turn, core = tables.obstacles.center[o], tables.obstacles.rotation[o], tables.cores[o]
     reach, least, zero = tables.balls[unit, REACH], load(memory.least, U(0)), spread(0.0)
-    x, y, z = _middle(memory, unit)
+    middle = point_at(memory.middles, U(unit))
     if tables.obstacles.kind[o] == HALF_SPACE:
         level = turn[2] * center[0] + turn[5] * center[1] + turn[8] * center[2]
-        height = turn[2] * x + turn[5] * y + turn[8] * z - level
+        height = turn[2] * middle[0] + turn[5] * middle[1] + turn[8] * middle[2] - level
         return any_lane(height < least + (reach * MARGIN + abs(level) * (MARGIN - 1.0)))
-    x, y, z = x - center[0], y - center[1], z - center[2]
     within = upper(zero, (least + (reach + core[AROUND]) * MARGIN) * MARGIN)
-    if not any_lane(x * x + y * y + z * z < within * within):
+    square = squared_distance(middle, (center[0], center[1], center[2]))
+    if not any_lane(square < within * within):
         return False
     within = (least + (reach + core[THICKNESS]) * MARGIN) * MARGIN
-    u = magnitude(turn[0] * x + turn[3] * y + turn[6] * z) - core[0]
-    v = magnitude(turn[1] * x + turn[4] * y + turn[7] * z) - core[1]
-    w = magnitude(turn[2] * x + turn[5] * y + turn[8] * z) - core[2]
+    x, y, z = seen_from(center, turn, middle)
+    u, v, w = magnitude(x) - core[0], magnitude(y) - core[1], magnitude(z) - core[2]
     deeper = upper(upper(u, v), w) < lower(zero, within)
     within = upper(zero, within)
     u, v, w = upper(u, zero), upper(v, zero), upper(w, zero)
@@ -225,26 +215,16 @@ def _meet_obstacle(tables: BodyTables, memory: Memory, b: int, o: int, decide: b
 def _from_obstacle(tables: BodyTables, unit: int, o: int, motion: Motion) -> Vector:
     """Return the clearances of a unit from an obstacle into whose frame a motion leads."""
     units, runs, spheres, capsules = tables.units, tables.runs, tables.spheres, tables.capsules
-    kind, box, least = tables.obstacles.kind[o], tables.cores[o], spread(np.inf)
-    core = spread(box[0]), spread(box[1]), spread(box[2]), spread(box[THICKNESS])
-    if kind == CYLINDER:  # radius, half the length
-        core = core[0], core[2], core[3], core[3]
-    first, stop = units[unit, FIRST_RUN], units[unit, STOP_RUN]
-    if first < stop:
-        if kind == HALF_SPACE:
-            least = spheres_to_half_spaces(motion, runs, spheres, first, stop, least)
-        elif kind == CYLINDER:
-            least = spheres_to_cylinders(motion, core, runs, spheres, first, stop, least)
-        else:
-            least = spheres_to_boxes(motion, core, runs, spheres, first, stop, least)
+    kind, core, least = tables.obstacles.kind[o], tables.cores[o], spread(np.inf)
+    for run in range(units[unit, FIRST_RUN], units[unit, STOP_RUN]):
+        for i in range(runs[run, 0], runs[run, 1]):
+            point = moved_point(motion, spheres[i, 0], spheres[i, 1], spheres[i, 2])
+            distance = distance_from_core(kind, core, point)
+            least = lower(least, distance - (core[THICKNESS] + spheres[i, 3]))
     for i in range(units[unit, FIRST_CAPSULE], units[unit, STOP_CAPSULE]):
-        segments = _moved_axis(motion, capsules[i])
-        if kind == HALF_SPACE:
-            least = segments_to_half_spaces(segments, capsules[i, 6], least)
-        elif kind == CYLINDER:
-            least = segments_to_cylinders(segments, capsules[i, 6], core, least)
-        else:
-            least = segments_to_boxes(segments, capsules[i, 6], core, least)
+        point = nearest_on_segments(kind, core, _moved_axis(motion, capsules[i]))
+        distance = distance_from_core(kind, core, point)
+        least = lower(least, distance - (core[THICKNESS] + capsules[i, 6]))
     return least
 
 
@@ -253,9 +233,8 @@ def _are_near(tables: BodyTables, memory: Memory, one: int, two: int, row: np.ui
     """Return whether the balls around two units may be nearer than the clearance so far."""
     margin = (tables.balls[one, REACH] + tables.balls[two, REACH]) * MARGIN
     within = upper(spread(0.0), (load(memory.least, row) + margin) * MARGIN)
-    a, b = _middle(memory, one), _middle(memory, two)
-    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return any_lane(x * x + y * y + z * z < within * within)
+    a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
+    return any_lane(squared_distance(a, b) < within * within)
 
 
 @inlined
@@ -286,20 +265,28 @@ def _between(tables: BodyTables, memory: Memory, one: int, two: int) -> Vector:
         least = spheres_to_spheres(runs, spheres, run, first, stop, centers, least)
     for i in range(units[one, FIRST_CAPSULE], units[one, STOP_CAPSULE]):
         for j in range(begin, end):
-            both = capsules[i, 6] + spheres[j, 3]
-            least = segment_to_points(capsules[i], center_at(centers, j - begin), both, least)
+            distance = segment_to_point(
+                _axis(capsules[i]), capsules[i, 7], point_at(centers, U(j - begin))
+            )
+            least = lower(least, distance - (capsules[i, 6] + spheres[j, 3]))
     # the second's capsules against both
     for j in range(units[two, FIRST_CAPSULE], units[two, STOP_CAPSULE]):
-        segments = _moved_axis(motion, capsules[j])
-        inverse, thickness = capsules[j, 7], capsules[j, 6]
+        segments, thickness = _moved_axis(motion, capsules[j]), capsules[j, 6]
         for run in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
             for i in range(runs[run, 0], runs[run, 1]):
-                both = thickness + spheres[i, 3]
-                least = segments_to_point(segments, spheres[i], inverse, both, least)
+                center = spheres[i, 0], spheres[i, 1], spheres[i, 2]
+                distance = segment_to_point(segments, capsules[j, 7], center)
+                least = lower(least, distance - (thickness + spheres[i, 3]))
         for i in range(units[one, FIRST_CAPSULE], units[one, STOP_CAPSULE]):
-            both = capsules[i, 6] + thickness
-            least = segment_to_segments(capsules[i], segments, inverse, both, least)
+            distance = segment_to_segments(capsules[i], segments, capsules[j, 7])
+            least = lower(least, distance - (capsules[i, 6] + thickness))
     return least
+
+
+@inlined
+def _axis(capsule: FloatArray) -> Segments:
+    """Return a capsule's constant axis."""
+    return Segments((capsule[0], capsule[1], capsule[2]), (capsule[3], capsule[4], capsule[5]))
 
 
 @inlined

@@ -11,7 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.center_kernels import POINT, nearest, spatial_point
+from evoexp.collision.bodies.distances import (
+    MARGIN,
+    POINT,
+    nearest,
+    nearest_to_obstacle,
+    place_point,
+    point_at,
+    squared_distance,
+)
 from evoexp.collision.bodies.tables import (
     FIRST_BALL,
     FIRST_HALF_SPACE,
@@ -26,13 +34,11 @@ from evoexp.collision.bodies.tables import (
     FlatTables,
     named_tables,
 )
-from evoexp.collision.models.obstacle_kernels import MARGIN, nearest_to_obstacle
 from evoexp.numeric.compilation import borrowed, inlined, kernel, view_part
 from evoexp.numeric.vectors import (
     LANES,
     Vector,
     any_lane,
-    load,
     lower,
     magnitude,
     root,
@@ -183,8 +189,8 @@ def _place(scene: BodyTables, memory: Memory, unit: int, time: float) -> None:
     """Compute the centre of a unit's ball, once."""
     if memory.placed[unit] != time:
         memory.placed[unit] = time
-        joint, place = scene.units[unit, JOINT], U(unit) * POINT
-        spatial_point(memory.frames, joint, scene.balls[unit], memory.middles, place, VECTOR)
+        joint, ball = scene.units[unit, JOINT], scene.balls[unit]
+        place_point(memory.frames, joint, ball, memory.middles, U(unit))
 
 
 @inlined
@@ -195,8 +201,7 @@ def _place_spheres(scene: BodyTables, memory: Memory, unit: int, time: float) ->
         memory.known[unit] = time
         first, stop = units[unit, FIRST_RUN], units[unit, STOP_RUN]
         for k in range(runs[first, 0], runs[stop - 1, 1]):
-            local, place = scene.spheres[k], U(k) * POINT
-            spatial_point(memory.frames, units[unit, JOINT], local, memory.centers, place, VECTOR)
+            place_point(memory.frames, units[unit, JOINT], scene.spheres[k], memory.centers, U(k))
 
 
 @inlined
@@ -225,9 +230,7 @@ def _meet_obstacles(
         if first == stop:
             continue
         _place(scene, memory, b, time)
-        own = U(b) * POINT
-        x, y = load(memory.middles, own), load(memory.middles, own + VECTOR)
-        z = load(memory.middles, own + U(2) * VECTOR)
+        x, y, z = point_at(memory.middles, U(b))
         square, nothing = x * x + y * y + z * z, spread(0.0)
         value = lower(
             _from_obstacles(entries, first, flat, square, x, y, z),
@@ -252,8 +255,7 @@ def _is_near(
 ) -> bool:
     """Return whether a unit's ball meets an obstacle in a lane that may be free yet, or nearly."""
     _place(scene, memory, unit, time)
-    one, infinite = U(unit), spread(np.inf)
-    middle = nearest_to_obstacle(scene.obstacles, o, memory.middles, one, one + U(1), infinite)
+    middle = nearest_to_obstacle(scene, o, memory.middles, U(unit), U(unit) + U(1))
     near = select(least < -1.0 * limits.slack, spread(-np.inf), limits.slack)
     return any_lane(middle - scene.balls[unit, REACH] * MARGIN < near)
 
@@ -263,7 +265,7 @@ def _measure_obstacle(
     scene: BodyTables, memory: Memory, b: int, o: int, time: float, limits: Limits, least: Vector
 ) -> Vector:
     """Lower a clearance to that of a body's spheres from an obstacle; far parts are skipped."""
-    units, runs, infinite = scene.units, scene.runs, spread(np.inf)
+    units, runs = scene.units, scene.runs
     first, stop = units[b, FIRST_PART], units[b, STOP_PART]
     # the ball around a sphere was tested exactly; that around a box is large
     coarse = scene.obstacles.kind[o] != SPHERE and stop - first > 1
@@ -274,8 +276,8 @@ def _measure_obstacle(
             _place_spheres(scene, memory, part, time)
             for run in range(units[part, FIRST_RUN], units[part, STOP_RUN]):
                 i, end = U(runs[run, 0]), U(runs[run, 1])
-                found = nearest_to_obstacle(scene.obstacles, o, memory.centers, i, end, infinite)
-                least = lower(least, found - scene.spheres[i, 3])
+                distance = nearest_to_obstacle(scene, o, memory.centers, i, end)
+                least = lower(least, distance - scene.spheres[i, 3])
     return least
 
 
@@ -306,10 +308,8 @@ def _meet(scene: BodyTables, memory: Memory, one: int, two: int, time: float, ne
     reach = (scene.balls[one, REACH] + scene.balls[two, REACH]) * MARGIN
     _place(scene, memory, one, time)
     _place(scene, memory, two, time)
-    i, j, m = U(one) * POINT, U(two) * POINT, memory.middles
-    x, y = load(m, i) - load(m, j), load(m, i + VECTOR) - load(m, j + VECTOR)
-    z = load(m, i + U(2) * VECTOR) - load(m, j + U(2) * VECTOR)
-    return any_lane(x * x + y * y + z * z - reach * reach < near)
+    a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
+    return any_lane(squared_distance(a, b) - reach * reach < near)
 
 
 @inlined
@@ -320,6 +320,6 @@ def _measure(scene: BodyTables, memory: Memory, one: int, two: int, least: Vecto
         i, end = U(runs[a, 0]), U(runs[a, 1])
         for b in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
             first, stop = U(runs[b, 0]), U(runs[b, 1])
-            square = nearest(memory.centers, i, end, first, stop, spread(np.inf))
+            square = nearest(memory.centers, i, end, first, stop)
             least = lower(least, root(square) - (spheres[i, 3] + spheres[first, 3]))
     return least

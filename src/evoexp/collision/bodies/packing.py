@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.distances import MARGIN
 from evoexp.collision.bodies.shapes import Shapes
 from evoexp.collision.bodies.tables import (
     AROUND,
@@ -24,7 +25,6 @@ from evoexp.collision.bodies.tables import (
     THICKNESS,
     BodyTables,
 )
-from evoexp.collision.models.obstacle_kernels import MARGIN
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE, ObstacleTable

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.collision.bodies.clearance_kernels import least_clearances
-from evoexp.collision.models.obstacle_kernels import MARGIN
+from evoexp.collision.bodies.distances import MARGIN
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn

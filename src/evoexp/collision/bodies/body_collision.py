@@ -17,7 +17,7 @@ from evoexp.collision.bodies.shapes import Pairs, Shapes, arms_of_joints, defaul
 from evoexp.collision.bodies.tables import FlatTables, flattened
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
-from evoexp.scenarios.obstacles import ObstacleTable
+from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 
 
 class Clearances(NamedTuple):
@@ -26,7 +26,9 @@ class Clearances(NamedTuple):
     # (configurations,) least distance of the robot's shapes to obstacles [length unit]
     to_obstacles: FloatArray
     between_arms: FloatArray  # (configurations,) least distance of shapes of two arms
-    to_self: FloatArray  # (configurations,) least distance of shapes of one arm
+    # (configurations,) least distance of shapes of one arm; +inf where those are no pairs, or
+    # count as two arms
+    to_self: FloatArray | float = np.inf
 
     @property
     def least(self) -> FloatArray:
@@ -80,6 +82,12 @@ class BodyCollision(NamedTuple):
             )
         packed = pack_tables(table, shapes, obstacles, tuple(chosen), tuple(ignored), arm)
         return cls(table, flattened(packed), len(packed.capsules) == 0)
+
+    @classmethod
+    def of_pair(cls, model: Any, shapes: Shapes, pair: tuple[int, int]) -> "BodyCollision":
+        """Return the collision model of two bodies alone."""
+        own = shapes.of(np.isin(shapes.labels, pair))
+        return cls.build(model, own, obstacle_table(()), (pair,))
 
     def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearances:
         """Return the clearances of a batch of configurations.

@@ -31,6 +31,12 @@ class Shapes(NamedTuple):
         every = self._replace(body=self.labels)
         return Shapes(*(np.asarray(column)[chosen] for column in every))
 
+    @classmethod
+    def joined(cls, parts: Iterable["Shapes"]) -> "Shapes":
+        """Return the shapes of several bodies together, with the numbers of their bodies."""
+        columns = zip(*(part._replace(body=part.labels) for part in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
     def checked(self, model: Any) -> "Shapes":
         """Return the shapes as arrays of the right types.
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
 from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
 from evoexp.collision.bodies.shapes import Shapes
 from evoexp.errors import SettingError
@@ -138,20 +138,6 @@ class Spheres(NamedTuple):
     radius: float  # of every sphere [length unit]
 
 
-class Clearance(NamedTuple):
-    """Least clearances of a batch: negative where spheres overlap, +inf where nothing is met."""
-
-    # (configurations,) least centre distance of spheres of two arms, less both radii
-    between_arms: FloatArray
-    # (configurations,) least distance of a centre to an obstacle's surface, less the radius
-    to_obstacles: FloatArray
-
-    @property
-    def least(self) -> FloatArray:
-        """Smaller of the two; a configuration collides where it is negative."""
-        return np.minimum(self.between_arms, self.to_obstacles)
-
-
 class SphereCollision(NamedTuple):
     """Touching spheres on one robot, and the obstacles around it."""
 
@@ -175,7 +161,7 @@ class SphereCollision(NamedTuple):
         """Radius of every sphere [length unit]."""
         return self.spheres.radius
 
-    def clearance(self, q: FloatArray) -> Clearance:
+    def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg].
 
         Raises:
@@ -194,7 +180,7 @@ class SphereCollision(NamedTuple):
                 kind, size, matrix_product(points, rotation.reshape(3, 3))
             )
             outside = np.minimum(outside, distances.min(axis=0))
-        return Clearance(np.sqrt(squares) - 2.0 * self.radius, outside - self.radius)
+        return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,): where `clearance` is negative.

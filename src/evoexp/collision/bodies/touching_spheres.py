@@ -1,7 +1,7 @@
 """Links as strings of touching circles or spheres (Rana & Zalzala 1995, Fig. 3).
 
 Any number of arms, in the plane or in space, among static obstacles. Yes and no come from
-`planar_contacts` or `primitives`; clearances, which are asked for at the ends of a search, from
+`planar_contacts` or `body_collision`; clearances, which are asked for at the ends of a search, from
 the centres here.
 """
 
@@ -11,9 +11,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.models.planar_contacts import CircleTables, contacts, link_lines
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
+from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
+from evoexp.collision.bodies.shapes import Shapes
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product
@@ -82,7 +82,7 @@ class TouchingSpheres(Component):
         arm_of_joints = [arm_of.get(joint, -1) for joint in range(assembly.model.njoints)]
         around = obstacle_table(obstacles).without_ellipses()
         shapes = Shapes(moving, centers, centers, radii)
-        general = PrimitiveCollision.build(
+        general = BodyCollision.build(
             assembly.model, shapes, around, between, (), arm_of_joints, table
         )
         # the planar one, of links as lines of circles
@@ -138,20 +138,6 @@ class Spheres(NamedTuple):
     radius: float  # of every sphere [length unit]
 
 
-class Clearance(NamedTuple):
-    """Least clearances of a batch: negative where spheres overlap, +inf where nothing is met."""
-
-    # (configurations,) least centre distance of spheres of two arms, less both radii
-    between_arms: FloatArray
-    # (configurations,) least distance of a centre to an obstacle's surface, less the radius
-    to_obstacles: FloatArray
-
-    @property
-    def least(self) -> FloatArray:
-        """Smaller of the two; a configuration collides where it is negative."""
-        return np.minimum(self.between_arms, self.to_obstacles)
-
-
 class SphereCollision(NamedTuple):
     """Touching spheres on one robot, and the obstacles around it."""
 
@@ -159,7 +145,7 @@ class SphereCollision(NamedTuple):
     spheres: Spheres  # the spheres
     arm_spheres: IntArray  # (arms, 2) first and one-past-last sphere of each arm
     obstacles: ObstacleTable  # the obstacle table
-    general: PrimitiveCollision  # the same spheres in the model of spheres and capsules
+    general: BodyCollision  # the same spheres in the model of spheres and capsules
     tables: CircleTables  # for the kernel `contacts`
     geometry: Any  # the same spheres as a `pin.GeometryModel` of coal spheres
 
@@ -175,7 +161,7 @@ class SphereCollision(NamedTuple):
         """Radius of every sphere [length unit]."""
         return self.spheres.radius
 
-    def clearance(self, q: FloatArray) -> Clearance:
+    def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg].
 
         Raises:
@@ -194,7 +180,7 @@ class SphereCollision(NamedTuple):
                 kind, size, matrix_product(points, rotation.reshape(3, 3))
             )
             outside = np.minimum(outside, distances.min(axis=0))
-        return Clearance(np.sqrt(squares) - 2.0 * self.radius, outside - self.radius)
+        return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,): where `clearance` is negative.

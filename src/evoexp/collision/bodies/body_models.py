@@ -9,23 +9,26 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_pairs import BodyPairs, body_pairs
+from evoexp.collision.bodies.shapes import Shapes
 from evoexp.collision.box_support import coal
-from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_covers import (
+from evoexp.collision.covers.body_covers import (
     Cover,
     around_cylinder,
     capsule_cover,
     given_cover,
 )
-from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
-from evoexp.collision.models.inner_balls import inner_balls
-from evoexp.collision.models.kept_covers import kept_sphere_cover
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.covers.inner_balls import inner_balls
+from evoexp.collision.covers.kept_covers import kept_sphere_cover
+from evoexp.collision.derived_pairs import Pair
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable
 from evoexp.validation import Component, NonNegative, Positive
+
+SLACK = 1e-6  # [length unit] by which covers are made smaller than it takes
+SMALLEST = 1e-6  # [length unit] radius of a cover
 
 
 class CollisionModel(Component):
@@ -50,15 +53,11 @@ class CollisionModel(Component):
         Raises:
             UnsupportedShape: If a body cannot be covered.
         """
-        covers = [
-            self.cover_of(item, (assembly.spheres or {}).get(item.name))
-            for item in assembly.geometry.geometryObjects
-        ]
-        shapes = cover_shapes(
-            covers, [item.parentJoint for item in assembly.geometry.geometryObjects]
-        )
-        pairs = body_pairs(assembly, shapes)
-        return BodyModel(assembly, tuple(covers), shapes, pairs, self.asked)
+        items, given = list(assembly.geometry.geometryObjects), assembly.spheres or {}
+        covers = tuple(self.cover_of(item, given.get(item.name)) for item in items)
+        bodies = zip(covers, (item.parentJoint for item in items), strict=True)
+        shapes = Shapes.joined(_shapes(*body, number) for number, body in enumerate(bodies))
+        return BodyModel(assembly, covers, shapes, body_pairs(assembly, shapes), self.asked)
 
 
 class SphereSets(CollisionModel):
@@ -111,7 +110,7 @@ class BodyModel(NamedTuple):
     shapes: Shapes  # all of them; a shape's body is its index among the geometry objects
     sorted_pairs: BodyPairs  # pairs of bodies, by who judges them
     asked: float = np.inf  # how far covers are asked to reach beyond bodies at most [length unit]
-    # bodies whose covers were made smaller (`fitted_covers`), and by how much
+    # bodies whose covers were made smaller (`fitted`), and by how much
     shrunk: tuple[tuple[int, float], ...] = ()
 
     @property
@@ -162,7 +161,7 @@ class BodyModel(NamedTuple):
         obstacles: ObstacleTable,
         ignored: tuple[Pair, ...] = (),
         carried: "Carried | None" = None,
-    ) -> PrimitiveCollision:
+    ) -> BodyCollision:
         """Return the collision model among obstacles.
 
         Args:
@@ -176,12 +175,10 @@ class BodyModel(NamedTuple):
             of_joint[item.parentJoint] = arm if item.parentJoint else -1
         if carried is not None:
             own = len(self.covers)
-            extra = cover_shapes([carried.cover], [carried.joint], own)
-            columns: Any = zip(shapes, extra, strict=True)
-            shapes = Shapes(*(np.concatenate(both) for both in columns))
+            shapes = Shapes.joined([shapes, _shapes(carried.cover, carried.joint, own)])
             pairs = (*pairs, *((body, own) for body in carried.watched))
         table = self.assembly.table
-        return PrimitiveCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
+        return BodyCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
 
     def touching(
         self,
@@ -189,7 +186,7 @@ class BodyModel(NamedTuple):
         allowed: tuple[Pair, ...],
         depth: float,
         carried: "Carried | None" = None,
-    ) -> PrimitiveCollision | None:
+    ) -> BodyCollision | None:
         """Return the model of the pairs that may touch: what is inside of bodies must stay free.
 
         Args:
@@ -202,23 +199,68 @@ class BodyModel(NamedTuple):
             without such pairs.
         """
         items, own = list(self.assembly.geometry.geometryObjects), len(self.covers)
-        found: dict[int, Shapes] = {}
-        for b in sorted({body for body, _ in allowed}):
-            if b == own and carried is not None:
-                found[b] = cover_shapes([carried.inner], [carried.joint], b)
-                continue
-            inner = inner_balls(items[b], depth)
-            if inner is not None:
-                found[b] = cover_shapes([inner], [items[b].parentJoint], b)
-        if not found:
+        inner: dict[int, Shapes] = {}
+        for body in sorted({body for body, _ in allowed}):
+            if body == own and carried is not None:
+                inner[body] = _shapes(carried.inner, carried.joint, body)
+            elif (cover := inner_balls(items[body], depth)) is not None:
+                inner[body] = _shapes(cover, items[body].parentJoint, body)
+        if not inner:
             return None
-        columns: Any = zip(*found.values(), strict=True)
-        shapes = Shapes(*(np.concatenate(column) for column in columns))
-        every = ((body, k) for body in found for k in range(len(obstacles.kind)))
+        shapes = Shapes.joined(inner.values())
+        every = ((body, k) for body in inner for k in range(len(obstacles.kind)))
         ignored = tuple(pair for pair in every if pair not in allowed)
         model, table = self.assembly.model, self.assembly.table
         arms = [0] * model.njoints
-        return PrimitiveCollision.build(model, shapes, obstacles, (), ignored, arms, table)
+        return BodyCollision.build(model, shapes, obstacles, (), ignored, arms, table)
+
+    def fitted(
+        self, obstacles: ObstacleTable, ignored: tuple[Pair, ...], q: FloatArray
+    ) -> "BodyModel":
+        """Return bodies whose covers do not touch at configurations where the bodies do not.
+
+        Covers that touch an obstacle are made smaller; pairs of bodies whose covers touch are no
+        longer tested. What a search does not see any more is left to the certifier.
+
+        Args:
+            obstacles: What does not move.
+            ignored: Pairs (body, obstacle) that may touch.
+            q: (nq, configurations) [rad] at which nothing touches.
+        """
+        model, radius, shrunk = self.assembly.model, self.shapes.radius.copy(), []
+        for body in range(len(self.covers)):
+            own = self.shapes.labels == body
+            if not self.shapes.joint[own].all():  # what stands still is not tested
+                continue
+            alone = self._replace(shapes=self.shapes.of(own), sorted_pairs=BodyPairs((), ()))
+            skipped = tuple(pair for pair in ignored if pair[0] == body)
+            least = float(alone.collision(obstacles, skipped).clearance(q).to_obstacles.min())
+            if least < 0.0:
+                radius[own] = np.maximum(radius[own] - (SLACK - least), SMALLEST)
+                shrunk.append((body, SLACK - least))
+        shapes = self.shapes._replace(radius=radius)
+        touching = tuple(
+            pair
+            for pair in self.pairs
+            if BodyCollision.of_pair(model, shapes, pair).collides(q).any()
+        )
+        tested = tuple(pair for pair in self.pairs if pair not in touching)
+        pairs = self.sorted_pairs._replace(tested=tested, fitted=touching)
+        return self._replace(shapes=shapes, sorted_pairs=pairs, shrunk=tuple(shrunk))
+
+    def fitting_notes(self, where: str, unit: str) -> list[str]:
+        """Describe the covers made smaller, and the pairs left to the certifier, by `fitted`."""
+        lines, names = [], self.names
+        if self.shrunk:
+            sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
+            lines.append(
+                f"covers made smaller, since they touch an obstacle at {where} where the bodies do "
+                f"not: {sizes}"
+            )
+        if pairs := self.sorted_pairs.fitted:
+            named = ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
+            lines.append(f"covers touch at {where}, left to the certifier: {named}")
+        return lines
 
 
 class Carried(NamedTuple):
@@ -230,13 +272,7 @@ class Carried(NamedTuple):
     watched: tuple[int, ...]  # bodies of the robot that it must not touch
 
 
-def cover_shapes(covers: list[Cover], joints: list[int], first: int = 0) -> Shapes:
-    """Return covers as shapes, numbered from `first` on."""
-    sizes = [len(cover.radius) for cover in covers]
-    return Shapes(
-        np.repeat(np.array(joints, dtype=np.int64), sizes),
-        np.vstack([cover.start for cover in covers]),
-        np.vstack([cover.end for cover in covers]),
-        np.concatenate([cover.radius for cover in covers]),
-        np.repeat(np.arange(first, first + len(covers)), sizes),
-    )
+def _shapes(cover: Cover, joint: int, body: int) -> Shapes:
+    """Return a cover as shapes of one body."""
+    joints, bodies = (np.full(len(cover.radius), number) for number in (joint, body))
+    return Shapes(joints, cover.start, cover.end, cover.radius, bodies)

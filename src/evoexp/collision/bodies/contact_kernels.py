@@ -3,7 +3,7 @@
 Eight configurations at a time, as vectors (`numeric.vectors`) in registers or in the first-level
 cache: forward kinematics; balls around bodies against balls around obstacles, and against each
 other; spheres where a ball is met in any lane that is not yet known to collide. Answers that
-rounding errors could change are left in doubt, and measured by `primitive_clearances`: so the
+rounding errors could change are left in doubt, and measured by `clearance_kernels`: so the
 answer is the sign of its clearance, whatever the order of operations here.
 """
 
@@ -11,25 +11,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.center_kernels import POINT, nearest, spatial_point
-from evoexp.collision.models.contact_tables import (
+from evoexp.collision.bodies.distances import (
+    MARGIN,
+    POINT,
+    nearest,
+    nearest_to_obstacle,
+    place_point,
+    point_at,
+    squared_distance,
+)
+from evoexp.collision.bodies.tables import (
     FIRST_BALL,
     FIRST_HALF_SPACE,
     FIRST_PART,
-    ROUNDING,
+    FIRST_RUN,
+    JOINT,
+    REACH,
     STOP_ENTRY,
     STOP_PART,
-    Scene,
-    scene_of,
+    STOP_RUN,
+    BodyTables,
+    FlatTables,
+    named_tables,
 )
-from evoexp.collision.models.obstacle_kernels import MARGIN, nearest_to_obstacle
-from evoexp.collision.models.packed_shapes import FIRST_RUN, JOINT, STOP_RUN
 from evoexp.numeric.compilation import borrowed, inlined, kernel, view_part
 from evoexp.numeric.vectors import (
     LANES,
     Vector,
     any_lane,
-    load,
     lower,
     magnitude,
     root,
@@ -37,7 +46,7 @@ from evoexp.numeric.vectors import (
     spread,
     store,
 )
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.forward_kinematics import (
     SPATIAL_FRAME,
     VECTOR,
@@ -51,6 +60,9 @@ from evoexp.scenarios.obstacles import SPHERE
 
 HIT = -1
 """Answer of `find_contacts` at the first configuration that collides."""
+
+ROUNDING = 1e-12
+"""Clearances below this times the scale are in doubt: rounding errors are a hundredth of it."""
 
 LARGEST_Q = 1e6
 """[rad] or [length unit]; beyond it nothing is sure, nor with NaN."""
@@ -76,14 +88,11 @@ class Limits(NamedTuple):
 
 
 @kernel
-def find_contacts(
-    numbers: FloatArray, indices: IntArray, at_first: bool, q: FloatArray, out: BoolArray
-) -> int:
+def find_contacts(tables: FlatTables, at_first: bool, q: FloatArray, out: BoolArray) -> int:
     """Decide which configurations collide.
 
     Args:
-        numbers: Of `ContactTables`.
-        indices: Of `ContactTables`.
+        tables: Of `tables.flattened`, without capsules.
         at_first: Whether to leave as soon as one is sure to collide.
         q: (nq, configurations) [rad], lengths for joints that slide; contiguous.
         out: (configurations,) written: whether each collides, true for those in doubt.
@@ -91,7 +100,7 @@ def find_contacts(
     Returns:
         How many are in doubt; `HIT` if it left.
     """
-    scene = scene_of(numbers, indices)
+    scene = named_tables(tables[0], tables[1])
     num_joints, num_units = U(len(scene.chain.parent)), U(len(scene.units))
     num_frames, num_q = (num_joints + U(1)) * SPATIAL_FRAME, U(q.shape[0]) * VECTOR
     num_middles, num_centers = num_units * POINT, U(len(scene.spheres)) * POINT
@@ -115,7 +124,7 @@ def find_contacts(
 
 @kernel
 def _find_contacts(
-    scene: Scene, at_first: bool, q: FloatArray, count: int, out: BoolArray, memory: Memory
+    scene: BodyTables, at_first: bool, q: FloatArray, count: int, out: BoolArray, memory: Memory
 ) -> int:
     """Do the work of `find_contacts` in given memory, so that no loop counts references."""
     scene, q, out, memory = borrowed((scene, q, out, memory))
@@ -147,7 +156,7 @@ def _find_contacts(
 
 
 @inlined
-def _limits(scene: Scene, eight: Eight) -> Limits:
+def _limits(scene: BodyTables, eight: Eight) -> Limits:
     """Return the limits of eight configurations."""
     chain, scale, total = scene.chain, spread(scene.scale), spread(0.0)
     for k in range(len(chain.parent)):
@@ -176,31 +185,30 @@ def _near(least: Vector, limits: Limits) -> Vector:
 
 
 @inlined
-def _place(scene: Scene, memory: Memory, unit: int, time: float) -> None:
+def _place(scene: BodyTables, memory: Memory, unit: int, time: float) -> None:
     """Compute the centre of a unit's ball, once."""
     if memory.placed[unit] != time:
         memory.placed[unit] = time
-        joint, place = scene.units[unit, JOINT], U(unit) * POINT
-        spatial_point(memory.frames, joint, scene.balls[unit], memory.middles, place, VECTOR)
+        joint, ball = scene.units[unit, JOINT], scene.balls[unit]
+        place_point(memory.frames, joint, ball, memory.middles, U(unit))
 
 
 @inlined
-def _place_spheres(scene: Scene, memory: Memory, unit: int, time: float) -> None:
+def _place_spheres(scene: BodyTables, memory: Memory, unit: int, time: float) -> None:
     """Compute the centres of a unit's spheres, once."""
     units, runs = scene.units, scene.runs
     if memory.known[unit] != time:
         memory.known[unit] = time
         first, stop = units[unit, FIRST_RUN], units[unit, STOP_RUN]
         for k in range(runs[first, 0], runs[stop - 1, 1]):
-            local, place = scene.spheres[k], U(k) * POINT
-            spatial_point(memory.frames, units[unit, JOINT], local, memory.centers, place, VECTOR)
+            place_point(memory.frames, units[unit, JOINT], scene.spheres[k], memory.centers, U(k))
 
 
 @inlined
 def _from_obstacles(
     entries: FloatArray, first: int, stop: int, square: Vector, x: Vector, y: Vector, z: Vector
 ) -> Vector:
-    """Return the least value of some entries at a ball's centre; see `contact_tables`."""
+    """Return the least value of some entries at a ball's centre; see `packing`."""
     least = spread(np.inf)
     for t in range(first, stop):
         k = U(t)
@@ -211,7 +219,7 @@ def _from_obstacles(
 
 @inlined
 def _meet_obstacles(
-    scene: Scene, memory: Memory, time: float, limits: Limits, at_first: bool
+    scene: BodyTables, memory: Memory, time: float, limits: Limits, at_first: bool
 ) -> Vector:
     """Return the least clearance from obstacles that were looked at."""
     units, entries = scene.units, scene.entries
@@ -222,9 +230,7 @@ def _meet_obstacles(
         if first == stop:
             continue
         _place(scene, memory, b, time)
-        own = U(b) * POINT
-        x, y = load(memory.middles, own), load(memory.middles, own + VECTOR)
-        z = load(memory.middles, own + U(2) * VECTOR)
+        x, y, z = point_at(memory.middles, U(b))
         square, nothing = x * x + y * y + z * z, spread(0.0)
         value = lower(
             _from_obstacles(entries, first, flat, square, x, y, z),
@@ -245,22 +251,21 @@ def _meet_obstacles(
 
 @inlined
 def _is_near(
-    scene: Scene, memory: Memory, unit: int, o: int, time: float, limits: Limits, least: Vector
+    scene: BodyTables, memory: Memory, unit: int, o: int, time: float, limits: Limits, least: Vector
 ) -> bool:
     """Return whether a unit's ball meets an obstacle in a lane that may be free yet, or nearly."""
     _place(scene, memory, unit, time)
-    one, infinite = U(unit), spread(np.inf)
-    middle = nearest_to_obstacle(scene.obstacles, o, memory.middles, one, one + U(1), infinite)
+    middle = nearest_to_obstacle(scene, o, memory.middles, U(unit), U(unit) + U(1))
     near = select(least < -1.0 * limits.slack, spread(-np.inf), limits.slack)
-    return any_lane(middle - scene.balls[unit, 3] * MARGIN < near)
+    return any_lane(middle - scene.balls[unit, REACH] * MARGIN < near)
 
 
 @inlined
 def _measure_obstacle(
-    scene: Scene, memory: Memory, b: int, o: int, time: float, limits: Limits, least: Vector
+    scene: BodyTables, memory: Memory, b: int, o: int, time: float, limits: Limits, least: Vector
 ) -> Vector:
     """Lower a clearance to that of a body's spheres from an obstacle; far parts are skipped."""
-    units, runs, infinite = scene.units, scene.runs, spread(np.inf)
+    units, runs = scene.units, scene.runs
     first, stop = units[b, FIRST_PART], units[b, STOP_PART]
     # the ball around a sphere was tested exactly; that around a box is large
     coarse = scene.obstacles.kind[o] != SPHERE and stop - first > 1
@@ -271,23 +276,23 @@ def _measure_obstacle(
             _place_spheres(scene, memory, part, time)
             for run in range(units[part, FIRST_RUN], units[part, STOP_RUN]):
                 i, end = U(runs[run, 0]), U(runs[run, 1])
-                found = nearest_to_obstacle(scene.obstacles, o, memory.centers, i, end, infinite)
-                least = lower(least, found - scene.spheres[i, 3])
+                distance = nearest_to_obstacle(scene, o, memory.centers, i, end)
+                least = lower(least, distance - scene.spheres[i, 3])
     return least
 
 
 @inlined
 def _meet_each_other(
-    scene: Scene, memory: Memory, time: float, limits: Limits, at_first: bool, least: Vector
+    scene: BodyTables, memory: Memory, time: float, limits: Limits, at_first: bool, least: Vector
 ) -> Vector:
     """Lower a clearance to the least one of pairs of bodies that were looked at."""
     pairs, parts, near = scene.pairs, scene.parts, _near(least, limits)
     for p in range(len(pairs)):
-        if not _meet(scene, memory, pairs[p, 0], pairs[p, 1], time, scene.pair_reaches[p], near):
+        if not _meet(scene, memory, pairs[p, 0], pairs[p, 1], time, near):
             continue
         for t in range(pairs[p, 2], pairs[p, 3]):
             one, two = parts[t, 0], parts[t, 1]
-            if _meet(scene, memory, one, two, time, scene.part_reaches[t], near):
+            if _meet(scene, memory, one, two, time, near):
                 _place_spheres(scene, memory, one, time)
                 _place_spheres(scene, memory, two, time)
                 least = _measure(scene, memory, one, two, least)
@@ -298,29 +303,23 @@ def _meet_each_other(
 
 
 @inlined
-def _meet(
-    scene: Scene, memory: Memory, one: int, two: int, time: float, reach: float, near: Vector
-) -> bool:
-    """Return whether the balls around two units meet in any lane, or nearly so.
-
-    `reach` is the square of the sum of their radii.
-    """
+def _meet(scene: BodyTables, memory: Memory, one: int, two: int, time: float, near: Vector) -> bool:
+    """Return whether the balls around two units meet in any lane, or nearly so."""
+    reach = (scene.balls[one, REACH] + scene.balls[two, REACH]) * MARGIN
     _place(scene, memory, one, time)
     _place(scene, memory, two, time)
-    i, j, m = U(one) * POINT, U(two) * POINT, memory.middles
-    x, y = load(m, i) - load(m, j), load(m, i + VECTOR) - load(m, j + VECTOR)
-    z = load(m, i + U(2) * VECTOR) - load(m, j + U(2) * VECTOR)
-    return any_lane(x * x + y * y + z * z - reach < near)
+    a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
+    return any_lane(squared_distance(a, b) - reach * reach < near)
 
 
 @inlined
-def _measure(scene: Scene, memory: Memory, one: int, two: int, least: Vector) -> Vector:
+def _measure(scene: BodyTables, memory: Memory, one: int, two: int, least: Vector) -> Vector:
     """Lower a clearance to the least one of two units' spheres."""
     units, runs, spheres = scene.units, scene.runs, scene.spheres
     for a in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
         i, end = U(runs[a, 0]), U(runs[a, 1])
         for b in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
             first, stop = U(runs[b, 0]), U(runs[b, 1])
-            square = nearest(memory.centers, i, end, first, stop, spread(np.inf))
+            square = nearest(memory.centers, i, end, first, stop)
             least = lower(least, root(square) - (spheres[i, 3] + spheres[first, 3]))
     return least

@@ -1,4 +1,4 @@
-"""Distances of capsules' axes, in encounters; see `primitive_distances`.
+"""Distances of capsules' axes from points, from each other and from obstacles; see `distances`.
 
 The distance of a point that moves along a segment to a convex body is a convex function of its
 place on the segment: it is least where its slope changes sign. For boxes the slope (of half the
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.primitive_distances import Core, Place
+from evoexp.collision.bodies.distances import Place
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import (
     Mask,
@@ -25,6 +25,7 @@ from evoexp.numeric.vectors import (
     upper,
 )
 from evoexp.records import FloatArray
+from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE
 
 SEARCHES = 100  # [-] steps along a segment beside a cylinder at most; some five are taken
 SHORT = 1e-15  # [-] of the segment's length: the search ends with a step below it
@@ -36,6 +37,10 @@ class Segments(NamedTuple):
 
     start: Place  # one end
     axis: Place  # from there to the other
+
+
+Core = tuple[Vector, Vector, Vector]
+"""Half the edges of a box that obstacles are, or that is around cylinders."""
 
 
 class Bracket(NamedTuple):
@@ -117,12 +122,29 @@ def _crossing(p: Vector, u: Vector, half: Vector) -> Crossing:
 
 
 @inlined
-def segments_to_boxes(segments: Segments, radius: float, core: Core, least: Vector) -> Vector:
-    """Lower a clearance to the signed distances of segments with a radius from thickened boxes.
+def nearest_on_segments(kind: int, half_edges: FloatArray, segments: Segments) -> Place:
+    """Return the points of segments that are nearest to an obstacle's core.
 
-    Where a segment enters a box, the distance is that of the middle of the part inside: not above
-    0.
+    Where a segment enters the core, the point is the middle of the part inside.
+
+    Args:
+        kind: Of the obstacle, from whose frame the segments are seen.
+        half_edges: (≥ 3,) of its core: see `BodyTables.cores`.
     """
+    (px, py, pz), (ux, uy, uz) = segments
+    core = spread(half_edges[0]), spread(half_edges[1]), spread(half_edges[2])
+    if kind == HALF_SPACE:
+        t = select(uz > 0.0, spread(0.0), spread(1.0))
+    elif kind == CYLINDER:
+        t = _beside_cylinder(segments, core)
+    else:
+        t = _beside_box(segments, core)
+    return px + t * ux, py + t * uy, pz + t * uz
+
+
+@inlined
+def _beside_box(segments: Segments, core: Core) -> Vector:
+    """Return the t in [0, 1] at which segments are nearest to boxes."""
     (px, py, pz), (ux, uy, uz) = segments
     zero, one = spread(0.0), spread(1.0)
     x, y, z = _crossing(px, ux, core[0]), _crossing(py, uy, core[1]), _crossing(pz, uz, core[2])
@@ -140,13 +162,8 @@ def segments_to_boxes(segments: Segments, radius: float, core: Core, least: Vect
     t = select(at_low >= 0.0, low, t)
     enter = upper(upper(x.enter, y.enter), upper(z.enter, zero))
     leave = lower(lower(x.leave, y.leave), lower(z.leave, one))
-    t = select(enter < leave, 0.5 * (enter + leave), _clamped(t))
-    u, v = magnitude(px + t * ux) - core[0], magnitude(py + t * uy) - core[1]
-    w = magnitude(pz + t * uz) - core[2]
-    p, q, r = upper(u, zero), upper(v, zero), upper(w, zero)
-    signed = root(p * p + q * q + r * r) + lower(upper(u, upper(v, w)), zero)
-    found: Vector = lower(least, signed - (core[3] + radius))
-    return found
+    place: Vector = select(enter < leave, 0.5 * (enter + leave), _clamped(t))
+    return place
 
 
 @inlined
@@ -154,7 +171,7 @@ def _cylinder_slope(t: Vector, segments: Segments, core: Core) -> tuple[Vector, 
     """Return slope and curvature of half the squared distance of points from cylinders."""
     (px, py, pz), (ux, uy, uz) = segments
     zero = spread(0.0)
-    x, y, e = px + t * ux, py + t * uy, _beyond(pz + t * uz, core[1])
+    x, y, e = px + t * ux, py + t * uy, _beyond(pz + t * uz, core[2])
     along, flat = x * ux + y * uy, ux * ux + uy * uy
     rho = root(x * x + y * y)
     out = core[0] < rho
@@ -169,23 +186,8 @@ def _cylinder_slope(t: Vector, segments: Segments, core: Core) -> tuple[Vector, 
 
 
 @inlined
-def segments_to_cylinders(segments: Segments, radius: float, core: Core, least: Vector) -> Vector:
-    """Lower a clearance to the signed distances of segments with a radius from cylinders."""
-    (px, py, pz), (ux, uy, uz) = segments
-    zero, t = spread(0.0), _beside_cylinder(segments, core)
-    x, y, z = px + t * ux, py + t * uy, pz + t * uz
-    u, w = root(x * x + y * y) - core[0], magnitude(z) - core[1]
-    p, r = upper(u, zero), upper(w, zero)
-    found: Vector = lower(least, root(p * p + r * r) + lower(upper(u, w), zero) - radius)
-    return found
-
-
-@inlined
 def _beside_cylinder(segments: Segments, core: Core) -> Vector:
-    """Return the t in [0, 1] at which segments are nearest to cylinders.
-
-    Where a segment enters the cylinder, t is the middle of the part inside.
-    """
+    """Return the t in [0, 1] at which segments are nearest to cylinders."""
     (px, py, pz), (ux, uy, uz) = segments
     zero, one = spread(0.0), spread(1.0)
     flat = ux * ux + uy * uy
@@ -195,7 +197,7 @@ def _beside_cylinder(segments: Segments, core: Core) -> Vector:
     x, y = px + nearest * ux, py + nearest * uy
     room = core[0] * core[0] - (x * x + y * y)
     reach = select(still, spread(np.inf), root(upper(room, zero) / flat))
-    z = _crossing(pz, uz, core[1])
+    z = _crossing(pz, uz, core[2])
     enter = upper(upper(nearest - reach, z.enter), zero)
     leave = lower(lower(nearest + reach, z.leave), one)
     inside = (room > 0.0) & (enter < leave)
@@ -235,57 +237,23 @@ def _zero_of_slope(
 
 
 @inlined
-def segments_to_half_spaces(segments: Segments, radius: float, least: Vector) -> Vector:
-    """Lower a clearance to the signed distances of segments' lower ends from half-spaces."""
-    z, w = segments.start[2], segments.axis[2]
-    found: Vector = lower(least, select(w > 0.0, z, z + w) - radius)
-    return found
-
-
-@inlined
-def segment_to_points(capsule: FloatArray, points: Place, both: float, least: Vector) -> Vector:
-    """Lower a clearance to the distances of one constant segment from points, less `both`.
+def segment_to_point(segment: Segments, inverse: float, point: Place) -> Vector:
+    """Return the distance of a point from a segment, either of vectors or numbers.
 
     Args:
-        capsule: (8,) one end of its axis, from there to the other end, radius, 1 / squared length.
-        points: Eight of them.
-        both: Sum of both radii [length unit].
-        least: The clearance so far [length unit].
+        inverse: 1 / squared length of the segment.
     """
-    vx, vy, vz = capsule[3], capsule[4], capsule[5]
-    x, y, z = points[0] - capsule[0], points[1] - capsule[1], points[2] - capsule[2]
-    t = _clamped((x * vx + y * vy + z * vz) * capsule[7])
-    x, y, z = x - t * vx, y - t * vy, z - t * vz
-    found: Vector = lower(least, root(x * x + y * y + z * z) - both)
-    return found
-
-
-@inlined
-def segments_to_point(
-    segments: Segments, point: FloatArray, inverse: float, both: float, least: Vector
-) -> Vector:
-    """Lower a clearance to the distances of a constant point from segments, less `both`.
-
-    Args:
-        segments: Eight of them.
-        point: (≥ 3,).
-        inverse: 1 / squared length of the segments.
-        both: Sum of both radii [length unit].
-        least: The clearance so far [length unit].
-    """
-    (px, py, pz), (vx, vy, vz) = segments
+    (px, py, pz), (vx, vy, vz) = segment
     x, y, z = point[0] - px, point[1] - py, point[2] - pz
     t = _clamped((x * vx + y * vy + z * vz) * inverse)
     x, y, z = x - t * vx, y - t * vy, z - t * vz
-    found: Vector = lower(least, root(x * x + y * y + z * z) - both)
-    return found
+    distance: Vector = root(x * x + y * y + z * z)
+    return distance
 
 
 @inlined
-def segment_to_segments(
-    capsule: FloatArray, segments: Segments, other: float, both: float, least: Vector
-) -> Vector:
-    """Lower a clearance to the distances of a constant segment from others, less `both`.
+def segment_to_segments(capsule: FloatArray, segments: Segments, other: float) -> Vector:
+    """Return the distances of a constant segment from others.
 
     The foot of the common perpendicular, clamped to the first segment, is projected to the second,
     clamped, and back: that is the least of a convex function of two places (Ericson 2005, section
@@ -293,10 +261,8 @@ def segment_to_segments(
     parallel; for parallel ones any foot serves.
 
     Args:
-        capsule: See `segment_to_points`.
+        capsule: (8,) one end of its axis, from there to the other end, radius, 1 / squared length.
         other: 1 / squared length of the others.
-        both: Sum of both radii [length unit].
-        least: The clearance so far [length unit].
     """
     (px, py, pz), (vx, vy, vz) = segments
     ux, uy, uz, inverse = capsule[3], capsule[4], capsule[5], capsule[7]
@@ -310,5 +276,5 @@ def segment_to_segments(
     x, y, z = x + b * vx, y + b * vy, z + b * vz
     a = _clamped((x * ux + y * uy + z * uz) * inverse)
     x, y, z = x - a * ux, y - a * uy, z - a * uz
-    found: Vector = lower(least, root(x * x + y * y + z * z) - both)
-    return found
+    distance: Vector = root(x * x + y * y + z * z)
+    return distance

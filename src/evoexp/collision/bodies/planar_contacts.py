@@ -5,9 +5,9 @@ given circle of the other follows by rounding its place on the other's line. So 
 and one of m take min(n, m) steps instead of n · m. The angles of a chain are summed, not its
 rotations multiplied, in quarter turns. Joints and lines are placed for several vectors of eight
 configurations before the next, so that constants stay in registers and neighbouring operations wait
-for no result of each other: this takes a third of what `primitive_kernels` takes for two arms.
+for no result of each other: this takes a third of what `contact_kernels` takes for two arms.
 
-Answers that rounding errors could change are left to `primitive_clearances`, and so are robots in
+Answers that rounding errors could change are left to `least_clearances`, and so are robots in
 space or among obstacles.
 """
 
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.obstacle_kernels import MARGIN
-from evoexp.collision.models.primitive_kernels import primitive_clearances
+from evoexp.collision.bodies.clearance_kernels import least_clearances
+from evoexp.collision.bodies.distances import MARGIN
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
@@ -78,7 +78,7 @@ class CircleTables(NamedTuple):
 
     chain: KinematicChain  # the joints
     lines: LinkLines  # what this kernel reads
-    general: tuple[Any, ...]  # tables of `primitive_clearances`, for all other cases
+    general: tuple[Any, ...]  # tables of `least_clearances`, for all other cases
 
 
 def link_lines(
@@ -184,7 +184,7 @@ def _general_contacts(
     for k in range(q.shape[0]):
         for n in range(stop - start):
             angles[k, n] = DEGREE * q[k, start + n]
-    primitive_clearances(tables.general, 0.0, True, angles, rows)
+    least_clearances(tables.general, 0.0, True, angles, rows)
     for n in range(stop - start):
         out[n] = min(rows[0, n], min(rows[1, n], rows[2, n]))
 

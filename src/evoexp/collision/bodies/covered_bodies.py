@@ -9,11 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
+from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
 from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_models import BodyModel, CollisionModel
-from evoexp.collision.models.fitted_covers import fitted_covers, fitting_notes
-from evoexp.collision.models.primitives import PrimitiveCollision
-from evoexp.collision.models.touching_spheres import Clearance
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
@@ -49,7 +47,7 @@ class CoveredBodies(Component):
         """
         table = obstacle_table(obstacles).without_ellipses()
         bodies, q = self.covers.bind(assembly), DEGREE * ends
-        fitted = fitted_covers(bodies, table, ignored, q)
+        fitted = bodies.fitted(table, ignored, q)
         collision = fitted.collision(table, ignored)
         return CoveredCollision(assembly, fitted, collision, table)
 
@@ -59,7 +57,7 @@ class CoveredCollision(NamedTuple):
 
     assembly: Assembly  # the robot
     bodies: BodyModel  # its bodies, covered
-    collision: PrimitiveCollision  # the kernels' tables
+    collision: BodyCollision  # the kernels' tables
     obstacles: ObstacleTable  # the obstacle table
 
     @property
@@ -69,10 +67,10 @@ class CoveredCollision(NamedTuple):
         between = sum(own[a] * own[b] for a, b in self.bodies.pairs)
         return int(between + sum(own.values()) * len(self.obstacles.kind))
 
-    def clearance(self, q: FloatArray) -> Clearance:
-        """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
-        found = self.collision.clearance(DEGREE * q)
-        return Clearance(np.minimum(found.between_arms, found.to_self), found.to_obstacles)
+    def clearance(self, q: FloatArray) -> Clearances:
+        """Return the clearances of a batch (nq, configurations) [deg]; links of one arm count."""
+        to_obstacles, between_arms, to_self = self.collision.clearance(DEGREE * q)
+        return Clearances(to_obstacles, np.minimum(between_arms, to_self))
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations (nq, configurations) [deg] collide."""
@@ -93,5 +91,5 @@ class CoveredCollision(NamedTuple):
             if left:
                 told = ", ".join(f"{names[a]} with {names[b]}" for a, b in left)
                 lines.append(f"{what}, judged by the certifier only: {told}")
-        lines += fitting_notes(self.bodies, "the start or the goal", unit)
+        lines += self.bodies.fitting_notes("the start or the goal", unit)
         return lines

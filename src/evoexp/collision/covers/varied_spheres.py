@@ -6,11 +6,11 @@ and balls are chosen one after the other, each that which contains most of the c
 done when one ball contains all that it has of the body, so the balls contain the body.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.collision.covers.solids import Solid
 from evoexp.records import BoolArray, FloatArray
 
 FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to its corners
@@ -20,30 +20,8 @@ OF_A_CELL = 0.3  # [-] of its edge squared: at least the surface per cell (seen:
 COARSER = 1.25  # [-] by which the inflation grows where balls do not suffice
 CANDIDATES = 800  # middles of balls, within the body
 AT_ONCE = 64  # cells that are compared with all candidates together
-POINTS_AT_ONCE = 4000  # whose heights above all planes are found together
 COAL_ERROR = 1e-5  # [-] of a body's size: more than that of its distances
 LESS = 1.0 - 1e-9  # of a ball's radius: more than rounding
-
-
-class Solid(NamedTuple):
-    """A convex body in its own frame."""
-
-    low: FloatArray  # (3,) least corner of the box around it
-    high: FloatArray  # (3,) greatest corner
-    planes: FloatArray  # (planes, 4) outward normals of unit length, and minus the planes' heights
-    far: Any  # function (points, 3) → (points,), at least the signed distance
-    area: float  # of its surface [length unit²]
-
-    def heights(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the greatest height of points above a plane, and the normal of that plane."""
-        highest, normals = np.empty(len(points)), np.empty((len(points), 3))
-        for k in range(0, len(points), POINTS_AT_ONCE):
-            own = slice(k, k + POINTS_AT_ONCE)
-            heights = matrix_product(points[own], self.planes[:, :3].T) + self.planes[:, 3]
-            which = heights.argmax(axis=1)
-            highest[own] = heights[np.arange(len(which)), which]
-            normals[own] = self.planes[which, :3]
-        return highest, normals
 
 
 class Balls(NamedTuple):
@@ -62,7 +40,7 @@ class _Cells(NamedTuple):
 
 
 def varied_spheres(solid: Solid, inflation: float, most: int, farthest: float) -> Balls | None:
-    """Cover a convex body with balls that reach as far as asked, or as little more as they can.
+    """Cover a hull with balls that reach as far as asked, or as little more as they can.
 
     Args:
         inflation: How far the balls may reach beyond it [length unit].

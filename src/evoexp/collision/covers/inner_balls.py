@@ -14,9 +14,8 @@ import coal
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.models.body_covers import Cover
+from evoexp.collision.covers.body_covers import Cover
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
 AROUND = 24  # points around the axis of a cylinder
@@ -40,13 +39,13 @@ def inner_balls(item: Any, depth: float) -> Cover | None:
     if isinstance(shape, coal.Sphere | coal.Capsule):
         half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
         ends = np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
-        return _placed(item, *ends, max(shape.radius - depth, 0.0))
+        return Cover.placed(item, *ends, np.array([max(shape.radius - depth, 0.0)]))
     if isinstance(shape, coal.Cylinder):
         points = _of_cylinder(float(shape.radius), float(shape.halfLength), depth / np.sqrt(2.0))
-        return _placed(item, points, points, 0.0)
+        return Cover.placed(item, points, points, np.zeros(len(points)))
     if isinstance(shape, coal.Box):
         points = _of_box(np.array(shape.halfSide), depth / np.sqrt(3.0))
-        return _placed(item, points, points, 0.0)
+        return Cover.placed(item, points, points, np.zeros(len(points)))
     return None
 
 
@@ -72,13 +71,3 @@ def _of_box(half: FloatArray, inset: float) -> FloatArray:
     axes = [np.linspace(-h, h, max(int(n), 2)) for h, n in zip(half, counts, strict=True)]
     points = np.array(list(product(*axes)))
     return np.asarray(points[(np.abs(points) >= half - 1e-12).any(axis=1)])
-
-
-def _placed(item: Any, start: FloatArray, end: FloatArray, radius: float) -> Cover:
-    rotation, translation = np.array(item.placement.rotation), np.array(item.placement.translation)
-    return Cover(
-        matrix_product(start, rotation.T) + translation,
-        matrix_product(end, rotation.T) + translation,
-        np.full(len(start), radius),
-        0.0,
-    )

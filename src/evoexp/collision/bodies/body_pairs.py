@@ -9,25 +9,24 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.shapes import Shapes
 from evoexp.collision.body_table import body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import (
     DerivedPairs,
     Pair,
     are_neighbours,
+    contacts_seen,
     joint_limits,
     sampled_configurations,
 )
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.collision.motion_bounds import pair_reaches, reaches
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.scenarios.obstacles import obstacle_table
 
 SAMPLES = 1000  # random postures by which pairs that always touch are found
 GRID, COARSE_GRID = 128, 48  # values per joint by which pairs that never touch are proven
-NO_OBSTACLES = obstacle_table(())
 
 
 class BodyPairs(NamedTuple):
@@ -60,94 +59,45 @@ def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
         shapes: The covers of its bodies.
     """
     items = list(assembly.geometry.geometryObjects)
-    adjacent: list[Pair] = []
-    apart: list[Pair] = []
-    for a, one in enumerate(items):
-        for b, two in enumerate(items[a + 1 :], start=a + 1):
-            named = frozenset((one.name, two.name)) in assembly.disabled
-            (adjacent if named or are_neighbours(assembly, a, b) else apart).append((a, b))
+    names = {
+        (a, b): frozenset((one.name, two.name))
+        for a, one in enumerate(items)
+        for b, two in enumerate(items[a + 1 :], start=a + 1)
+    }
+    adjacent = [
+        pair
+        for pair, named in names.items()
+        if named in assembly.disabled or are_neighbours(assembly, *pair)
+    ]
+    apart = [pair for pair in names if pair not in adjacent]
     q = sampled_configurations(assembly, SAMPLES)
     if not apart or q is None:
         return BodyPairs(tuple(apart), tuple(adjacent))
-    if assembly.pairs is not None:
-        return _as_derived(assembly, shapes, adjacent, apart, q)
-    touching = _coal_touches(assembly, apart, q)
-    always = [pair for pair, hits in zip(apart, touching, strict=True) if hits.all()]
-    rest = [pair for pair in apart if pair not in always]
-    never, overlapping = [], []
-    for pair in rest:
-        if not touching[apart.index(pair)].any() and _never_touch(assembly, shapes, pair):
-            never.append(pair)
-        elif _alone(assembly, shapes, pair).collides(q).all():
-            overlapping.append(pair)
-    left = {*never, *overlapping}
-    return BodyPairs(
-        tuple(pair for pair in rest if pair not in left),
-        tuple(adjacent),
-        tuple(always),
-        tuple(never),
-        overlapping=tuple(overlapping),
-    )
-
-
-def _as_derived(
-    assembly: Assembly, shapes: Shapes, adjacent: list[Pair], apart: list[Pair], q: FloatArray
-) -> BodyPairs:
-    """Sort the pairs that are not adjacent by the data that the robot brings along."""
-    assert assembly.pairs is not None
-    derived = DerivedPairs.from_json(assembly.pairs)
-    names = [item.name for item in assembly.geometry.geometryObjects]
-    always, never = set(derived.always), set(derived.never)
-    sorted_pairs: dict[str, list[Pair]] = {"always": [], "unseen": [], "over": [], "tested": []}
+    if assembly.pairs is None:
+        touched, parted = contacts_seen(assembly, apart, SAMPLES)
+        always = {pair for pair, seen in zip(apart, parted, strict=True) if not seen}
+        unseen = {pair for pair, seen in zip(apart, touched, strict=True) if not seen}
+    else:
+        derived = DerivedPairs.from_json(assembly.pairs)
+        always = {pair for pair in apart if names[pair] in derived.always}
+        unseen = {pair for pair in apart if names[pair] in derived.never}
+    groups: dict[str, list[Pair]] = {
+        name: [] for name in ("tested", "always", "never", "unseen", "overlapping")
+    }
     for pair in apart:
-        named = frozenset(names[body] for body in pair)
-        if named in always:
-            sorted_pairs["always"].append(pair)
-        elif named in never:
-            sorted_pairs["unseen"].append(pair)
+        if pair in always:
+            group = "always"
+        elif assembly.pairs is not None and pair in unseen:
+            group = "unseen"
+        elif pair in unseen and _never_touch(assembly, shapes, pair):
+            group = "never"
+        elif BodyCollision.of_pair(assembly.model, shapes, pair).collides(q).all():
+            group = "overlapping"
         else:
-            hidden = bool(_alone(assembly, shapes, pair).collides(q).all())
-            sorted_pairs["over" if hidden else "tested"].append(pair)
-    return BodyPairs(
-        tuple(sorted_pairs["tested"]),
-        tuple(adjacent),
-        tuple(sorted_pairs["always"]),
-        unseen=tuple(sorted_pairs["unseen"]),
-        overlapping=tuple(sorted_pairs["over"]),
-    )
-
-
-def _coal_touches(assembly: Assembly, pairs: list[Pair], q: FloatArray) -> np.ndarray:
-    """Return which pairs touch on coal's geometry, (pairs, configurations)."""
-    model, geometry = assembly.model, assembly.geometry
-    data, placements = model.createData(), geometry.createData()
-    shapes = [item.geometry for item in geometry.geometryObjects]
-    request, result = coal.CollisionRequest(), coal.CollisionResult()
-    out = np.zeros((len(pairs), q.shape[1]), dtype=np.bool_)
-    for n in range(q.shape[1]):
-        pin.updateGeometryPlacements(
-            model, data, geometry, placements, np.ascontiguousarray(q[:, n])
-        )
-        places = [coal.Transform3s(place.rotation, place.translation) for place in placements.oMg]
-        for k, (a, b) in enumerate(pairs):
-            result.clear()
-            out[k, n] = (
-                coal.collide(shapes[a], places[a], shapes[b], places[b], request, result) > 0
-            )
-    return out
-
-
-def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
-    """Return the model of two bodies alone."""
-    kept = np.isin(shapes.labels, pair)
-    own = Shapes(
-        shapes.joint[kept],
-        shapes.start[kept],
-        shapes.end[kept],
-        shapes.radius[kept],
-        shapes.labels[kept],
-    )
-    return PrimitiveCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
+            group = "tested"
+        groups[group].append(pair)
+    sorted_pairs = {name: tuple(pairs) for name, pairs in groups.items()}
+    return BodyPairs(adjacent=tuple(adjacent), **sorted_pairs)
 
 
 def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
@@ -171,7 +121,7 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     if len(moving) > 2:
         return False
     q, slack = _grid(assembly, moving, way, GRID)
-    if float(_alone(assembly, shapes, pair).clearance(q).least.min()) > slack:
+    if float(BodyCollision.of_pair(assembly.model, shapes, pair).clearance(q).least.min()) > slack:
         return True
     q, slack = _grid(assembly, moving, way, COARSE_GRID)
     return bool(_coal_distances(assembly, pair, q).min() > slack)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from evoexp.collision.box_support import EXACT, coal
-from evoexp.collision.models.body_covers import Cover, sphere_cover
+from evoexp.collision.covers.body_covers import Cover, sphere_cover
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.kernel_folders import sources_key
 from evoexp.version import version_of

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from evoexp.collision.models.link_collision import LinkCollision
+from evoexp.collision.planar.link_collision import LinkCollision
 from evoexp.configuration import compose
 from evoexp.records import generations
 

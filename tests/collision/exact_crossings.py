@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from evoexp.collision.models import link_crossing_kernels as kernels
-from evoexp.collision.models.link_crossings import Crossings, everyone, no_crossings
+from evoexp.collision.planar import link_crossing_kernels as kernels
+from evoexp.collision.planar.link_crossings import Crossings, everyone, no_crossings
 from evoexp.records import FloatArray
 
 Base = tuple[float, float]

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from collision.exact_crossings import count_exactly
-from evoexp.collision.models.link_crossings import (
+from evoexp.collision.planar.link_crossings import (
     Arm,
     Crossings,
     closed_form,
@@ -19,7 +19,7 @@ from evoexp.collision.models.link_crossings import (
     path_configurations,
     update_crossings,
 )
-from evoexp.collision.models.segment_predicates import orientation, touching
+from evoexp.collision.planar.segment_predicates import orientation, touching
 from matrix import first
 from references import link_crossings_numpy as plain
 

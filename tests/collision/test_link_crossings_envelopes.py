@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.models.envelope_contact import Envelope, colliding
-from evoexp.collision.models.link_crossings import Arm, count_crossings
-from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions, update_collisions
+from evoexp.collision.planar.envelope_contact import Envelope, colliding
+from evoexp.collision.planar.link_crossings import Arm, count_crossings
+from evoexp.collision.planar.link_envelopes import EnvelopedArm, count_collisions, update_collisions
 from references import link_crossings_numpy as plain
 
 SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))

@@ -6,9 +6,9 @@ import coal
 import numpy as np
 import pytest
 
-from evoexp.collision.models.link_crossings import Arm
-from evoexp.collision.models.link_envelopes import EnvelopedArm
-from evoexp.collision.models.link_obstacles import (
+from evoexp.collision.planar.link_crossings import Arm
+from evoexp.collision.planar.link_envelopes import EnvelopedArm
+from evoexp.collision.planar.link_obstacles import (
     count_enveloped_obstacle_collisions,
     count_obstacle_collisions,
     planar_obstacles,

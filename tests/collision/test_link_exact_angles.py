@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.collision.models.link_crossings import (
+from evoexp.collision.planar.link_crossings import (
     Arm,
     closed_form,
     count_crossings,
     update_crossings,
 )
-from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions
-from evoexp.collision.models.link_obstacles import (
+from evoexp.collision.planar.link_envelopes import EnvelopedArm, count_collisions
+from evoexp.collision.planar.link_obstacles import (
     count_enveloped_obstacle_collisions,
     count_obstacle_collisions,
     planar_obstacles,

@@ -5,9 +5,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from evoexp.collision.models.link_collision import LinkCollision
-from evoexp.collision.models.link_crossings import Arm
-from evoexp.collision.models.link_obstacles import planar_obstacles
+from evoexp.collision.planar.link_collision import LinkCollision
+from evoexp.collision.planar.link_crossings import Arm
+from evoexp.collision.planar.link_obstacles import planar_obstacles
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.scenarios.link_motion import Posture

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_crossing_kernels import crossings, link_points, tolerance_of
+from evoexp.collision.planar.link_crossing_kernels import crossings, link_points, tolerance_of
 from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall

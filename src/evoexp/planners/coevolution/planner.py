@@ -17,7 +17,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from evoexp.collision.models.link_collision import LinkCrossings
+from evoexp.collision.planar.link_collision import LinkCrossings
 from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
-from evoexp.collision.models.link_crossings import closed_form
+from evoexp.collision.planar.link_crossings import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem

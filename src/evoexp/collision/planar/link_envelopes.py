@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models import link_envelope_kernels as kernels
-from evoexp.collision.models.envelope_contact import Envelope
-from evoexp.collision.models.link_crossings import (
+from evoexp.collision.planar import link_envelope_kernels as kernels
+from evoexp.collision.planar.envelope_contact import Envelope
+from evoexp.collision.planar.link_crossings import (
     Arm,
     Crossings,
     changed_members,

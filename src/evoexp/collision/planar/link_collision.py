@@ -7,14 +7,14 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_crossings import (
+from evoexp.collision.planar.link_crossings import (
     Arm,
     Crossings,
     count_crossings,
     path_configurations,
 )
-from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions
-from evoexp.collision.models.link_obstacles import (
+from evoexp.collision.planar.link_envelopes import EnvelopedArm, count_collisions
+from evoexp.collision.planar.link_obstacles import (
     PlanarObstacles,
     count_enveloped_obstacle_collisions,
     count_obstacle_collisions,

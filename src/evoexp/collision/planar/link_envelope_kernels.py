@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.models.crossing_blocks import add_where, greater, lesser
-from evoexp.collision.models.envelope_contact import Envelope, colliding, tolerance_of
-from evoexp.collision.models.link_crossing_kernels import Point, directions, sum_counts
+from evoexp.collision.planar.crossing_blocks import add_where, greater, lesser
+from evoexp.collision.planar.envelope_contact import Envelope, colliding, tolerance_of
+from evoexp.collision.planar.link_crossing_kernels import Point, directions, sum_counts
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import LANES, Singles, load_singles, magnitude, spread_single
 from evoexp.records import FloatArray, IntArray

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.models import link_crossing_kernels as kernels
-from evoexp.collision.models.segment_predicates import meeting
+from evoexp.collision.planar import link_crossing_kernels as kernels
+from evoexp.collision.planar.segment_predicates import meeting
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import atan2, sin
 from evoexp.records import BoolArray, FloatArray, IntArray

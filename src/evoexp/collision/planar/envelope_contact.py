@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from evoexp.collision.models.link_crossing_kernels import Point
-from evoexp.collision.models.segment_predicates import contact_tolerance, meeting, squared_distance
+from evoexp.collision.planar.link_crossing_kernels import Point
+from evoexp.collision.planar.segment_predicates import contact_tolerance, meeting, squared_distance
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 

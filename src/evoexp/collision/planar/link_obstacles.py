@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_crossings import Arm, checked
-from evoexp.collision.models.link_envelopes import EnvelopedArm
-from evoexp.collision.models.segment_predicates import contact_tolerance, squared_distance
+from evoexp.collision.planar.link_crossings import Arm, checked
+from evoexp.collision.planar.link_envelopes import EnvelopedArm
+from evoexp.collision.planar.segment_predicates import contact_tolerance, squared_distance
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import U

@@ -26,7 +26,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.models.crossing_blocks import (
+from evoexp.collision.planar.crossing_blocks import (
     MARGIN,
     Table,
     cross_block,
@@ -34,7 +34,7 @@ from evoexp.collision.models.crossing_blocks import (
     fill_table,
     new_table,
 )
-from evoexp.collision.models.segment_predicates import contact_tolerance, meeting
+from evoexp.collision.planar.segment_predicates import contact_tolerance, meeting
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import exact_sincos
 from evoexp.numeric.vectors import LANES, least_lane, load, mask_bits, spread, upper

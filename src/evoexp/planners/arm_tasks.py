@@ -115,7 +115,7 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         return _floor_motion(task)
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
-    from evoexp.collision.models.link_collision import two_link_arms  # and its kernels
+    from evoexp.collision.planar.link_collision import two_link_arms  # and its kernels
 
     if task.stationary:
         must = "empty: this planner moves all robots"

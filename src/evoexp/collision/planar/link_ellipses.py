@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, gap, paths_collide
+from evoexp.collision.planar.ellipse_kernels import Ellipses, TestedPath, gap, paths_collide
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE

@@ -6,7 +6,6 @@ the path has that node at its place; so nothing needs to be cleared between path
 """
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel

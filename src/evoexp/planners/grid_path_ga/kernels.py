@@ -267,9 +267,7 @@ def draw_generations(
     words, choices, world, population = borrowed((words, choices, world, population))
     found, summaries, at = *borrowed((found, summaries)), 0
     for generation in range(first + 1, last + 1):
-        count = walk_all(
-            words[at:], num_words, more_words, choices, ends, erase, population.paths
-        )
+        count = walk_all(words[at:], num_words, more_words, choices, ends, erase, population.paths)
         if count < 0:
             return generation - 1
         at += count

@@ -127,10 +127,10 @@ def _tabulate(
 @inlined
 def _are_equal(one: IntArray, two: IntArray) -> bool:
     """Return whether two rows of weights are the same."""
+    num_equal = 0
     for k in range(len(one)):
-        if one[k] != two[k]:
-            return False
-    return True
+        num_equal += one[k] == two[k]
+    return num_equal == len(one)
 
 
 def choice_table(moves: Moves) -> Choices:

@@ -93,7 +93,7 @@ def move_spheres(
 
 
 @inlined
-def squared_distance(a: Place, b: Place) -> Vector:
+def squared_distance(a: Place, b: Place | tuple[float, float, float]) -> Vector:
     """Return the squared distance of two points, each of vectors or numbers."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     square: Vector = x * x + y * y + z * z
@@ -154,11 +154,13 @@ def nearest_to_obstacle(
         middle = center[0], center[1], center[2]
         for k in range(first, stop):
             least = lower(least, squared_distance(point_at(centers, U(k)), middle))
-        return root(least) - core[THICKNESS]
+        beyond: Vector = root(least) - core[THICKNESS]
+        return beyond
     for k in range(first, stop):
         point = seen_from(center, turn, point_at(centers, U(k)))
         least = lower(least, distance_from_core(kind, core, point))
-    return least - core[THICKNESS]
+    clearance: Vector = least - core[THICKNESS]
+    return clearance
 
 
 @inlined

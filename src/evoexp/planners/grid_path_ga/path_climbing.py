@@ -91,12 +91,22 @@ class _Climbing(PathTable):
         """Make the trials of generations; draw more numbers whenever they do not suffice."""
         self.states, num_trials = [], self._ga.num_offspring
         task = self._problem.world, self._planner.objective.weights, not self._planner.revisits
-        memory = self._paths, *self._scratch, self.recorded, self.summaries
+        candidate, scratch = self._scratch
         while first < last:
             if self._is_used_up:
                 self._draws.extend(rng)
             self._trial = kernels.climb(
-                self._draws.block, self._trial, first, last, num_trials, *task, *memory
+                self._draws.block,
+                self._trial,
+                first,
+                last,
+                num_trials,
+                *task,
+                self._paths,
+                candidate,
+                scratch,
+                self.recorded,
+                self.summaries,
             )
             is_complete = self._trial == last * num_trials
             reached = last if is_complete else self._trial // num_trials

@@ -129,9 +129,9 @@ class GridPathGa(PlannerDefaults, Component):
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths, from the start with more words if some lack."""
         counts = problem.num_words(len(paths)), MORE_WORDS
-        task = problem.choices, problem.ends, not self.revisits, paths
+        ends, erases = problem.ends, not self.revisits
         words = rng.bit_generator.random_raw(counts[0])
-        while walk_all(words, *counts, *task) < 0:
+        while walk_all(words, *counts, problem.choices, ends, erases, paths) < 0:
             words = np.concatenate([words, rng.bit_generator.random_raw(MORE_WORDS)])
 
     def _fill_one_by_one(

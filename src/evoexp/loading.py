@@ -59,11 +59,7 @@ def load(
 ) -> Frames:
     """Load the stored results of an experiment, or of one run by its hash.
 
-    ```python
-    frames = evoexp.load("rana_planar")  # or evoexp.load("4da921")
-    frames.summaries.groupby("label")[["best_cost", "cpu_s"]].median()
-    frames.generations.query("index == 100")  # every replicate's hundredth generation
-    ```
+    `evoexp.load("4da921").summaries.groupby("label")[["best_cost", "cpu_s"]].median()`
 
     Args:
         what: Name or file of an experiment, or any unique prefix of a run's hash.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from evoexp.collision.planar.arm_pairs import Crossings, count_pairs
-from evoexp.collision.planar.arms import Arm
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.records import FloatArray
 
 Base = tuple[float, float]

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from collision.exact_crossings import count_exactly
 from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
-from evoexp.collision.planar.arms import Arm, path_configurations
 from evoexp.collision.planar.closed_form import closed_form
+from evoexp.collision.planar.planar_arms import Arm, path_configurations
 from evoexp.collision.planar.segment_predicates import orientation, touching
 from matrix import first
 from references import link_crossings_numpy as plain

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.collision.planar.arm_pairs import count_collisions
-from evoexp.collision.planar.arms import Arm, boundary, colliding, tolerance_of
+from evoexp.collision.planar.planar_arms import Arm, boundary, colliding, tolerance_of
 from references import link_crossings_numpy as plain
 
 SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from collision.test_link_crossings_envelopes import boundaries
-from evoexp.collision.planar.arms import Arm
-from evoexp.collision.planar.obstacles import count_obstacle_collisions, planar_obstacles
+from evoexp.collision.planar.arm_obstacles import count_obstacle_collisions, planar_obstacles
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from composed import composed
+from evoexp.collision.planar.arm_obstacles import count_obstacle_collisions, planar_obstacles
 from evoexp.collision.planar.arm_pairs import count_collisions
-from evoexp.collision.planar.arms import Arm
 from evoexp.collision.planar.closed_form import closed_form
-from evoexp.collision.planar.obstacles import count_obstacle_collisions, planar_obstacles
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.proofs import judge_motion

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp
 
-from evoexp.commands.stored_runs import origin_of
+from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import find_runs
 
 Refused = Callable[..., str]

@@ -5,9 +5,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from evoexp.collision.planar.arms import Arm
+from evoexp.collision.planar.arm_obstacles import planar_obstacles
 from evoexp.collision.planar.link_collision import LinkCollision
-from evoexp.collision.planar.obstacles import planar_obstacles
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.scenarios.link_motion import Posture

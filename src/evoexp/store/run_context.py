@@ -100,7 +100,7 @@ def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(component, Mapping) and isinstance(component.get("planner"), Mapping):
             around = {key: value for key, value in component.items() if key != "planner"}
             parts |= {"control": around} | typed_parts({"planner": component["planner"]})
-        elif name == "planner":
+        elif name == "planner" and isinstance(component, Mapping):
             inner = {
                 key: value
                 for key, value in component.items()

@@ -24,15 +24,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.planar.arms import (
-    OUTLINE_ROWS,
-    POINT_ROWS,
-    Arm,
-    Point,
-    checked,
-    colliding,
-    tolerance_of,
-)
 from evoexp.collision.planar.pair_tests import (
     Sizes,
     envelope_quantities,
@@ -40,6 +31,15 @@ from evoexp.collision.planar.pair_tests import (
     error_bound,
     line_products,
     sizes_of,
+)
+from evoexp.collision.planar.planar_arms import (
+    OUTLINE_ROWS,
+    POINT_ROWS,
+    Arm,
+    Point,
+    checked,
+    colliding,
+    tolerance_of,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vector_rows import Eight, transposed

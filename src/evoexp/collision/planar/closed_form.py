@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.arms import Arm, tolerance_of
+from evoexp.collision.planar.planar_arms import Arm, tolerance_of
 from evoexp.collision.planar.segment_predicates import meeting
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray

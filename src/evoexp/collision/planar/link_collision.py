@@ -5,13 +5,13 @@ Links are lines, or have envelopes.
 
 from typing import Any, ClassVar, NamedTuple
 
-from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
-from evoexp.collision.planar.arms import Arm, path_configurations
-from evoexp.collision.planar.obstacles import (
+from evoexp.collision.planar.arm_obstacles import (
     PlanarObstacles,
     count_obstacle_collisions,
     planar_obstacles,
 )
+from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
+from evoexp.collision.planar.planar_arms import Arm, path_configurations
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly

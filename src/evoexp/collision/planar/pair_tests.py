@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.planar.arms import Arm
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.vectors import LANES, Singles, load_singles, magnitude, select, spread_single
 from evoexp.robots.kinematics import U

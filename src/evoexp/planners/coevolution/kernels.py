@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
-from evoexp.collision.planar.arms import Arm, tolerance_of, write_outlines
+from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
 from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall

@@ -70,7 +70,7 @@ class ReportFiles(NamedTuple):
 def report(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> Path:
-    """Write a report and return the path of its `index.html`; see `derived`."""
+    """Write a report and return the path of its `index.md`; see `derived`."""
     return write_report(derived(request, settings, outputs, num_replicates))
 
 
@@ -122,13 +122,13 @@ def page_files(
 
 
 def write_report(report: ReportFiles) -> Path:
-    """Write the files of a report and return the path of its `index.html`."""
+    """Write the files of a report and return the path of its `index.md`."""
     directory, files = report
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})
     for path in stale_files(report):
         path.unlink()
-    return directory / HTML
+    return directory / INDEX
 
 
 def stale_files(report: ReportFiles) -> list[Path]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.arms import (
+from evoexp.collision.planar.planar_arms import (
     OUTLINE_ROWS,
     POINT_ROWS,
     Arm,

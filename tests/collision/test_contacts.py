@@ -12,8 +12,8 @@ import pytest
 
 from composed import composed
 from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
-from evoexp.collision.bodies.shapes import Shapes
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,

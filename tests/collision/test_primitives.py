@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.shapes import Shapes, default_pairs
+from evoexp.collision.bodies.body_shapes import Shapes, default_pairs
 from evoexp.robots.kinematics import UnsupportedJoint
 from evoexp.scenarios.obstacles import (
     BoxObstacle,

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.shapes import Shapes
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.shapes import Shapes
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,

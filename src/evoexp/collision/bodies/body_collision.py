@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_shapes import Pairs, Shapes, arms_of_joints, default_pairs
+from evoexp.collision.bodies.body_tables import FlatTables, flattened
 from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
 from evoexp.collision.bodies.packing import pack_tables
-from evoexp.collision.bodies.shapes import Pairs, Shapes, arms_of_joints, default_pairs
-from evoexp.collision.bodies.tables import FlatTables, flattened
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table

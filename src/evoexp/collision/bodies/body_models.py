@@ -11,7 +11,7 @@ import numpy as np
 
 from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.body_pairs import BodyPairs, body_pairs
-from evoexp.collision.bodies.shapes import Shapes
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.box_support import coal
 from evoexp.collision.covers.body_covers import (
     Cover,

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.shapes import Shapes
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.body_table import body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import (

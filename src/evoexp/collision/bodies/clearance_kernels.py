@@ -12,6 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_tables import (
+    AROUND,
+    FIRST_BALL,
+    FIRST_CAPSULE,
+    FIRST_PART,
+    FIRST_RUN,
+    JOINT,
+    REACH,
+    STOP_CAPSULE,
+    STOP_ENTRY,
+    STOP_PART,
+    STOP_RUN,
+    THICKNESS,
+    BodyTables,
+    FlatTables,
+    named_tables,
+)
 from evoexp.collision.bodies.capsule_distances import (
     Segments,
     nearest_on_segments,
@@ -34,23 +51,6 @@ from evoexp.collision.bodies.distances import (
     spheres_to_spheres,
     squared_distance,
     turned,
-)
-from evoexp.collision.bodies.tables import (
-    AROUND,
-    FIRST_BALL,
-    FIRST_CAPSULE,
-    FIRST_PART,
-    FIRST_RUN,
-    JOINT,
-    REACH,
-    STOP_CAPSULE,
-    STOP_ENTRY,
-    STOP_PART,
-    STOP_RUN,
-    THICKNESS,
-    BodyTables,
-    FlatTables,
-    named_tables,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import (

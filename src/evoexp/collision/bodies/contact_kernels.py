@@ -11,16 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.distances import (
-    MARGIN,
-    POINT,
-    nearest,
-    nearest_to_obstacle,
-    place_point,
-    point_at,
-    squared_distance,
-)
-from evoexp.collision.bodies.tables import (
+from evoexp.collision.bodies.body_tables import (
     FIRST_BALL,
     FIRST_HALF_SPACE,
     FIRST_PART,
@@ -33,6 +24,15 @@ from evoexp.collision.bodies.tables import (
     BodyTables,
     FlatTables,
     named_tables,
+)
+from evoexp.collision.bodies.distances import (
+    MARGIN,
+    POINT,
+    nearest,
+    nearest_to_obstacle,
+    place_point,
+    point_at,
+    squared_distance,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel, view_part
 from evoexp.numeric.vectors import (

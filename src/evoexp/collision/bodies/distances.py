@@ -5,7 +5,7 @@ A point of eight configurations is three vectors (`numeric.vectors`) side by sid
 
 import numpy as np
 
-from evoexp.collision.bodies.tables import THICKNESS, BodyTables
+from evoexp.collision.bodies.body_tables import THICKNESS, BodyTables
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import Vector, load, lower, magnitude, root, spread, store, upper
 from evoexp.records import FloatArray, IntArray

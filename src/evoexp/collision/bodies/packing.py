@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.distances import MARGIN
-from evoexp.collision.bodies.shapes import Shapes
-from evoexp.collision.bodies.tables import (
+from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.body_tables import (
     AROUND,
     FIRST_BALL,
     FIRST_PART,
@@ -25,6 +24,7 @@ from evoexp.collision.bodies.tables import (
     THICKNESS,
     BodyTables,
 )
+from evoexp.collision.bodies.distances import MARGIN
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE, ObstacleTable

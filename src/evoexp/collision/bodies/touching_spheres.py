@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
-from evoexp.collision.bodies.shapes import Shapes
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product

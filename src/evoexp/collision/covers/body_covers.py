@@ -11,7 +11,7 @@ import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.box_support import coal
-from evoexp.collision.covers.solids import Solid, solid_of
+from evoexp.collision.covers.covered_solids import Solid, solid_of
 from evoexp.collision.covers.varied_spheres import Balls, varied_spheres
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.covers.solids import Solid
+from evoexp.collision.covers.covered_solids import Solid
 from evoexp.records import BoolArray, FloatArray
 
 FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to its corners

@@ -222,7 +222,7 @@ def _sum_counts(counts: NDArray[np.int16], sums_1: IntArray, sums_2: IntArray) -
 @kernel
 def _table(
     arm: Arm,
-    outlines: FloatArray,
+    outlines: FloatArray,  # (K, 4 | 8, N)
     way: Point,
     toward: float,
     scale: float,
@@ -231,8 +231,6 @@ def _table(
     """Return the table of a population.
 
     Args:
-        arm: Its arm.
-        outlines: (K, 4 | 8, N).
         way: From its base to the other's.
         toward: 1 for arm 1; −1 for arm 2, which reaches against the axes.
         scale: A power of two.

@@ -175,7 +175,7 @@ def margins(
 def cover_shapes(collision: SphereCollision | CoveredCollision) -> tuple[CoverShape, ...]:
     """Return the circles, spheres and capsules that a collision model tests."""
     if isinstance(collision, CoveredCollision):
-        shapes = collision.bodies.body_shapes
+        shapes = collision.bodies.shapes
         columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
         return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
     found = []

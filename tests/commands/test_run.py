@@ -51,7 +51,7 @@ def test_conditions_that_become_one_are_one_row_everywhere(
     (run,) = find_runs(outputs)
     row = pd.read_parquet(run.summary_path).iloc[0]
     named = {"experiment": "rana_planar", "label": "cma_es", "budget": "smoke"}
-    assert {name: row[name] for name in named} == named and row["planner"] == "cma_es"
+    assert {name: row[name] for name in named} == named and row["control"] == "cma_es"
     assert set(load("rana_planar", *words[1:], budget="smoke").summaries["label"]) == {"cma_es"}
     (listed,) = json.loads(evoexp("list", "--json").out)["runs"]
     assert {name: listed[name] for name in named} == named and listed["changed"]

@@ -216,7 +216,7 @@ def summary_table(experiment: Experiment) -> Table:
 
     As the report, it has all stored replicates, also those beyond the number that is asked for.
     """
-    numbers = right("replicates", "solved", "certified", "median\nbest cost", "CPU s\neach")
+    numbers = right("replicates", "solved /\ncertified", "median\nbest cost", "CPU s\neach")
     table = new_table(experiment.report_name, "condition", hash_column(), *numbers)
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
@@ -225,18 +225,18 @@ def summary_table(experiment: Experiment) -> Table:
         columns = rows.select([*SHOWN, "status", "clearance"]).to_pylist()
         done = [row for row in columns if row["status"] == "done"]
         moved = [row for row in done if not math.isnan(row["clearance"])]
-        certified = sum(row["certified"] is True for row in moved)
+        solved = sum(row["solved"] for row in done)
+        certified = str(sum(row["certified"] is True for row in moved)) if moved else "–"
         table.add_row(
             label,
             condition.id[:12],
             f"{len(done)} of {planned}",
-            f"{sum(row['solved'] for row in done)} of {len(done)}",
-            f"{certified} of {len(moved)}" if moved else "–",
+            f"{solved} / {certified}",
             _median([row["best_cost"] for row in done], ".4g"),
             _median([row["cpu_s"] for row in done], ".3f"),
         )
         if experiment.budget_of(label) == "smoke":
-            table.caption = "budget=smoke shows that everything runs; nothing follows from numbers"
+            table.caption = "budget=smoke shows that everything runs; its numbers decide nothing"
         if planned > condition.num_replicates(experiment.num_replicates):
             asked = experiment.num_replicates
             table.caption = f"of {asked} asked for: all that are stored, here and in the report"

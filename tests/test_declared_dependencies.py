@@ -72,3 +72,10 @@ def test_an_imported_library_is_declared(module: str) -> None:
 @pytest.mark.parametrize("distribution", DEEP)
 def test_what_evoexp_depends_on_in_depth_has_an_upper_bound(distribution: str) -> None:
     assert "<" in declared()[distribution]
+
+
+def test_every_locked_distribution_has_its_licence() -> None:
+    lock, page = ((ROOT / name).read_text() for name in ("requirements.lock", "docs/licences.md"))
+    _, _, table = page.rpartition("| --- | --- |\n")
+    listed = re.findall(r"^\| (\S+) \| \S.* \|$", table, re.MULTILINE)
+    assert set(listed) == set(re.findall(r"^([^ =]+)==", lock, re.MULTILINE))

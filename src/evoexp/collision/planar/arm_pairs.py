@@ -11,9 +11,9 @@ envelopes:
 - The others are tested in single precision, one arm against a block (`pair_tests`).
 - What rounding leaves open, two pairs of ten thousand random ones, is decided by `arms.colliding`.
 
-So counts are the same whatever the vector width, and exact but for contacts that rounding hides:
-parallel, collinear, touching and vanishing links are decided exactly, and lines and circles nearer
-than `segment_predicates.contact_tolerance` touch.
+So counts are the same whatever the vector width, and exact but for what rounding hides: lines and
+circles nearer than `segment_predicates.contact_tolerance` touch, parallel, collinear and vanishing
+ones, too.
 
 100 × 100 pairs of lines in 4 configurations take 10 … 17 µs in a run of a search and 30 where all
 angles are random; blocks of 104 individuals, without a look for axes, took 27 in both.
@@ -62,7 +62,7 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
 MOST_CONFIGURATIONS = 32767  # counts are int16
-LARGEST = 1e150  # [length unit] coordinates below it are decided exactly
+LARGEST = 1e150  # [length unit] of coordinates: their products do not overflow
 
 _MARGIN = 2.0**-40
 """Added to reaches, whose sums of at most six rounded numbers below 8 err by less than 2^-46."""
@@ -162,7 +162,7 @@ def count_pairs(
         outlines_1: (K, 4 | 8, N1), finite.
         arm_2: Arm of population 2.
         outlines_2: (K, 4 | 8, N2), finite.
-        tolerance: Of `tolerance_of`; 0: the given points are exact.
+        tolerance: Of `tolerance_of`.
         enveloped: None if both arms are lines: the tests of envelopes are not compiled then.
         counts: (N1, N2) int16.
         sums_1: (N1,) int64.

@@ -10,6 +10,7 @@ similar configurations can skip more there.
 from collections.abc import Callable
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -49,7 +50,12 @@ def coal_collisions(collision: Any) -> tuple[Callable[[Any], Any], Callable[[Any
     The first is called once per configuration and stops at the first contact. The second takes all
     configurations in one call (a pool with one thread and a tree per configuration).
     """
-    model, geometry = collision.assembly.model, pin.GeometryModel(collision.geometry)
+    model, geometry, shapes = collision.assembly.model, pin.GeometryModel(), collision.shapes
+    for joint, center, _, radius in zip(*shapes[:4], strict=True):
+        place = pin.SE3(np.eye(3), center)
+        geometry.addGeometryObject(
+            pin.GeometryObject("sphere", int(joint), 0, place, coal.Sphere(radius))
+        )
     (first, stop), (second, end) = collision.arm_spheres
     for a in range(first, stop):
         for b in range(second, end):

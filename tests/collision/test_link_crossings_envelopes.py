@@ -117,7 +117,7 @@ def exact_line_counts(arms: Any, drawn: Any) -> np.ndarray:
     counts = np.zeros((one.shape[2], two.shape[2]), dtype=np.int64)
     for i, j in np.ndindex(counts.shape):
         counts[i, j] = any(
-            plain.segments_touch(a[:2], a[2:], b[:2], b[2:])
+            plain.exact_squared_distance(a[:2], a[2:], b[:2], b[2:]) == 0
             for a in one[:, :, i].tolist()
             for b in two[:, :, j].tolist()
         )

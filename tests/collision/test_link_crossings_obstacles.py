@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 from collision.test_link_crossings_envelopes import boundaries
-from evoexp.collision.planar.arm_obstacles import count_obstacle_collisions, planar_obstacles
+from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.planar.planar_arms import Arm
+from evoexp.errors import SettingError
+from evoexp.robots.planar_chain import PlanarChain
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,
     SPHERE,
     BoxObstacle,
     CapsuleObstacle,
-    CylinderObstacle,
+    EllipseObstacle,
     HalfSpaceObstacle,
     SphereObstacle,
     obstacle_table,
@@ -29,6 +31,15 @@ OBSTACLES: dict[str, Any] = {
     "capsule": CapsuleObstacle(shape="capsule", start=(-0.2, 0.3), end=(0.0, 0.45), radius=0.04),
     "wall": HalfSpaceObstacle(shape="half_space", point=(0.4, 0.0), normal=(-1.0, 0.2)),
 }
+
+
+def bound(arm: Arm, *obstacles: Any) -> LinkCollision:
+    """Return the collision model of one arm among obstacles."""
+    robot = PlanarChain(link_lengths=arm.lengths, base_position=arm.base)
+    model = LinkCrossings(
+        collision_substeps=1, half_width=arm.half_width, tcp_radius=arm.tcp_radius
+    )
+    return model.bind(robot.build(), obstacles)
 
 
 def solid(table: Any, k: int) -> tuple[Any, Any]:
@@ -63,7 +74,7 @@ def test_counts_are_coal_s(names: Any) -> None:
     table = obstacle_table(tuple(OBSTACLES[name] for name in names))
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (4, 2, 60))
     points = ARM.outlines(q)
-    found = count_obstacle_collisions(ARM, points, planar_obstacles(table))
+    found = bound(ARM, *(OBSTACLES[name] for name in names)).with_obstacles(0, q)
     least = np.empty((4, 60))
     for k, n in np.ndindex(4, 60):
         rods = [rod([*ARM.base, *points[k, :2, n]]), rod(points[k, :4, n])]
@@ -82,8 +93,9 @@ def test_counts_are_coal_s(names: Any) -> None:
 def test_envelopes_are_coal_s(names: Any) -> None:
     table = obstacle_table(tuple(OBSTACLES[name] for name in names))
     arm = ARM._replace(half_width=0.03, tcp_radius=0.07)
-    drawn = arm.outlines(np.random.default_rng(7).uniform(-np.pi, np.pi, (4, 2, 60)))
-    found = count_obstacle_collisions(arm, drawn, planar_obstacles(table))
+    q = np.random.default_rng(7).uniform(-np.pi, np.pi, (4, 2, 60))
+    drawn = arm.outlines(q)
+    found = bound(arm, *(OBSTACLES[name] for name in names)).with_obstacles(0, q)
     lines = boundaries(arm, drawn)
     least = np.empty((4, 60))
     for k, n in np.ndindex(4, 60):
@@ -118,17 +130,13 @@ def test_envelopes_are_coal_s(names: Any) -> None:
     ],
 )
 def test_touching_counts(obstacle: Any, touches: float, misses: float) -> None:
-    obstacles = planar_obstacles(obstacle_table((obstacle,)))
     for height, expected in ((touches, 1), (misses, 0)):
         arm = Arm((0.0, height), (0.5, 0.5))
-        assert (
-            count_obstacle_collisions(arm, arm.outlines(np.zeros((1, 2, 1))), obstacles)[0]
-            == expected
-        )
+        assert bound(arm, obstacle).with_obstacles(0, np.zeros((1, 2, 1)))[0] == expected
 
 
 def test_a_link_inside_collides_and_nothing_collides_with_nothing() -> None:
-    points = ARM.outlines(np.random.default_rng(1).uniform(0.0, np.pi, (4, 2, 9)))
+    q = np.random.default_rng(1).uniform(0.0, np.pi, (4, 2, 9))
     for name, obstacle in {
         "disc": SphereObstacle(shape="sphere", center=(0.0, 0.0), radius=3.0),
         "box": BoxObstacle(
@@ -136,31 +144,11 @@ def test_a_link_inside_collides_and_nothing_collides_with_nothing() -> None:
         ),
         "capsule": CapsuleObstacle(shape="capsule", start=(0.0, -1.0), end=(0.0, 1.0), radius=3.0),
     }.items():
-        found = count_obstacle_collisions(
-            ARM, points, planar_obstacles(obstacle_table((obstacle,)))
-        )
-        assert (found == 4).all(), name
-    assert not count_obstacle_collisions(ARM, points, planar_obstacles(obstacle_table(()))).any()
+        assert (bound(ARM, obstacle).with_obstacles(0, q) == 4).all(), name
+    assert not bound(ARM).with_obstacles(0, q).any()
 
 
-@pytest.mark.parametrize(
-    "obstacle",
-    [
-        SphereObstacle(shape="sphere", center=(0.0, 0.0, 0.1), radius=1.0),
-        BoxObstacle(shape="box", center=(0.0, 0.0), size=(1.0, 1.0), rotation=(10.0, 0.0, 0.0)),
-        BoxObstacle(shape="box", center=(0.0, 0.0, 2.0), size=(1.0, 1.0, 1.0)),
-        CapsuleObstacle(shape="capsule", start=(0.0, 0.0), end=(0.0, 0.0, 1.0), radius=1.0),
-        HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0), normal=(0.0, 0.0, 1.0)),
-        CylinderObstacle(shape="cylinder", start=(0.0, 0.0), end=(1.0, 0.0), radius=1.0),
-    ],
-)
-def test_obstacles_out_of_the_plane_are_refused(obstacle: Any) -> None:
-    table = obstacle_table((OBSTACLES["disc"], obstacle))
-    with pytest.raises(ValueError, match=r"obstacles\[1\] must be a sphere, box"):
-        planar_obstacles(table)
-
-
-def test_points_of_another_shape_are_refused() -> None:
-    nothing = planar_obstacles(obstacle_table(()))
-    with pytest.raises(ValueError, match=r"outlines must have shape .* was \(4, 3\)"):
-        count_obstacle_collisions(ARM, np.zeros((4, 3)), nothing)
+def test_an_ellipse_is_refused() -> None:
+    ellipse = EllipseObstacle(shape="ellipse", center=(0.0, 0.0), semi_axes=(1.0, 2.0))
+    with pytest.raises(SettingError, match=r"scenario.obstacles\[1\].shape: must be any but"):
+        bound(ARM, OBSTACLES["disc"], ellipse)

@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pytest
 
-from evoexp.collision.planar.link_ellipses import EllipseCollision, LinkEllipses, _spread
+from evoexp.collision.planar.link_ellipses import EllipseCollision, LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.arms import Arms
@@ -236,13 +236,6 @@ def test_every_individual_is_judged_alone(count: int) -> None:
         bool(bound().collide(starts[:, k : k + 1], ends[:, k : k + 1])[0]) for k in range(count)
     ]
     assert together.tolist() == alone
-
-
-@pytest.mark.parametrize("num", range(1, 40))
-def test_positions_are_each_tested_once_the_end_first(num: int) -> None:
-    order = _spread(num)
-    assert order[0] == num
-    assert sorted(order) == list(range(1, num + 1))
 
 
 def test_an_ellipse_counts_from_the_first_link_that_reaches_it() -> None:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from collision.test_link_crossings_obstacles import bound
 from composed import composed
-from evoexp.collision.planar.arm_obstacles import count_obstacle_collisions, planar_obstacles
 from evoexp.collision.planar.arm_pairs import count_collisions
 from evoexp.collision.planar.closed_form import closed_form
 from evoexp.collision.planar.planar_arms import Arm
@@ -25,7 +25,6 @@ from evoexp.scenarios.obstacles import (
     CapsuleObstacle,
     HalfSpaceObstacle,
     SphereObstacle,
-    obstacle_table,
 )
 from references.link_crossings_numpy import exact_touch
 from references.surds import Surd, as_near, exact_arm, exact_boundaries, within
@@ -172,15 +171,13 @@ def test_obstacles_are_hit_as_in_exact_arithmetic() -> None:
     arm = arm_at(0)
     circled = arm._replace(tcp_radius=RADIUS * UNIT)
     for obstacle, touches in cases:
-        flat = planar_obstacles(obstacle_table((obstacle,)))
         links = [any(touches(line, 0) for line in lines_of(points)) for points in arms]
-        check(count_obstacle_collisions(arm, arm.outlines(angles(chosen)), flat), links)
+        check(bound(arm, obstacle).with_obstacles(0, angles(chosen)), links)
         tips = [
             met or touches((points[2], points[2]), RADIUS)
             for met, points in zip(links, arms, strict=True)
         ]
-        outlines = circled.outlines(angles(chosen))
-        check(count_obstacle_collisions(circled, outlines, flat), tips)
+        check(bound(circled, obstacle).with_obstacles(0, angles(chosen)), tips)
 
 
 def turned(t: Fraction) -> tuple[Fraction, Fraction]:

@@ -32,15 +32,17 @@ def coal_clearance(
     collision: SphereCollision, obstacles: tuple[object, ...], q_deg: np.ndarray
 ) -> tuple[float, float]:
     """Least distances by coal: spheres of different arms, and spheres and obstacles."""
-    assembly, geometry = collision.assembly, collision.geometry
-    data, geometry_data = assembly.model.createData(), geometry.createData()
-    pin.updateGeometryPlacements(assembly.model, data, geometry, geometry_data, np.deg2rad(q_deg))
+    model, shapes = collision.assembly.model, collision.shapes
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.deg2rad(q_deg))
     arms = np.concatenate(
         [[a] * (stop - first) for a, (first, stop) in enumerate(collision.arm_spheres)]
     )
     spheres = [
-        (coal.CollisionObject(g.geometry, p.rotation, p.translation), arm)
-        for g, p, arm in zip(geometry.geometryObjects, geometry_data.oMg, arms, strict=True)
+        (coal.CollisionObject(coal.Sphere(radius), np.eye(3), data.oMi[joint].act(center)), arm)
+        for joint, center, radius, arm in zip(
+            shapes.joint.tolist(), shapes.start, shapes.radius, arms, strict=True
+        )
     ]
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     between = [_distance(a, b, request, result) for a, m in spheres for b, n in spheres if m < n]

@@ -16,7 +16,6 @@ from evoexp.numeric.vectors import (
     ceiling,
     least_lane,
     load,
-    load_singles,
     lower,
     magnitude,
     mask_bits,
@@ -24,7 +23,6 @@ from evoexp.numeric.vectors import (
     select,
     spread,
     store,
-    store_singles,
     upper,
     whole,
 )
@@ -176,28 +174,6 @@ def test_neighbours_are_read_and_written_where_they_are_named() -> None:
     x, out = np.arange(20.0), np.full(20, -1.0)
     shift(x, 3, out, 5)
     assert out.tolist() == [-1.0] * 5 + list(range(3, 11)) + [-1.0] * 7
-
-
-@kernel
-def rough(one: Any, two: Any, factor: np.float32, exact: FloatArray, out: Any) -> None:
-    for place in range(0, len(one), LANES):
-        at = np.uint64(place)
-        a, b = load_singles(one, at), load_singles(two, at)
-        chosen = select(a <= b, factor * a - b, magnitude(a * b) + factor)
-        store_singles(out, at, chosen)
-        store_singles(out, np.uint64(len(one) + place), load(exact, at))
-
-
-def test_singles_have_the_bits_of_scalars_and_round_doubles() -> None:
-    rng, factor = np.random.default_rng(3), np.float32(1.7)
-    one, two = rng.normal(size=(2, 5 * LANES)).astype(np.float32)
-    two[::7] = one[::7]
-    exact = rng.normal(size=len(one)) * 10.0 ** rng.integers(-50, 50, len(one))
-    out = np.empty(2 * len(one), dtype=np.float32)
-    rough(one, two, factor, exact, out)
-    with np.errstate(all="ignore"):
-        expected = np.where(one <= two, factor * one - two, np.abs(one * two) + factor)
-        assert np.array_equal(out, np.concatenate([expected, exact.astype(np.float32)]))
 
 
 def test_other_arrays_are_refused() -> None:

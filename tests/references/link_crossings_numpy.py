@@ -17,14 +17,6 @@ def side(a: Any, b: Any, c: Any) -> int:
     return (value > 0) - (value < 0)
 
 
-def segments_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
-    """Whether two segments have a common point.
-
-    Ends are pairs of floats, taken as the rational numbers they are.
-    """
-    return exact_touch(*(tuple(map(Fraction, point)) for point in (a, b, c, d)))
-
-
 def exact_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
     """Whether two segments have a common point; ends are pairs of exact numbers."""
     if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
@@ -39,21 +31,20 @@ def on_segment(a: Any, b: Any, c: Any) -> bool:
     return side(a, b, c) == 0 and within
 
 
-def exact_counts(
-    base_1: Any, points_1: FloatArray, base_2: Any, points_2: FloatArray
-) -> np.ndarray:
-    """Return the number of colliding configurations of each pair, (N1, N2).
+def exact_squared_distance(a: Any, b: Any, c: Any, d: Any) -> Fraction:
+    """Return the squared distance of two segments; ends are floats, taken as rational numbers."""
+    a, b, c, d = (tuple(map(Fraction, point)) for point in (a, b, c, d))
+    if exact_touch(a, b, c, d):
+        return Fraction(0)
+    ends = (a, b, c), (a, b, d), (c, d, a), (c, d, b)
+    return min(_from_segment(*each) for each in ends)
 
-    Points are (K, 4, N).
-    """
-    counts = np.zeros((points_1.shape[2], points_2.shape[2]), dtype=np.int64)
-    for i, j in np.ndindex(counts.shape):
-        for one, two in zip(points_1[:, :, i].tolist(), points_2[:, :, j].tolist(), strict=True):
-            a, b = [base_1, one[:2], one[2:]], [base_2, two[:2], two[2:]]
-            counts[i, j] += any(
-                segments_touch(*a[m : m + 2], *b[n : n + 2]) for m in (0, 1) for n in (0, 1)
-            )
-    return counts
+
+def _from_segment(a: Any, b: Any, p: Any) -> Fraction:
+    u, v = (b[0] - a[0], b[1] - a[1]), (p[0] - a[0], p[1] - a[1])
+    square = u[0] * u[0] + u[1] * u[1]
+    t = min(max((u[0] * v[0] + u[1] * v[1]) / square, 0), 1) if square else 0
+    return (v[0] - t * u[0]) ** 2 + (v[1] - t * u[1]) ** 2
 
 
 def cross(u: FloatArray, v: FloatArray) -> FloatArray:

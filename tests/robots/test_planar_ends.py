@@ -10,11 +10,9 @@ from evoexp.numeric.vectors import LANES
 from evoexp.robots.planar_chain import PlanarChain
 from evoexp.robots.planar_ends import (
     PlanarArm,
-    begin_turning,
     block_ends,
     load_lanes,
     planar_arm,
-    turned_ends,
 )
 
 ARM = PlanarChain(link_lengths=(3.0, 2.0, 1.0), base_position=(0.5, -1.0), base_angle=30.0)
@@ -32,25 +30,6 @@ def ends_at(
     y: np.ndarray,
 ) -> None:
     block_ends(starts, ends, arm, position, num_positions, x, y)
-
-
-@kernel
-def turn_from(
-    starts: np.ndarray,
-    ends: np.ndarray,
-    arm: PlanarArm,
-    position: int,
-    num_positions: int,
-    turn: np.ndarray,
-    x: np.ndarray,
-    y: np.ndarray,
-) -> None:
-    begin_turning(starts, ends, arm, position, num_positions, turn, x, y)
-
-
-@kernel
-def turn_on(arm: PlanarArm, turn: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
-    turned_ends(arm, turn, x, y)
 
 
 @pytest.fixture
@@ -90,20 +69,6 @@ def test_the_last_position_is_the_end_to_the_last_bit(paths: np.ndarray) -> None
     ends_at(ends, ends, arm, 0, 1, u, v)
     assert np.array_equal(x, u)
     assert np.array_equal(y, v)
-
-
-def test_turned_on_directions_agree_with_computed_ones(paths: np.ndarray) -> None:
-    """32 turns, after which the kernels begin anew, at 2e-16 each."""
-    starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
-    arm, turn = planar_arm(ARM.build()), np.empty(4 * 3 * LANES)
-    x, y, u, v = np.empty((4, 4 * LANES))
-    turn_from(starts, ends, arm, 5, NUM_POSITIONS, turn, u, v)
-    ends_at(starts, ends, arm, 5, NUM_POSITIONS, x, y)
-    assert np.array_equal(x, u) and np.array_equal(y, v)
-    for position in range(6, 38):
-        ends_at(starts, ends, arm, position, NUM_POSITIONS, x, y)
-        turn_on(arm, turn, u, v)
-        assert max(np.abs(x - u).max(), np.abs(y - v).max()) < 6.0 * 32 * 3e-16
 
 
 def test_a_block_is_filled_with_its_last_individual() -> None:

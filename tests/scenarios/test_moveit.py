@@ -11,7 +11,7 @@ import yaml
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.scenarios.moveit_files import Document
+from evoexp.scenarios.moveit_files import MessagePart, read_document
 from evoexp.scenarios.moveit_frames import read_frames
 from evoexp.scenarios.moveit_messages import REQUEST, SCENE
 from evoexp.scenarios.moveit_request import read_link_goal, read_request
@@ -20,15 +20,17 @@ from evoexp.scenarios.obstacles import BOX, CYLINDER, HALF_SPACE, SPHERE, obstac
 from moveit_samples import GOAL, JOINTS, START, body, request, scene
 
 
-def document(plain: Any, message: str = SCENE) -> Document:
+def document(plain: Any, message: str = SCENE) -> MessagePart:
     text = plain if isinstance(plain, bytes) else yaml.safe_dump(plain).encode()
-    return Document(text, "scenario.scene" if message == SCENE else "scenario.request", message)
+    return read_document(
+        text, "scenario.scene" if message == SCENE else "scenario.request", message
+    )
 
 
 def read(plain: Any) -> World:
     """Read all of a scene."""
     file = document(plain)
-    read_state(file, file.root.get("robot_state"), "robot_state")
+    read_state(file["robot_state"])
     read_allowed(file)
     return read_world(file, None, {})
 
@@ -202,7 +204,7 @@ def test_no_other_yaml_is_read(text: bytes) -> None:
 
 def asked(**changes: Any) -> Any:
     file = document(request(**changes), REQUEST)
-    read_state(file, file.root.get("start_state"), "start_state")
+    read_state(file["start_state"])
     return read_request(file)
 
 

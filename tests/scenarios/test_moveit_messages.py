@@ -65,7 +65,7 @@ def test_other_files_are_named(named: str) -> None:
     ids=["topic echo", "byte order mark", "JSON with tabs", "ends of lines"],
 )
 def test_one_message_is_taken_however_it_is_written(text: str) -> None:
-    assert document(text.encode()).root == yaml.safe_load(TEXT)
+    assert document(text.encode()).value == yaml.safe_load(TEXT)
 
 
 def test_the_command_line_names_the_file_and_ends_with_2(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_slip_in_a_name_is_told_its_nearest() -> None:
 
 def read(plain: Any) -> None:
     file = document(plain)
-    read_state(file, file.root.get("robot_state"), "robot_state")
+    read_state(file["robot_state"])
     read_allowed(file)
     read_world(file, None, {})
 
@@ -152,10 +152,18 @@ UNFIT = {
     r"one position of 'j' at robot_state.joint_state, was \[1.0, 2.0\]": {
         "robot_state": {"joint_state": {"name": ["j", "j"], "position": [1, 2]}}
     },
-    r"1 numbers at 'thing'.dimensions, was 3": scene(body("sphere", [0.1, 0, 0], [0, 0, 0])),
-    r"2 numbers at 'thing'.dimensions, was 1": scene(body("cone", [0.1], [0, 0, 0])),
-    r"3 numbers at 'thing'.dimensions, was 2": scene(body("box", [0.1, 0.2], [0, 0, 0])),
-    r"3 numbers at 'thing'.primitive_poses\[0\], was 2": scene(body("sphere", [0.1], [0, 0])),
+    r"1 numbers at 'thing'.primitives\[0\].dimensions, was 3": scene(
+        body("sphere", [0.1, 0, 0], [0, 0, 0])
+    ),
+    r"2 numbers at 'thing'.primitives\[0\].dimensions, was 1": scene(
+        body("cone", [0.1], [0, 0, 0])
+    ),
+    r"3 numbers at 'thing'.primitives\[0\].dimensions, was 2": scene(
+        body("box", [0.1, 0.2], [0, 0, 0])
+    ),
+    r"3 numbers at 'thing'.primitive_poses\[0\].position, was 2": scene(
+        body("sphere", [0.1], [0, 0])
+    ),
     r"primitives that are box, .*, was \"'thing', a none\"": scene(body(None, [1], [0, 0, 0])),
     r"primitives that are box, .*, was \"'thing', a true\"": scene(body(True, [1], [0, 0, 0])),
     r"primitives that are box, .*, was \"'thing', a 7\"": scene(body(7, [1], [0, 0, 0])),
@@ -187,7 +195,9 @@ def test_quaternions_are_normalised_within_a_hundredth_and_refused_beyond() -> N
         assert np.allclose(turned(length).center, [0.0, 1.0, 0.0], atol=1e-12)
         assert np.allclose(turned(length).rotation, [0.0, 0.0, 90.0], atol=1e-9)
     for length in (0.98, 1.02):
-        with pytest.raises(SettingError, match=f"quaternions of length 1 at 'thing', was {length}"):
+        with pytest.raises(
+            SettingError, match=f"quaternions of length 1 at 'thing'.pose.orientation, was {length}"
+        ):
             turned(length)
 
 

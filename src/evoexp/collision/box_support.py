@@ -11,7 +11,7 @@ import warnings
 import coal
 import numpy as np
 
-__all__ = ["EXACT", "coal", "settle"]
+__all__ = ["EXACT", "coal", "distance", "settle"]
 
 TURNED = np.array(  # a rotation about (1, 2, 3) by 1 rad: no component of any direction is zero
     [
@@ -30,12 +30,13 @@ def settle() -> bool:
     """
     capsule, box = coal.Capsule(0.125, 1.0), coal.Box(0.5, 0.5, 0.5)
     here, turned = coal.Transform3s(), coal.Transform3s(TURNED, np.array([1.0, 2.0, 3.0]))
-    _distance(capsule, coal.Transform3s(TURNED.T, np.zeros(3)), box, turned)
+    distance(capsule, coal.Transform3s(TURNED.T, np.zeros(3)), box, turned)
     aside = coal.Transform3s(np.eye(3), np.array([0.5 + _GAP, 0.0, 0.0]))
-    return _distance(box, here, box, aside) == _GAP
+    return distance(box, here, box, aside) == _GAP
 
 
-def _distance(one: coal.ShapeBase, first: object, two: coal.ShapeBase, second: object) -> float:
+def distance(one: coal.ShapeBase, first: object, two: coal.ShapeBase, second: object) -> float:
+    """Return coal's signed distance of two shapes at their places, `coal.Transform3s`."""
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     return float(coal.distance(one, first, two, second, request, result))
 

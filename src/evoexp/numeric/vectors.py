@@ -27,7 +27,6 @@ from evoexp.numeric.compilation import inlined, intrinsic
 LANES = 8
 
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
-_SINGLES = ir.VectorType(ir.FloatType(), LANES)
 _WORDS = ir.VectorType(ir.IntType(64), LANES)
 _BITS = ir.VectorType(ir.IntType(1), LANES)
 
@@ -57,19 +56,6 @@ class Vector(Protocol):
     def __ge__(self, other: "Vector | float") -> Mask: ...
 
 
-class Singles(Protocol):
-    """Eight float32, for what may be rough: half the work of a `Vector`."""
-
-    def __add__(self, other: "Singles | np.float32") -> "Singles": ...
-    def __radd__(self, other: np.float32) -> "Singles": ...
-    def __sub__(self, other: "Singles | np.float32") -> "Singles": ...
-    def __rsub__(self, other: np.float32) -> "Singles": ...
-    def __mul__(self, other: "Singles | np.float32") -> "Singles": ...
-    def __rmul__(self, other: np.float32) -> "Singles": ...
-    def __lt__(self, other: "Singles | np.float32") -> Mask: ...
-    def __le__(self, other: "Singles | np.float32") -> Mask: ...
-
-
 class _VectorType(types.Type):
     """numba's type of one kind of vector."""
 
@@ -79,8 +65,8 @@ class _VectorType(types.Type):
         return _LLVM_TYPES[self.name]
 
 
-_LLVM_TYPES = {"vector8": _DOUBLES, "words8": _WORDS, "mask8": _BITS, "singles8": _SINGLES}
-vector_type, word_type, mask_type, single_type = map(_VectorType, _LLVM_TYPES)
+_LLVM_TYPES = {"vector8": _DOUBLES, "words8": _WORDS, "mask8": _BITS}
+vector_type, word_type, mask_type = map(_VectorType, _LLVM_TYPES)
 
 
 @register_model(_VectorType)
@@ -149,7 +135,6 @@ def _define_operators() -> None:
     }
     for operation, instruction in arithmetic.items():
         _define(operation, vector_type, types.float64, vector_type, instruction)
-        _define(operation, single_type, types.float32, single_type, instruction)
     for operation, instruction in of_words.items():
         _define(operation, word_type, types.int64, word_type, instruction)
 
@@ -162,7 +147,6 @@ def _define_operators() -> None:
     comparisons = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
     for sign, operation in comparisons.items():
         _define(operation, vector_type, types.float64, mask_type, comparison(sign))
-        _define(operation, single_type, types.float32, mask_type, comparison(sign))
     _define(operator.eq, vector_type, types.float64, mask_type, comparison("=="))
     _define(operator.ne, word_type, types.int64, mask_type, unequal)
     _define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
@@ -172,18 +156,16 @@ def _define_operators() -> None:
 _define_operators()
 
 
-def _check_array(array: Any, dtype: Any = types.float64) -> None:
+def _check_array(array: Any) -> None:
     flat = isinstance(array, types.Array) and array.ndim == 1 and array.layout == "C"
-    if not (flat and array.dtype == dtype):
-        raise TypingError(f"array must be contiguous {dtype} of one dimension, is {array}")
+    if not (flat and array.dtype == types.float64):
+        raise TypingError(f"array must be contiguous float64 of one dimension, is {array}")
 
 
-def _pointer(
-    context: Any, builder: Any, kind: Any, array: Any, place: Any, lanes: Any = _DOUBLES
-) -> Any:
+def _pointer(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
     """Return the address of eight numbers in an array's memory."""
     data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [place]), lanes.as_pointer())
+    return builder.bitcast(builder.gep(data, [place]), _DOUBLES.as_pointer())
 
 
 @intrinsic
@@ -212,43 +194,11 @@ def _store(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
 
 
 @intrinsic
-def _load_singles(typing_context: Any, array: Any, place: Any) -> Any:
-    _check_array(array, types.float32)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array, place = arguments
-        value = builder.load(_pointer(context, builder, signature.args[0], array, place, _SINGLES))
-        value.align = 4  # [B] that of a float32
-        return value
-
-    return single_type(array, place), generate
-
-
-@intrinsic
-def _store_singles(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
-    _check_array(array, types.float32)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array, place, value = arguments
-        rounded = value if vector == single_type else builder.fptrunc(value, _SINGLES)
-        pointer = _pointer(context, builder, signature.args[0], array, place, _SINGLES)
-        written = builder.store(rounded, pointer)
-        written.align = 4
-        return context.get_dummy_value()
-
-    return types.void(array, place, vector), generate
-
-
-@intrinsic
 def _spread_scalar(typing_context: Any, value: Any) -> Any:
-    scalar, kind = value, single_type
-    if value != types.float32:  # an int, too
-        scalar, kind = types.float64, vector_type
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _spread(builder, arguments[0], kind.lanes)
+        return _spread(builder, arguments[0], _DOUBLES)
 
-    return kind(scalar), generate
+    return vector_type(types.float64), generate  # of an int, too
 
 
 @intrinsic
@@ -289,18 +239,15 @@ def _of_llvm(name: str) -> Any:
 
     @intrinsic
     def operation(typing_context: Any, vector: Any) -> Any:
-        single = vector == single_type
-        lanes, kind = (_SINGLES, single_type) if single else (_DOUBLES, vector_type)
-
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             function = cgutils.get_or_insert_function(
                 builder.module,
-                ir.FunctionType(lanes, [lanes]),
-                f"llvm.{name}.v{LANES}f{32 if single else 64}",
+                ir.FunctionType(_DOUBLES, [_DOUBLES]),
+                f"llvm.{name}.v{LANES}f64",
             )
             return builder.call(function, arguments)
 
-        return kind(kind), generate
+        return vector_type(vector_type), generate
 
     return operation
 
@@ -329,17 +276,8 @@ Neither `load` nor `store` checks that they lie within the array.
 store: Callable[[NDArray[np.float64], np.uint64, Vector], None] = _store
 """Write eight numbers side by side into a contiguous array, from an index on."""
 
-load_singles: Callable[[NDArray[np.float32], np.uint64], Singles] = _load_singles
-"""Return eight numbers of a contiguous array of float32; see `load`."""
-
-store_singles: Callable[[NDArray[np.float32], np.uint64, Vector | Singles], None] = _store_singles
-"""Write eight numbers, rounded, side by side into a contiguous array of float32."""
-
 spread: Callable[[float], Vector] = _spread_scalar
 """Return a vector of one number in every lane."""
-
-spread_single: Callable[[np.float32], Singles] = _spread_scalar
-"""Return singles of one number in every lane."""
 
 select: Callable[[Any, Any, Any], Any] = _select
 """Return the first value in lanes where a condition holds, the second in the others."""
@@ -353,8 +291,8 @@ least_lane: Callable[[Vector], float] = _least_lane
 root: Callable[[Vector], Vector] = _of_llvm("sqrt")
 """Return the square root of every lane, correctly rounded."""
 
-magnitude: Callable[[Any], Any] = _of_llvm("fabs")
-"""Return the absolute value of every lane of a vector or of singles."""
+magnitude: Callable[[Vector], Vector] = _of_llvm("fabs")
+"""Return the absolute value of every lane."""
 
 ceiling: Callable[[Vector], Vector] = _of_llvm("ceil")
 """Return the least whole number not below the value of every lane."""

@@ -174,15 +174,9 @@ def margins(
 
 def cover_shapes(collision: SphereCollision | CoveredCollision) -> tuple[CoverShape, ...]:
     """Return the circles, spheres and capsules that a collision model tests."""
-    if isinstance(collision, CoveredCollision):
-        shapes = collision.bodies.shapes
-        columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
-        return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
-    found = []
-    for item in collision.geometry.geometryObjects:
-        center = np.array(item.placement.translation)
-        found.append(CoverShape(item.parentJoint, center, center, float(item.geometry.radius)))
-    return tuple(found)
+    joint, start, end, radius, _ = collision.shapes
+    columns = joint.tolist(), start, end, radius.tolist()
+    return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
 
 
 def cover_notes(

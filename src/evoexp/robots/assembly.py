@@ -255,22 +255,3 @@ def link_capsule(link: Link, name: str) -> Any:
         )
     shape = coal.Capsule(link.radius, length(link.end - link.start))
     return pin.GeometryObject(name, link.joint, 0, along(link.start, link.end), shape)
-
-
-def sphere_geometry(
-    assembly: Assembly, centres: FloatArray, joints: np.ndarray, radii: FloatArray
-) -> Any:
-    """Return spheres fixed to joints as a `pin.GeometryModel`, the papers' own collision models.
-
-    Args:
-        centres: (spheres, 3) in the frames of their joints.
-        joints: (spheres,) indices of Pinocchio joints.
-        radii: (spheres,).
-    """
-    geometry = pin.GeometryModel()
-    for k, (centre, joint, radius) in enumerate(zip(centres, joints, radii, strict=True)):
-        placement = pin.SE3(np.eye(3), centre)
-        geometry.addGeometryObject(
-            pin.GeometryObject(f"sphere_{k}", int(joint), 0, placement, coal.Sphere(radius))
-        )
-    return geometry

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.compilation import inlined
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.vectors import LANES, Vector, load, spread, store
 from evoexp.records import FloatArray
@@ -25,31 +25,6 @@ class Eight(NamedTuple):
     q: FloatArray  # the batch, flat: coordinate k of the first one stands at k · stride + place
     place: np.uint64  # of the first one
     stride: np.uint64  # from one coordinate to the next
-
-
-@kernel
-def copy_lanes(
-    source: FloatArray,
-    place: int,
-    stride: int,
-    count: int,
-    target: FloatArray,
-    target_place: int,
-    target_stride: int,
-) -> None:
-    """Copy some neighbours of every row of one flat array to another.
-
-    Args:
-        source: Rows of `stride` numbers.
-        place: Of the first neighbour in a row.
-        count: How many neighbours.
-        target: Rows of `target_stride` numbers, written.
-        target_place: Of the first neighbour in a row of the target.
-    """
-    source, target = borrowed((source, target))
-    for row in range(len(source) // stride):
-        for n in range(count):
-            target[row * target_stride + target_place + n] = source[row * stride + place + n]
 
 
 @inlined

@@ -13,11 +13,10 @@ from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import (
     SPATIAL_FRAME,
     VECTOR,
-    Eight,
-    copy_lanes,
+    eight_of,
     spatial_frames,
 )
-from evoexp.robots.kinematics import KinematicChain, KinematicTable, U
+from evoexp.robots.kinematics import SPATIAL_ROWS, KinematicChain, KinematicTable, U
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -92,9 +91,7 @@ def frame_poses(
     )
     own = U(joint) * SPATIAL_FRAME
     for first in range(0, count, LANES):
-        lanes = min(LANES, count - first)
-        copy_lanes(flat, first, count, lanes, padded, 0, LANES)
-        spatial_frames(chain, Eight(padded, U(0), VECTOR), 1.0, frames)
+        spatial_frames(chain, eight_of(flat, first, count, padded), 1.0, frames)
         for e in range(3):
             row, at = U(3 * e) * VECTOR, U(9 + e) * VECTOR
             x, y = load(frames, own + row), load(frames, own + row + VECTOR)
@@ -106,7 +103,9 @@ def frame_poses(
             # coordinate e of the position
             moved = x * local[9] + y * local[10] + z * local[11]
             store(found, at, load(frames, own + at) + moved)
-        copy_lanes(found, 0, LANES, lanes, target, first, count)
+        for number in range(SPATIAL_ROWS):
+            for lane in range(min(LANES, count - first)):
+                target[number * count + first + lane] = found[number * LANES + lane]
 
 
 def frame_pose(table: KinematicTable, joint: int, local: FloatArray, q: FloatArray) -> FloatArray:

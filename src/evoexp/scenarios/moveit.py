@@ -19,19 +19,25 @@ from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit_files import Document, Pose
+from evoexp.scenarios.moveit_files import MessagePart, Pose, read_document
 from evoexp.scenarios.moveit_frames import has_other_frames
 from evoexp.scenarios.moveit_meshes import Mesh, resources
 from evoexp.scenarios.moveit_messages import REQUEST, SCENE
 from evoexp.scenarios.moveit_request import (
     LinkGoal,
     Request,
-    check_start,
     read_link_goal,
     read_request,
     state_of,
 )
-from evoexp.scenarios.moveit_scene import AllowedPairs, World, read_allowed, read_state, read_world
+from evoexp.scenarios.moveit_scene import (
+    AllowedPairs,
+    World,
+    check_robot_place,
+    read_allowed,
+    read_state,
+    read_world,
+)
 from evoexp.validation import Component, NonNegative, Positive, Settings
 
 if TYPE_CHECKING:
@@ -129,9 +135,7 @@ class MoveitTask(Component):
     @property
     def state(self) -> dict[str, float]:
         """Joint names → positions at the start [rad, m]; the request's come before the scene's."""
-        scene = self._message("scene")
-        state = read_state(scene, scene.root.get("robot_state"), "robot_state")
-        return state | self.plan_request.start
+        return read_state(self._message("scene")["robot_state"]) | self.plan_request.start
 
     def world(self, links: "LinkFrames | None", load: LoadMesh) -> World:
         """Return the scene's objects.
@@ -156,7 +160,7 @@ class MoveitTask(Component):
             robot: The robot of the condition.
         """
         name = getattr(robot, "robot_name", "")
-        scene, request = (self._message(name).root for name in FILES)
+        scene, request = (self._message(name).value for name in FILES)
         found = []
         if scene.get("is_diff"):
             found.append("the scene is a change of another (is_diff): it is taken as it is")
@@ -169,7 +173,7 @@ class MoveitTask(Component):
             found.append(f"left out of the request: {', '.join(left)} (export has its own limits)")
         return tuple(found)
 
-    def _message(self, name: str) -> Document:
+    def _message(self, name: str) -> MessagePart:
         file: File = getattr(self, name)
         path = _paths.get(file.sha256)
         field = f"scenario.{name}" if path is None else f"scenario.{name}: {path}"
@@ -219,7 +223,7 @@ class MoveitTask(Component):
         if q_goal is None:
             must = "a goal of joints for this planner (posture_es plans to poses)"
             raise SettingError("scenario.request", must, f"a pose of '{self.plan_request.link}'")
-        check_start(self._message("request"), world.frames)
+        check_robot_place(self._message("request")["start_state"], world.frames)
         ends = [joints.typed(q) for q in (state_of(joints.names, self.state), q_goal)]
         start, end = (
             tuple(tuple(float(value) for value in q[a:b]) for a, b in joints.slices) for q in ends
@@ -259,7 +263,7 @@ class MoveitTask(Component):
         from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
 
         request = self._message("request")
-        check_start(request, world.frames)
+        check_robot_place(request["start_state"], world.frames)
         if tool_at_goal is not None:
             link = LinkGoal("", tool_at_goal, self.position_tolerance, self.angle_tolerance)
         else:
@@ -285,18 +289,14 @@ class MoveitTask(Component):
         )
 
 
-@functools.lru_cache(maxsize=64)
-def _document(content: bytes, field: str, message: str) -> Document:
-    return Document(content, field, message)
-
-
+_document = functools.lru_cache(maxsize=64)(read_document)
 _allowed = functools.lru_cache(maxsize=64)(read_allowed)
 _request = functools.lru_cache(maxsize=64)(read_request)
 
 
 @functools.lru_cache(maxsize=64)
 def _world(
-    scene: Document, links: "LinkFrames | None", meshes: tuple[SceneMesh, ...], load: LoadMesh
+    scene: MessagePart, links: "LinkFrames | None", meshes: tuple[SceneMesh, ...], load: LoadMesh
 ) -> World:
     loaded = {}
     for mesh in meshes:

@@ -1,5 +1,6 @@
-"""Messages of MoveIt in files, as plain data that is asked by name, and poses in them."""
+"""Messages of MoveIt in files, whose parts know their places, and poses in them."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,89 +70,119 @@ def primitive_kind(value: Any) -> str:
     return KINDS[value] if is_number else str(value).lower()
 
 
-class Document:
-    """The message of a file, asked by name; errors name the place."""
+def read_document(content: bytes, field: str, message: str) -> "MessagePart":
+    """Read a message within limits.
 
-    def __init__(self, content: bytes, field: str, message: str) -> None:
-        """Read a message within limits.
+    Args:
+        content: Of a file.
+        field: The setting that names it, for errors.
+        message: Its type, of `moveit_messages.FIELDS`.
 
-        Args:
-            field: The setting that names it, for errors.
-            message: Its type, of `moveit_messages.FIELDS`.
+    Raises:
+        SettingError: If it is no such message, or holds what evoexp does not know.
+    """
+    from evoexp.scenarios.moveit_yaml import read_message  # most tasks come out of no such file
 
-        Raises:
-            SettingError: If it is no such message, or holds what evoexp does not know.
-        """
-        from evoexp.scenarios.moveit_yaml import read_message  # most tasks come out of no such file
+    root = read_message(content, field)
+    check_message(root, message, field)
+    return MessagePart(root, field, "")
 
-        self.field = field
-        self.root = read_message(content, field)
-        check_message(self.root, message, field)
 
-    def mapping(self, value: Any, where: str) -> dict[str, Any]:
-        """Return a mapping; an absent one is empty."""
-        found: dict[str, Any] = self._of_kind(value, dict, {}, "a mapping", where)
-        return found
+class MessagePart:
+    """A part of a message, with its place in the file; false if it is absent.
 
-    def items(self, value: Any, where: str) -> list[Any]:
-        """Return a list; an absent one is empty."""
-        found: list[Any] = self._of_kind(value, list, [], "a list", where)
-        return found
+    Whatever it is asked for, it raises a `SettingError` that names the place if it is something
+    else. An absent mapping, list or text is empty.
+    """
 
-    def names(self, value: Any, where: str) -> list[str]:
-        """Return a list of names."""
-        return [str(name) for name in self.items(value, where)]
-
-    def numbers(self, value: Any, where: str, count: int | None = None) -> FloatArray:
-        """Return a list of numbers.
+    def __init__(self, value: Any, field: str, where: str) -> None:
+        """Take the plain data of a part.
 
         Args:
-            where: Its place, for errors.
-            count: How many there must be; None: any number.
+            value: The data; None: the part is absent.
+            field: The setting that names the file.
+            where: Its place in the file, as errors name it.
         """
-        found = [self.number(each, where) for each in self.items(value, where)]
+        self.value, self.field, self.where = value, field, where
+
+    def __bool__(self) -> bool:
+        """Whether the part is there."""
+        return self.value is not None
+
+    def __getitem__(self, name: str) -> "MessagePart":
+        """Return a field of a mapping."""
+        where = f"{self.where}.{name}" if self.where else name
+        return MessagePart(self._of_kind(dict, "a mapping").get(name), self.field, where)
+
+    def __iter__(self) -> Iterator["MessagePart"]:
+        """Yield the items of a list."""
+        for k, value in enumerate(self._of_kind(list, "a list")):
+            yield MessagePart(value, self.field, f"{self.where}[{k}]")
+
+    def called(self, where: str) -> "MessagePart":
+        """Return the part under another name for its place."""
+        return MessagePart(self.value, self.field, where)
+
+    def refusal(self, must: str, was: Any, hint: str = "") -> SettingError:
+        """Return the error that the file must be something else."""
+        return SettingError(self.field, must, was, hint)
+
+    @property
+    def text(self) -> str:
+        """A text; an absent one is empty."""
+        return "" if self.value is None else str(self.value)
+
+    @property
+    def names(self) -> list[str]:
+        """A list of names."""
+        return [str(item.value) for item in self]
+
+    def numbers(self, count: int | None = None) -> FloatArray:
+        """Return a list of numbers, so many if a count is given."""
+        found = [item.number() for item in self]
         if count is not None and len(found) != count:
-            raise SettingError(self.field, f"{count} numbers at {where}", len(found))
+            raise self.refusal(f"{count} numbers at {self.where}", len(found))
         return np.array(found, dtype=np.float64)
 
-    def number(self, value: Any, where: str) -> float:
-        """Return a number; YAML takes 1e-05 for a text."""
+    def number(self, absent: float | None = None) -> float:
+        """Return a number, or that of an absent part; YAML takes 1e-05 for a text."""
+        value = self.value if self else absent
         try:
             number = float(value) if isinstance(value, int | float | str) else np.nan
         except (ValueError, OverflowError):
             number = np.nan
         if isinstance(value, bool) or not abs(number) <= LARGEST:
-            must = f"finite numbers, at most {LARGEST:g}, at {where}"
-            raise SettingError(self.field, must, str(value)[:40])
+            must = f"finite numbers, at most {LARGEST:g}, at {self.where}"
+            raise self.refusal(must, str(value)[:40])
         return number + 0.0
 
-    def pose(self, value: Any, where: str) -> Pose:
-        """Return a pose; an absent one is the frame's own."""
-        given = self.mapping(value, where)
-        place = given.get("position", given.get("translation"))
-        turn = given.get("orientation", given.get("rotation"))
-        position = np.zeros(3) if place is None else self.point(place, where)
-        if turn is None:
-            return Pose(np.eye(3), position)
-        if isinstance(turn, dict):
-            turn = [turn.get(key, 0) for key in "xyzw"]
-        return Pose(self._rotation(self.numbers(turn, where, 4), where), position)
+    @property
+    def pose(self) -> Pose:
+        """A pose; an absent one is the frame's own."""
+        place = self["position"] or self["translation"]
+        turn = self["orientation"] or self["rotation"]
+        return Pose(turn._rotation() if turn else np.eye(3), place.point if place else np.zeros(3))
 
-    def point(self, value: Any, where: str) -> FloatArray:
-        """Return a point (3,)."""
-        if isinstance(value, dict):
-            value = [value.get(key, 0) for key in "xyz"]
-        return self.numbers(value, where, 3)
+    @property
+    def point(self) -> FloatArray:
+        """A point (3,)."""
+        return self._listed("xyz").numbers(3)
 
-    def _rotation(self, quaternion: FloatArray, where: str) -> FloatArray:
+    def _listed(self, keys: str) -> "MessagePart":
+        """Return a mapping of coordinates as a list."""
+        if not isinstance(self.value, dict):
+            return self
+        return MessagePart([self.value.get(key, 0) for key in keys], self.field, self.where)
+
+    def _rotation(self) -> FloatArray:
         """Return the rotation of a quaternion x, y, z, w of any length but 0."""
-        x, y, z, w = (float(part) for part in quaternion)
+        x, y, z, w = (float(part) for part in self._listed("xyzw").numbers(4))
         size = x * x + y * y + z * z + w * w
         if size == 0.0:  # ROS leaves an orientation that nobody set at 0
             return np.eye(3)
         length = float(np.sqrt(size))
         if abs(length - 1.0) > SLACK:
-            raise SettingError(self.field, f"quaternions of length 1 at {where}", round(length, 6))
+            raise self.refusal(f"quaternions of length 1 at {self.where}", round(length, 6))
         s = 2.0 / size
         return np.array(
             [
@@ -161,9 +192,9 @@ class Document:
             ]
         )
 
-    def _of_kind(self, value: Any, kind: type, absent: Any, name: str, where: str) -> Any:
-        if value is None:
-            return absent
-        if not isinstance(value, kind):
-            raise SettingError(self.field, f"{name} at {where}", str(value)[:40])
-        return value
+    def _of_kind(self, kind: type, name: str) -> Any:
+        if self.value is None:
+            return kind()
+        if not isinstance(self.value, kind):
+            raise self.refusal(f"{name} at {self.where}", str(self.value)[:40])
+        return self.value

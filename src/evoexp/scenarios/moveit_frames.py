@@ -6,12 +6,12 @@ MoveIt names a frame of its own in `header.frame_id` of a fixed transform and th
 a link comes before a transform (`PlanningScene::getFrameTransform`).
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from evoexp.errors import SettingError, nearest
-from evoexp.scenarios.moveit_files import IDENTITY, Document, Pose
+from evoexp.errors import nearest
+from evoexp.scenarios.moveit_files import IDENTITY, MessagePart, Pose
 
 if TYPE_CHECKING:
     from evoexp.robots.assembly import LinkFrames
@@ -27,27 +27,27 @@ class Frames(NamedTuple):
     poses: dict[str, Pose]  # frames that stand still → their poses in the world
     moving: frozenset[str]  # links that move
 
-    def of_header(self, document: Document, header: Any, where: str) -> Pose:
-        """Return the pose of the frame that a header names; the planning frame's if it names none.
+    def of_header(self, part: MessagePart) -> Pose:
+        """Return the pose of the frame that the header of a part names, or the planning frame's.
 
         Raises:
             SettingError: If the frame is not known, or moves.
         """
-        name = frame_name(document.mapping(header, f"{where}.header").get("frame_id"))
-        must = f"given in a frame that stands still ({', '.join(self.poses)}) at {where}"
+        name = frame_name(part["header"]["frame_id"])
+        must = f"given in a frame that stands still ({', '.join(self.poses)}) at {part.where}"
         if name in self.moving:
-            raise SettingError(document.field, must, f"'{name}', a link that moves")
+            raise part.refusal(must, f"'{name}', a link that moves")
         if (name := name or self.planning) not in self.poses:
-            raise SettingError(document.field, must, name, nearest(name, self.poses))
+            raise part.refusal(must, name, nearest(name, self.poses))
         return self.poses[name]
 
 
-def frame_name(value: Any) -> str:
+def frame_name(part: MessagePart) -> str:
     """Return the name of a frame; `/base` and `base` are one."""
-    return str(value or "").strip().lstrip("/")
+    return part.text.strip().lstrip("/")
 
 
-def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
+def read_frames(scene: MessagePart, links: "LinkFrames | None") -> Frames:
     """Read the fixed transforms of a scene beside the links of a robot.
 
     Args:
@@ -65,7 +65,7 @@ def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
     if planning in moving or (planning and not is_certain and planning not in known):
         must = f"of transforms whose child_frame_id is the planning frame ({', '.join(known)})"
         hint = "; header.frame_id names the frame that a transform places"
-        raise SettingError(scene.field, must, planning, hint)
+        raise scene.refusal(must, planning, hint)
     poses = {name: _link_pose(pose) for name, pose in standing.items()}
     origin = poses.get(planning or ground or WORLD, IDENTITY)
     poses.setdefault(planning or ground or WORLD, origin)
@@ -77,13 +77,11 @@ def read_frames(scene: Document, links: "LinkFrames | None") -> Frames:
         pose = origin.times(local)
         if not pose.is_near(poses.setdefault(name, pose), SAME):
             must = f"a scene whose transform of '{name}' is that of the robot's link"
-            raise SettingError(
-                scene.field, must, pose.text, f"; the link stands {poses[name].text}"
-            )
+            raise scene.refusal(must, pose.text, f"; the link stands {poses[name].text}")
     return Frames(planning or ground or WORLD, poses, moving)
 
 
-def has_other_frames(scene: Document) -> bool:
+def has_other_frames(scene: MessagePart) -> bool:
     """Whether a scene has fixed transforms of frames other than the planning frame.
 
     Raises:
@@ -93,7 +91,7 @@ def has_other_frames(scene: Document) -> bool:
     return not all(pose.is_near(IDENTITY, SAME) for pose in poses)
 
 
-def _fixed_transforms(scene: Document) -> tuple[dict[str, Pose], str, bool]:
+def _fixed_transforms(scene: MessagePart) -> tuple[dict[str, Pose], str, bool]:
     """Read the fixed transforms.
 
     Returns:
@@ -102,26 +100,24 @@ def _fixed_transforms(scene: Document) -> tuple[dict[str, Pose], str, bool]:
     """
     named: dict[str, Pose] = {}
     planning, is_certain = "", False
-    where = "fixed_frame_transforms"
-    for k, item in enumerate(scene.items(scene.root.get(where), where)):
-        given, place = scene.mapping(item, where), f"{where}[{k}]"
-        header = scene.mapping(given.get("header"), f"{place}.header")
-        name, target = frame_name(header.get("frame_id")), frame_name(given.get("child_frame_id"))
-        pose = scene.pose(given.get("transform"), place)
+    transforms = scene["fixed_frame_transforms"]
+    for transform in transforms:
+        name = frame_name(transform["header"]["frame_id"])
+        target, pose = frame_name(transform["child_frame_id"]), transform["transform"].pose
         is_identity = pose.is_near(IDENTITY, SAME)
         if not is_identity and (not name or name == target):
-            must = f"a frame other than '{target}' at {place}.header.frame_id, or no transform"
-            raise SettingError(scene.field, must, name)
+            place = f"{transform.where}.header.frame_id"
+            raise scene.refusal(f"a frame other than '{target}' at {place}, or no transform", name)
         if not target and name:
-            raise SettingError(scene.field, f"the planning frame at {place}.child_frame_id", "")
+            raise scene.refusal(f"the planning frame at {transform.where}.child_frame_id", "")
         if planning and target and target != planning:
-            must = f"one planning frame for all of {where}, the child_frame_id '{planning}'"
-            raise SettingError(scene.field, must, f"'{name}' in '{target}'")
+            must = f"one planning frame for all of {transforms.where}, the child_frame_id"
+            raise scene.refusal(f"{must} '{planning}'", f"'{name}' in '{target}'")
         planning = target or planning
         is_certain |= bool(target) and name in ("", target)
         if name and not pose.is_near(named.setdefault(name, pose), SAME):
-            must = f"one transform of '{name}' in {where}"
-            raise SettingError(scene.field, must, f"{named[name].text} and {pose.text}")
+            must = f"one transform of '{name}' in {transforms.where}"
+            raise scene.refusal(must, f"{named[name].text} and {pose.text}")
     return named, planning, is_certain
 
 

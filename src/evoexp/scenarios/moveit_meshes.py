@@ -1,15 +1,13 @@
 """Meshes and cones of a planning scene, as convex hulls that contain them."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import sincos
 from evoexp.records import FloatArray, IntArray
-from evoexp.scenarios.moveit_files import Document, Pose
+from evoexp.scenarios.moveit_files import MessagePart, Pose
 from evoexp.scenarios.obstacles import HullObstacle
 
 Mesh = tuple[FloatArray, IntArray]
@@ -18,83 +16,62 @@ Mesh = tuple[FloatArray, IntArray]
 AROUND = 32  # corners of a cone's base; they stand out of it by half a hundredth of its radius
 
 
-def resources(scene: Document) -> list[str]:
+def resources(scene: MessagePart) -> list[str]:
     """List the files that the meshes of a scene name, as robowflex writes them."""
-    world = scene.mapping(scene.root.get("world"), "world")
-    objects = scene.items(world.get("collision_objects"), "world.collision_objects")
-    meshes = [mesh for thing in objects if isinstance(thing, dict) for mesh in _meshes(thing)]
-    return list(dict.fromkeys(str(mesh["resource"]) for mesh in meshes if mesh.get("resource")))
+    things = scene["world"]["collision_objects"]
+    names = (mesh["resource"].text for thing in things for mesh in thing["meshes"])
+    return list(dict.fromkeys(filter(None, names)))
 
 
 def mesh_hulls(
-    scene: Document,
-    given: dict[str, Any],
-    meshes: Mapping[str, Mesh],
-    pose: Pose,
-    where: str,
-    name: str,
+    mesh: MessagePart, loaded: Mapping[str, Mesh], pose: Pose, name: str
 ) -> list[HullObstacle]:
     """Return the convex hulls of the parts of a mesh (`shape_msgs/Mesh`) that hang together.
 
     Args:
-        meshes: Of the files that meshes of the scene name.
+        mesh: The message.
+        loaded: Of the files that meshes of the scene name.
         pose: Where it stands.
-        where: Its place in the file, for errors.
         name: Of the object; the hulls are numbered if they are several.
 
     Raises:
         SettingError: If it is no mesh, or a part of it has no inside.
     """
-    if resource := given.get("resource"):
-        if given.get("vertices") or given.get("triangles"):
-            raise SettingError(scene.field, f"a resource or triangles at {where}, not both", name)
-        corners, triangles = meshes[str(resource)]
-        scale = given.get("dimensions")
-        if scale is not None:
-            corners = corners * scene.numbers(scale, f"{where}.dimensions", 3)
+    if resource := mesh["resource"].text:
+        if mesh["vertices"].value or mesh["triangles"].value:
+            raise mesh.refusal(f"a resource or triangles at {mesh.where}, not both", name)
+        corners, triangles = loaded[resource]
+        if mesh["dimensions"]:
+            corners = corners * mesh["dimensions"].numbers(3)
     else:
-        corners, triangles = _own_triangles(scene, given, where, name)
+        corners, triangles = _own_triangles(mesh, name)
     found = []
     parts = _parts(corners, triangles)
     for k, part in enumerate(parts):
         hull = hull_of(part)
         if hull is None:
             must = f"meshes with an inside ('{name}')"
-            raise SettingError(scene.field, must, f"a part of {len(part)} vertices in one plane")
+            raise mesh.refusal(must, f"a part of {len(part)} vertices in one plane")
         found.append(_hull(hull[0], pose, f"{name}_{k + 1}" if len(parts) > 1 else name))
     return found
 
 
-def _meshes(thing: dict[str, Any]) -> list[dict[str, Any]]:
-    meshes = thing.get("meshes")
-    return [mesh for mesh in meshes if isinstance(mesh, dict)] if isinstance(meshes, list) else []
-
-
-def _own_triangles(scene: Document, given: dict[str, Any], where: str, name: str) -> Mesh:
+def _own_triangles(mesh: MessagePart, name: str) -> Mesh:
     """Read the corners and triangles that a message holds."""
-    if given.get("dimensions"):
-        must = f"a mesh whose dimensions scale a resource at {where}"
-        raise SettingError(scene.field, must, name)
-    corners = np.array(
-        [scene.point(item, where) for item in scene.items(given.get("vertices"), where)]
-    )
-    faces = []
-    for item in scene.items(given.get("triangles"), where):
+    if mesh["dimensions"].value:
+        raise mesh.refusal(f"a mesh whose dimensions scale a resource at {mesh.where}", name)
+    corners = np.array([vertex.point for vertex in mesh["vertices"]])
+    faces = [
         # robowflex writes the list alone
-        face = item if isinstance(item, list) else scene.mapping(item, where).get("vertex_indices")
-        faces.append(scene.numbers(face, where, 3))
-    triangles = np.array(faces).reshape(-1, 3)
-    whole = np.all(triangles == np.floor(triangles)) and np.all(triangles >= 0.0)
-    if not whole or not len(triangles) or triangles.max() >= len(corners):
-        must = f"triangles of three of the {len(corners)} vertices of '{name}', counted from 0"
-        count = len(corners)
-        wrong = [
-            row
-            for row in triangles
-            if not 0.0 <= min(row) <= max(row) < count or any(row != np.floor(row))
-        ]
-        told = ", ".join(f"{value:g}" for value in wrong[0]) if wrong else "none"
-        raise SettingError(scene.field, must, told)
+        (face if isinstance(face.value, list) else face["vertex_indices"]).numbers(3)
+        for face in mesh["triangles"]
+    ]
+    triangles, count = np.array(faces).reshape(-1, 3), len(corners)
+    is_corner = (triangles == np.floor(triangles)) & (triangles >= 0.0) & (triangles < count)
+    wrong = triangles[~is_corner.all(axis=1)]
+    if len(wrong) or not len(triangles):
+        must = f"triangles of three of the {count} vertices of '{name}', counted from 0"
+        raise mesh.refusal(must, ", ".join(f"{k:g}" for k in wrong[0]) if len(wrong) else "none")
     return corners, triangles.astype(np.int64)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.numeric.ordered_sums import length, matrix_product
 from evoexp.numeric.rotations import rotation_matrix
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
@@ -178,16 +178,15 @@ def _row(obstacle: Any, field: str) -> tuple[int, FloatArray, FloatArray, Any]:
                 raise SettingError(f"{field}.points", must, list(2.0 * half))
             return BOX, _point(obstacle.center) + matrix_product(turn, middle), turn, half
         case HalfSpaceObstacle():
-            axis, length = _direction(_point(obstacle.normal))
-            if length == 0.0:
+            axis = _point(obstacle.normal)
+            if (size := length(axis)) == 0.0:
                 raise SettingError(f"{field}.normal", "a direction", list(obstacle.normal))
-            return HALF_SPACE, _point(obstacle.point), _z_along(axis), (0.0, 0.0, 0.0)
+            return HALF_SPACE, _point(obstacle.point), _z_along(axis / size), (0.0, 0.0, 0.0)
     start, end = _point(obstacle.start), _point(obstacle.end)
-    axis, length = _direction(end - start)
-    if length == 0.0:
+    if (size := length(end - start)) == 0.0:
         raise SettingError(f"{field}.end", "another point than start", list(obstacle.end))
-    kind = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE
-    return kind, 0.5 * (start + end), _z_along(axis), (obstacle.radius, 0.5 * length, 0.0)
+    kind, turn = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE, end - start
+    return kind, 0.5 * (start + end), _z_along(turn / size), (obstacle.radius, 0.5 * size, 0.0)
 
 
 def obstacle_hulls(obstacles: tuple[Any, ...]) -> dict[int, FloatArray]:
@@ -206,22 +205,8 @@ def _point(coordinates: tuple[float, ...]) -> FloatArray:
     return np.array([*coordinates, 0.0][:3])
 
 
-def _direction(vector: FloatArray) -> tuple[FloatArray, float]:
-    """Return a vector's unit vector, and its length; the zero vector itself, and 0."""
-    length = float(np.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]))
-    return (vector / length if length > 0.0 else vector), length
-
-
 def _z_along(axis: FloatArray) -> FloatArray:
     """Return a rotation whose z axis is the given unit vector."""
-    x, y, z = axis
-    helper = np.array([1.0, 0.0, 0.0]) if abs(x) < 0.9 else np.array([0.0, 1.0, 0.0])
-    first = np.array(
-        [
-            helper[1] * z - helper[2] * y,
-            helper[2] * x - helper[0] * z,
-            helper[0] * y - helper[1] * x,
-        ]
-    )
-    first /= np.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
+    first = np.cross(np.eye(3)[0 if abs(axis[0]) < 0.9 else 1], axis)
+    first /= length(first)
     return np.column_stack([first, np.cross(axis, first), axis])

@@ -12,7 +12,7 @@ import pinocchio as pin
 from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.body_table import body_table
-from evoexp.collision.box_support import coal
+from evoexp.collision.box_support import coal, distance
 from evoexp.collision.derived_pairs import (
     DerivedPairs,
     Pair,
@@ -152,13 +152,11 @@ def _grid(
 
 def _coal_distances(assembly: Assembly, pair: Pair, q: FloatArray) -> FloatArray:
     """Return the distances of two bodies, (configurations,)."""
-    model, data = assembly.model, assembly.model.createData()
-    items = [assembly.geometry.geometryObjects[body] for body in pair]
-    request, result, out = coal.DistanceRequest(), coal.DistanceResult(), np.empty(q.shape[1])
+    model, data, distances = assembly.model, assembly.model.createData(), np.empty(q.shape[1])
+    one, two = (assembly.geometry.geometryObjects[body] for body in pair)
     for n in range(q.shape[1]):
         pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
-        places = [data.oMi[item.parentJoint] * item.placement for item in items]
-        one, two = (coal.Transform3s(place.rotation, place.translation) for place in places)
-        result.clear()
-        out[n] = coal.distance(items[0].geometry, one, items[1].geometry, two, request, result)
-    return out
+        places = (data.oMi[item.parentJoint] * item.placement for item in (one, two))
+        first, second = (coal.Transform3s(place.rotation, place.translation) for place in places)
+        distances[n] = distance(one.geometry, first, two.geometry, second)
+    return distances

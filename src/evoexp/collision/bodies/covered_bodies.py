@@ -11,6 +11,7 @@ import numpy as np
 
 from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.derived_pairs import Pair
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
@@ -61,9 +62,14 @@ class CoveredCollision(NamedTuple):
     obstacles: ObstacleTable  # the obstacle table
 
     @property
+    def shapes(self) -> Shapes:
+        """Spheres and capsules of all bodies."""
+        return self.bodies.shapes
+
+    @property
     def num_tests(self) -> int:
         """Pairs of shapes that one configuration has: of two bodies, and with obstacles."""
-        own = dict(zip(*np.unique(self.bodies.shapes.labels, return_counts=True), strict=True))
+        own = dict(zip(*np.unique(self.shapes.labels, return_counts=True), strict=True))
         between = sum(own[a] * own[b] for a, b in self.bodies.pairs)
         return int(between + sum(own.values()) * len(self.obstacles.kind))
 

@@ -18,7 +18,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.robots.assembly import Assembly, sphere_geometry
+from evoexp.robots.assembly import Assembly
 from evoexp.robots.poses import frame_poses
 from evoexp.scenarios.obstacles import (
     CAPSULE,
@@ -93,8 +93,7 @@ class TouchingSpheres(Component):
         if not table.planar or len(around.kind):
             lines = lines._replace(scale=np.inf)
         tables = CircleTables(table.chain, lines, general.tables)
-        geometry = sphere_geometry(assembly, centers, moving, radii)
-        return SphereCollision(assembly, spheres, of_arms, around, general, tables, geometry)
+        return SphereCollision(assembly, spheres, shapes, of_arms, around, general, tables)
 
     def _of_link(self, assembly: Assembly, link: Any) -> list["_Sphere"]:
         fractions = (
@@ -143,11 +142,11 @@ class SphereCollision(NamedTuple):
 
     assembly: Assembly  # the robot
     spheres: Spheres  # the spheres
+    shapes: Shapes  # the same in the frames of Pinocchio's joints
     arm_spheres: IntArray  # (arms, 2) first and one-past-last sphere of each arm
     obstacles: ObstacleTable  # the obstacle table
     general: BodyCollision  # the same spheres in the model of spheres and capsules
     tables: CircleTables  # for the kernel `contacts`
-    geometry: Any  # the same spheres as a `pin.GeometryModel` of coal spheres
 
     @property
     def num_tests(self) -> int:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.box_support import coal
+from evoexp.collision.box_support import coal, distance
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
@@ -97,8 +97,8 @@ def solid_of(item: Any) -> Solid:
     return Solid(corners.min(axis=0), corners.max(axis=0), near, far, planes, hull.area)
 
 
-def _exact(half: FloatArray, distance: Any) -> Solid:
-    return Solid(-half, half, distance, distance)
+def _exact(half: FloatArray, signed: Any) -> Solid:
+    return Solid(-half, half, signed, signed)
 
 
 def _box_distance(points: FloatArray, half: FloatArray) -> FloatArray:
@@ -124,16 +124,6 @@ def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
 
 def _coal_distance(points: FloatArray, shape: Any) -> FloatArray:
     """Return the distances of points from a body as coal has them."""
-    here, ball, request, result = (
-        coal.Transform3s(),
-        coal.Sphere(1e-9),
-        coal.DistanceRequest(),
-        coal.DistanceResult(),
-    )
-    found = np.empty(len(points))
-    for k, point in enumerate(points):
-        result.clear()
-        found[k] = coal.distance(
-            ball, coal.Transform3s(np.eye(3), point), shape, here, request, result
-        )
-    return found
+    here, ball = coal.Transform3s(), coal.Sphere(1e-9)
+    places = (coal.Transform3s(np.eye(3), point) for point in points)
+    return np.array([distance(ball, place, shape, here) for place in places])

@@ -8,15 +8,12 @@ envelopes:
   each arm 1 and each block of eight arms 2 reach toward each other: where they end before they
   meet, no arm of the block can touch. That spares four of five tests of an arm and a block, at the
   price of a load and a comparison each, or once for eight arms and a block.
-- The others are tested in single precision, one arm against a block (`pair_tests`).
-- What rounding leaves open, two pairs of ten thousand random ones, is decided by `arms.colliding`.
+- The others are tested one arm against a block (`pair_tests`).
+- What rounding leaves open is decided by `planar_arms.colliding`.
 
-So counts are the same whatever the vector width, and exact but for contacts that rounding hides:
-parallel, collinear, touching and vanishing links are decided exactly, and lines and circles nearer
-than `segment_predicates.contact_tolerance` touch.
-
-100 × 100 pairs of lines in 4 configurations take 10 … 17 µs in a run of a search and 30 where all
-angles are random; blocks of 104 individuals, without a look for axes, took 27 in both.
+So counts are the same whatever the vector width, and exact but for what rounding hides: lines and
+circles nearer than `segment_predicates.contact_tolerance` touch, parallel, collinear and vanishing
+ones, too.
 """
 
 from typing import NamedTuple
@@ -25,12 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.planar.pair_tests import (
-    Sizes,
     envelope_quantities,
     envelope_reach,
     error_bound,
+    greatest_distance,
     line_products,
-    sizes_of,
 )
 from evoexp.collision.planar.planar_arms import (
     OUTLINE_ROWS,
@@ -46,32 +42,26 @@ from evoexp.numeric.vector_rows import Eight, transposed
 from evoexp.numeric.vectors import (
     LANES,
     Mask,
-    Singles,
     Vector,
     any_lane,
     load,
-    load_singles,
     select,
     spread,
-    spread_single,
     store,
-    store_singles,
     upper,
 )
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
 MOST_CONFIGURATIONS = 32767  # counts are int16
-LARGEST = 1e150  # [length unit] coordinates below it are decided exactly
+LARGEST = 1e70  # [length unit] of coordinates: products of four do not overflow
 
 _MARGIN = 2.0**-40
-"""Added to reaches, whose sums of at most six rounded numbers below 8 err by less than 2^-46."""
+"""Of the greatest distance, added to reaches, whose sums of at most six numbers are rounded."""
 
 _LINE_ROWS = 6
 """Vectors of a block in a configuration: of both links x, y, then how far beside each of them the
 other's base lies; for envelopes, how far along them follows."""
-
-_ONE, _NONE = np.float32(1.0), np.float32(0.0)
 
 
 class Crossings(NamedTuple):
@@ -86,10 +76,10 @@ class Crossings(NamedTuple):
 class Table(NamedTuple):
     """A population in blocks of eight, the last one filled up by copies of the last individual.
 
-    Coordinates are scaled, so that none is above 1, and count from the base of arm 1.
+    Coordinates count from the base of arm 1.
     """
 
-    blocks: NDArray[np.float32]  # (blocks · K · rows · LANES,) see `_LINE_ROWS`
+    blocks: FloatArray  # (blocks · K · rows · LANES,) see `_LINE_ROWS`
     # (individuals · K · LANES,) of arm 1 along x, y, x + y, x − y, then against them
     reaches: FloatArray
     # (blocks · K · LANES,) of those in a block that reach farthest; of arm 2 the other way round
@@ -109,7 +99,7 @@ def count_collisions(
 
     Raises:
         ValueError: If the shapes do not fit, there are more than 32767 configurations, something is
-            not finite or above 1e150, or a half width or radius is negative.
+            not finite or above 1e70, or a half width or radius is negative.
     """
     enveloped = one.is_enveloped or two.is_enveloped or None
     rows = (OUTLINE_ROWS,) if enveloped else (POINT_ROWS, OUTLINE_ROWS)
@@ -128,7 +118,7 @@ def count_collisions(
     for name, arm, outlines in (("one", one, outlines_1), ("two", two, outlines_2)):
         numbers = np.array([*arm.base, *arm.lengths, arm.half_width, arm.tcp_radius])
         if not (np.abs(numbers) < LARGEST).all() or not (np.abs(outlines) < LARGEST).all():
-            raise ValueError(f"{name} and its outlines must be finite and below 1e150, was {arm}")
+            raise ValueError(f"{name} and its outlines must be finite and below 1e70, was {arm}")
         if (numbers[4:] < 0.0).any():
             raise ValueError(
                 f"{name}: half_width and tcp_radius must be at least 0, were {arm.half_width} and "
@@ -162,30 +152,30 @@ def count_pairs(
         outlines_1: (K, 4 | 8, N1), finite.
         arm_2: Arm of population 2.
         outlines_2: (K, 4 | 8, N2), finite.
-        tolerance: Of `tolerance_of`; 0: the given points are exact.
+        tolerance: Of `tolerance_of`.
         enveloped: None if both arms are lines: the tests of envelopes are not compiled then.
         counts: (N1, N2) int16.
         sums_1: (N1,) int64.
         sums_2: (N2,) int64.
     """
-    scale, tau = error_bound(arm_1, arm_2, tolerance, enveloped)
-    sizes = sizes_of(arm_1, arm_2, scale)
+    tau = error_bound(arm_1, arm_2, tolerance, enveloped)
     # twice: along x ± y, whose unit is sqrt 2
-    margin = _MARGIN + 2.0 * (tolerance + envelope_reach(arm_1, arm_2)) * scale
+    margin = 2.0 * (tolerance + envelope_reach(arm_1, arm_2))
+    margin += _MARGIN * greatest_distance(arm_1, arm_2, tolerance)
     dx, dy = arm_2.base[0] - arm_1.base[0], arm_2.base[1] - arm_1.base[1]
-    one = _table(arm_1, outlines_1, (dx, dy), 1.0, scale, enveloped)
-    two = _table(arm_2, outlines_2, (-dx, -dy), -1.0, scale, enveloped)
+    one = _table(arm_1, outlines_1, (dx, dy), 1.0, enveloped)
+    two = _table(arm_2, outlines_2, (-dx, -dy), -1.0, enveloped)
     num_1, num_2, num_configurations = len(sums_1), len(sums_2), outlines_1.shape[0]
     width = (num_2 + LANES - 1) // LANES * LANES
     # eight rows of certain collisions, one per arm 1, then eight of possible ones
-    tally = np.empty(2 * LANES * width, dtype=np.float32)
+    tally = np.empty(2 * LANES * width)
     for first in range(0, num_1, LANES):
         count = min(LANES, num_1 - first)
         for n in range(len(tally)):
-            tally[U(n)] = _NONE
+            tally[U(n)] = 0.0
         for begin in range(0, width, LANES):
             pair = one, first, count, two, begin, num_configurations
-            _test_block(*pair, sizes, enveloped, margin, tau, tally)
+            _test_block(*pair, arm_1, arm_2, enveloped, margin, tau, tally)
         for r in range(count):
             certain, possible, i = U(r * width), U((r + LANES) * width), U(first + r)
             undecided = 0
@@ -225,7 +215,6 @@ def _table(
     outlines: FloatArray,  # (K, 4 | 8, N)
     way: Point,
     toward: float,
-    scale: float,
     enveloped: bool | None,
 ) -> Table:
     """Return the table of a population.
@@ -233,16 +222,15 @@ def _table(
     Args:
         way: From its base to the other's.
         toward: 1 for arm 1; −1 for arm 2, which reaches against the axes.
-        scale: A power of two.
         enveloped: See `count_pairs`.
     """
     num_configurations, num_rows, num = outlines.shape
     num_blocks, flat = (num + LANES - 1) // LANES, borrowed(outlines.reshape(-1))
     rows = _LINE_ROWS if enveloped is None else _LINE_ROWS + 2
-    blocks = np.empty(num_blocks * num_configurations * rows * LANES, dtype=np.float32)
+    blocks = np.empty(num_blocks * num_configurations * rows * LANES)
     reaches = np.empty(num_blocks * LANES * num_configurations * LANES)
     block_reaches, filled = np.empty(num_blocks * num_configurations * LANES), np.empty(LANES)
-    dx, dy = way[0] * scale, way[1] * scale
+    dx, dy = way
     origin_x, origin_y = (0.0, 0.0) if toward > 0.0 else (-dx, -dy)
     for block in range(num_blocks):
         for k in range(num_configurations):
@@ -250,8 +238,7 @@ def _table(
             x, y = _row(flat, row, num, first, filled), _row(flat, row + 1, num, first, filled)
             tip_x = _row(flat, row + 2, num, first, filled)
             tip_y = _row(flat, row + 3, num, first, filled)
-            u, v = (x - arm.base[0]) * scale, (y - arm.base[1]) * scale
-            w, z = (tip_x - x) * scale, (tip_y - y) * scale
+            u, v, w, z = x - arm.base[0], y - arm.base[1], tip_x - x, tip_y - y
             a, b, c, d = u, v, w, z
             if enveloped is not None:
                 a = _row(flat, row + 4, num, first, filled)
@@ -260,15 +247,15 @@ def _table(
                 d = _row(flat, row + 7, num, first, filled)
             # both vectors, and the other's base beside and along them, from base and elbow
             o, step = U((block * num_configurations + k) * rows * LANES), U(LANES)
-            store_singles(blocks, o, a)
-            store_singles(blocks, o + step, b)
-            store_singles(blocks, o + U(2) * step, c)
-            store_singles(blocks, o + U(3) * step, d)
-            store_singles(blocks, o + U(4) * step, a * dy - b * dx)
-            store_singles(blocks, o + U(5) * step, c * (dy - v) - d * (dx - u))
+            store(blocks, o, a)
+            store(blocks, o + step, b)
+            store(blocks, o + U(2) * step, c)
+            store(blocks, o + U(3) * step, d)
+            store(blocks, o + U(4) * step, a * dy - b * dx)
+            store(blocks, o + U(5) * step, c * (dy - v) - d * (dx - u))
             if enveloped is not None:
-                store_singles(blocks, o + U(6) * step, a * dx + b * dy)
-                store_singles(blocks, o + U(7) * step, c * (dx - u) + d * (dy - v))
+                store(blocks, o + U(6) * step, a * dx + b * dy)
+                store(blocks, o + U(7) * step, c * (dx - u) + d * (dy - v))
             # how far arms reach toward the others, each and all of them
             elbow_x, elbow_y = toward * (origin_x + u), toward * (origin_y + v)
             ends = elbow_x, elbow_y, elbow_x + toward * w, elbow_y + toward * z
@@ -322,11 +309,12 @@ def _test_block(
     two: Table,
     begin: int,
     num_configurations: int,
-    sizes: Sizes,
+    arm_1: Arm,
+    arm_2: Arm,
     enveloped: bool | None,
     margin: float,
-    tau: np.float32,
-    tally: NDArray[np.float32],
+    tau: float,
+    tally: FloatArray,
 ) -> None:
     """Count the configurations in which arms 1 of a block collide with those of a block of arms 2.
 
@@ -337,7 +325,8 @@ def _test_block(
         two: Of population 2.
         begin: First arm of its block, a multiple of eight.
         num_configurations: K.
-        sizes: Of both arms.
+        arm_1: Arm of population 1.
+        arm_2: Arm of population 2.
         enveloped: See `count_pairs`.
         margin: Distance of reaches above which nothing touches.
         tau: See `pair_tests`.
@@ -358,13 +347,13 @@ def _test_block(
             if enveloped is None:
                 quantity = line_products(one.blocks, own, two.blocks, other)
             else:
-                quantity = envelope_quantities(one.blocks, own, two.blocks, other, sizes)
+                quantity = envelope_quantities(one.blocks, own, two.blocks, other, arm_1, arm_2)
             _add_where(quantity < -tau, tally, r * width + column)
             _add_where(quantity <= tau, tally, (r + lanes) * width + column)
 
 
 @inlined
-def _add_where(condition: Mask, tally: NDArray[np.float32], place: np.uint64) -> None:
+def _add_where(condition: Mask, tally: FloatArray, place: np.uint64) -> None:
     """Add 1 to the numbers of a vector where a condition holds."""
-    more: Singles = select(condition, spread_single(_ONE), spread_single(_NONE))
-    store_singles(tally, place, load_singles(tally, place) + more)
+    more: Vector = select(condition, spread(1.0), spread(0.0))
+    store(tally, place, load(tally, place) + more)

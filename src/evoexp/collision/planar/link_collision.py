@@ -5,17 +5,17 @@ Links are lines, or have envelopes.
 
 from typing import Any, ClassVar, NamedTuple
 
-from evoexp.collision.planar.arm_obstacles import (
-    PlanarObstacles,
-    count_obstacle_collisions,
-    planar_obstacles,
-)
+import numpy as np
+
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
-from evoexp.collision.planar.planar_arms import Arm, path_configurations
+from evoexp.collision.planar.planar_arms import Arm, largest_coordinate, path_configurations
+from evoexp.collision.planar.segment_predicates import contact_tolerance
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-from evoexp.scenarios.obstacles import obstacle_table
+from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from evoexp.validation import Component, LayoutCount, NonNegative
 
 
@@ -35,25 +35,27 @@ class LinkCrossings(Component):
         """Return the model of some robots among obstacles.
 
         Raises:
-            SettingError: If a robot is no planar arm of two links, or an obstacle no figure of the
-                plane.
+            SettingError: If a robot is no planar arm of two links, or an obstacle an ellipse.
         """
-        arms = two_link_arms(assembly)
-        try:
-            flat = planar_obstacles(obstacle_table(obstacles))
-        except ValueError as error:
-            raise SettingError(
-                "scenario.obstacles", f"figures of the plane ({error})", len(obstacles)
-            ) from None
-        enveloped = [Arm(arm.base, arm.lengths, self.half_width, self.tcp_radius) for arm in arms]
-        return LinkCollision(tuple(enveloped), flat, self.collision_substeps)
+        arms = tuple(
+            Arm(arm.base, arm.lengths, self.half_width, self.tcp_radius)
+            for arm in two_link_arms(assembly)
+        )
+        table = obstacle_table(obstacles).without_ellipses()
+        firsts = (int(first) + 1 for first, _ in assembly.arm_slices)
+        solids = tuple(
+            BodyCollision.build(assembly.model, _boundary_shapes(arm, first, table), table, ())
+            for arm, first in zip(arms, firsts, strict=True)
+            if len(table.kind)
+        )
+        return LinkCollision(arms, solids, self.collision_substeps)
 
 
 class LinkCollision(NamedTuple):
     """Planar robots of two links, and the obstacles around them."""
 
     arms: tuple[Arm, ...]  # base and link lengths of every robot, and its envelope
-    obstacles: PlanarObstacles  # what stands still
+    solids: tuple[BodyCollision, ...]  # (robots,) each among the obstacles; none without them
     substeps: int  # configurations tested per segment
 
     @property
@@ -65,42 +67,81 @@ class LinkCollision(NamedTuple):
     def is_lines(self) -> bool:
         """Whether robots are lines, among no obstacles, at the configurations of their paths."""
         enveloped = any(arm.is_enveloped for arm in self.arms)
-        return not (enveloped or len(self.obstacles.kind) or self.substeps > 1)
+        return not (enveloped or self.solids or self.substeps > 1)
 
-    def outlines(self, robot: int, path: FloatArray) -> FloatArray:
-        """Return the outlines of a population's paths where they are tested, (K, 8, N).
+    def tested(self, path: FloatArray) -> FloatArray:
+        """Return the configurations at which a population's paths are tested, (K, 2, N) [rad].
 
         Args:
-            robot: Whose population.
             path: (configurations, 2, N) link angles [rad], start and goal included, which are the
                 same for all.
         """
         q = path[1:-1]
         if self.substeps > 1:
             q = path_configurations(q, path[0, :, 0], path[-1, :, 0], self.substeps)
-        return self.arms[robot].outlines(q)
+        return q
 
     def contact(self, posture: FloatArray) -> str:
         """Return the first contact at link angles (robots, 2) [rad] in words; empty if none."""
-        outlines = [
-            arm.outlines(angles.reshape(1, 2, 1))
-            for arm, angles in zip(self.arms, posture, strict=True)
-        ]
-        for r, outline in enumerate(outlines):
-            if self.with_obstacles(r, outline)[0]:
+        q = posture.reshape(-1, 1, 2, 1)
+        for r in range(len(q)):
+            if self.with_obstacles(r, q[r])[0]:
                 return f"robot {r + 1} touches an obstacle"
-            for s in range(r + 1, len(outlines)):
-                if self.between(r, outline, s, outlines[s]).counts[0, 0]:
+            for s in range(r + 1, len(q)):
+                if self.between(r, q[r], s, q[s]).counts[0, 0]:
                     return f"robots {r + 1} and {s + 1} touch"
         return ""
 
-    def between(self, one: int, first: FloatArray, two: int, second: FloatArray) -> Crossings:
-        """Count colliding configurations for every pair of individuals of two populations."""
-        return count_collisions(self.arms[one], first, self.arms[two], second)
+    def between(self, one: int, q_1: FloatArray, two: int, q_2: FloatArray) -> Crossings:
+        """Count colliding configurations for every pair of individuals of two populations.
 
-    def with_obstacles(self, robot: int, outlines: FloatArray) -> IntArray:
-        """Count configurations in an obstacle for every individual of a population, (N,)."""
-        return count_obstacle_collisions(self.arms[robot], outlines, self.obstacles)
+        Args:
+            one: A robot.
+            q_1: (K, 2, N1) angles of its links [rad].
+            two: Another robot.
+            q_2: (K, 2, N2).
+        """
+        first, second = self.arms[one], self.arms[two]
+        return count_collisions(first, first.outlines(q_1), second, second.outlines(q_2))
+
+    def with_obstacles(self, robot: int, q: FloatArray) -> IntArray:
+        """Count configurations in an obstacle for every individual of a population, (N,).
+
+        Args:
+            robot: Whose population.
+            q: (K, 2, N) angles of its links from +x [rad].
+        """
+        if not self.solids:
+            return np.zeros(q.shape[2], dtype=np.int64)
+        configurations = np.zeros((2 * len(self.arms), q.shape[0] * q.shape[2]))
+        own = configurations[2 * robot : 2 * robot + 2]
+        own[:] = q.transpose(1, 0, 2).reshape(2, -1)
+        own[1] -= own[0]  # joints turn against the link before
+        hits = self.solids[robot].collides(configurations).reshape(q.shape[0], -1)
+        return np.asarray(hits.sum(axis=0))
+
+
+def _boundary_shapes(arm: Arm, first: int, obstacles: ObstacleTable) -> Shapes:
+    """Return an arm's lines, or boundary lines, and its circle as thin capsules and a sphere.
+
+    They are thicker by what rounding may hide, so that what touches an obstacle collides.
+
+    Args:
+        first: Pinocchio's index of its first joint.
+        obstacles: Among which it stands.
+    """
+    far = (np.abs(obstacles.center).sum(axis=1) + obstacles.size.sum(axis=1)).max(initial=0.0)
+    near = contact_tolerance(largest_coordinate(arm) + float(far))
+    beside = (-arm.half_width, arm.half_width) if arm.half_width > 0.0 else (0.0,)
+    rows = [
+        (first + link, (0.0, y, 0.0), (length, y, 0.0), near)
+        for link, length in enumerate(arm.lengths)
+        for y in beside
+    ]
+    if arm.tcp_radius > 0.0:
+        tip = (arm.lengths[1], 0.0, 0.0)
+        rows.append((first + 1, tip, tip, arm.tcp_radius + near))
+    return Shapes(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:

@@ -1,22 +1,25 @@
 """The collision model of Lavoie & Boudreau 2001: a planar arm's links as lines among ellipses."""
 
-from functools import cache
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.planar.ellipse_kernels import Ellipses, TestedPath, gap, paths_collide
+from evoexp.collision.planar.ellipse_kernels import (
+    Ellipses,
+    TestedPath,
+    gap,
+    mapped,
+    paths_collide,
+)
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.vectors import LANES
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.planar_ends import PlanarArm, block_ends, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
 from evoexp.validation import Component, LayoutCount
-
-NUM_FIRST = 1  # positions tested before chords are swept, so that few blocks go all the way
 
 
 class LinkEllipses(Component):
@@ -81,8 +84,8 @@ class EllipseCollision(NamedTuple):
 
     @property
     def path(self) -> TestedPath:
-        """The positions tested: the end, halves, quarters, …; all again if chords are swept."""
-        return _tested_path(self.num_positions, self.chords)
+        """The positions and chords that are tested."""
+        return TestedPath(self.num_positions, self.chords)
 
     @property
     def queries(self) -> int:
@@ -169,23 +172,17 @@ def _first_contact(
             ellipse = ellipses.maps[e]
             for k in range(num + 1):
                 at, root = k * LANES, max(k - 1, 0) * LANES
-                here = _mapped(ellipse, x[new, at], y[new, at])
-                if chords and _meets(_mapped(ellipse, x[old, at], y[old, at]), here):
+                here = mapped(ellipse, x[new, at], y[new, at])
+                if chords and _meets(mapped(ellipse, x[old, at], y[old, at]), here):
                     return position, e, k, True
-                if _meets(_mapped(ellipse, x[new, root], y[new, root]), here):
+                if _meets(mapped(ellipse, x[new, root], y[new, root]), here):
                     return position, e, k, False
     return -1, -1, -1, False
 
 
 @kernel
-def _mapped(ellipse: FloatArray, x: float, y: float) -> tuple[float, float]:
-    """Return a point in an ellipse's frame."""
-    return ellipse[0] * x + ellipse[1] * y + ellipse[2], ellipse[3] * y + ellipse[4]
-
-
-@kernel
 def _meets(one: tuple[float, float], two: tuple[float, float]) -> bool:
-    """Return whether a segment, given by its `_mapped` ends, touches the unit circle."""
+    """Return whether a segment, given by its `mapped` ends, touches the unit circle."""
     return bool(gap(one[0], one[1], two[0], two[1]) <= 0.0)
 
 
@@ -213,22 +210,3 @@ def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: 
     nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
     within = np.flatnonzero(np.cumsum(lengths) >= nearest)
     return int(within[0]) + 1 if len(within) else len(lengths) + 2
-
-
-@cache
-def _tested_path(num_positions: int, chords: bool) -> TestedPath:
-    """Return the positions that are tested, made once: every judged plan asks for them."""
-    first = _spread(num_positions)
-    return TestedPath(num_positions, first[:NUM_FIRST] if chords else first, chords)
-
-
-def _spread(num_positions: int) -> IntArray:
-    """Return 1 … M in an order that spreads: M, the middle, the quarters, …."""
-    order, parts = [num_positions], 2
-    while len(order) < num_positions:
-        for k in range(1, parts, 2):
-            position = max(1, round(k * num_positions / parts))
-            if position not in order:
-                order.append(position)
-        parts *= 2
-    return np.array(order, dtype=np.int64)

@@ -198,10 +198,7 @@ def colliding(
     k: int,
     tolerance: float,
 ) -> bool:
-    """Return whether two individuals collide in configuration k, the lines decided exactly.
-
-    What is at most a tolerance apart touches.
-    """
+    """Return whether two individuals are at most a tolerance apart in configuration k."""
     radius_1, radius_2 = arm_1.tcp_radius, arm_2.tcp_radius
     # circle against circle
     cx, cy = outlines_1[k, 2, i], outlines_1[k, 3, i]

@@ -11,7 +11,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 
-NOT_FINITE = "points and bases must be finite and below 1e150"
+NOT_FINITE = "points and bases must be finite and below 1e70"
 
 
 class Problem(NamedTuple):

@@ -142,11 +142,11 @@ class Coevolution(PlannerDefaults, Component):
         points = np.empty((robots, self.num_configurations + 2, 4, count))
         measure(populations, *self.task(problem)[:4], paths, points, criteria, own)
         # C1 (Eqs. 4, 5): an obstacle is in the way whoever the collaborator is
-        outlines = [collision.outlines(r, paths[r]) for r in range(robots)]
-        blocked = np.array([collision.with_obstacles(r, outlines[r]) for r in range(robots)])
+        tested = [collision.tested(path) for path in paths]
+        blocked = np.array([collision.with_obstacles(r, tested[r]) for r in range(robots)])
         hits, sums = [], blocked * count
         for a, b in combinations(range(robots), 2):
-            crossings = collision.between(a, outlines[a], b, outlines[b])
+            crossings = collision.between(a, tested[a], b, tested[b])
             hits.append(crossings.counts)
             sums[a] += crossings.sums_1
             sums[b] += crossings.sums_2

@@ -70,7 +70,7 @@ def evolve(
     )
     tables, summaries = generations
     count, last = len(memory.parents), first + len(uniforms)
-    checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
+    checks = prepare_checks(len(starts), tables.shape[2])
     for index in range(first, last):
         own, other = index % len(tables), (index + 1) % len(tables)
         following = tables[other]
@@ -100,7 +100,7 @@ def begin(
 ) -> None:
     """Draw and judge the initial population, at place 0; see `evolve`."""
     (tables, summaries), size = generations, len(memory.hit)
-    checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
+    checks = prepare_checks(len(starts), tables.shape[2])
     draw(uniforms, size, breeding, judging, starts, tables[0], memory, checks)
     summarise_costs(tables[0, len(tables[0]) - RESULTS, :size], summaries[0])
 

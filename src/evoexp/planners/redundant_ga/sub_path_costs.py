@@ -86,6 +86,6 @@ def judge_paths(starts: FloatArray, ends: FloatArray, judging: Judging) -> Float
     results, lanes = np.empty((RESULTS, count)), np.empty(count + LANES, dtype=np.int64)
     measure(starts, ends, count, judging, results)
     left, hit = list_inside(results, count, lanes), np.zeros(count, dtype=np.bool_)
-    checks = prepare_checks(judging.ellipses, len(starts), count)
+    checks = prepare_checks(len(starts), count)
     drop_collisions(starts, ends, lanes, left, judging, results, hit, checks)
     return results

@@ -50,10 +50,10 @@ class Problem(ArmProblem):
         Returns:
             One array (spheres, 3) [length unit] per arm.
         """
-        model, geometry = self.assembly.model, self._spheres.geometry
-        data, placements = model.createData(), geometry.createData()
-        pin.updateGeometryPlacements(model, data, geometry, placements, DEGREE * q)
-        centres = np.array([placement.translation for placement in placements.oMg])
+        model, shapes = self.assembly.model, self._spheres.shapes
+        data, spheres = model.createData(), zip(shapes.joint.tolist(), shapes.start, strict=True)
+        pin.forwardKinematics(model, data, DEGREE * q)
+        centres = np.array([data.oMi[joint].act(center) for joint, center in spheres])
         return [centres[first:stop] for first, stop in self._spheres.arm_spheres]
 
     def centre_distances(self, q: FloatArray) -> FloatArray:

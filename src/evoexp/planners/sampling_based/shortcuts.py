@@ -25,17 +25,27 @@ class ShortenedPath:
         nodes: (nodes, nq) [deg]; never changed in place.
         lengths: (nodes,) from the start to each [deg].
         num_attempts: Attempts so far.
+
+    Where edges are proven, too, shorter paths are taken by the model first; `settle` judges the
+    one in hand.
     """
 
     def __init__(self, nodes: FloatArray, edges: EdgeTest) -> None:
         """Begin with a path (nodes, nq) that is free."""
         self.nodes, self.lengths = nodes, lengths_along(nodes)
         self._edges, self.num_attempts = edges, 0
+        self._before: list[FloatArray] = []  # the paths since the last one that was judged
 
     @property
     def length(self) -> float:
         """Length of the path [deg]."""
         return float(self.lengths[-1])
+
+    def settle(self) -> None:
+        """Go back to the last path that is proven, if the one in hand is not."""
+        while self._before and self._edges.unproven(self.nodes) >= 0:
+            self.nodes = self._before.pop()
+        self._before, self.lengths = [], lengths_along(self.nodes)
 
     def improve(self, settings: EdgeSettings, rng: np.random.Generator) -> None:
         """Try a shortcut, or cut the corners where all shortcuts were tried."""
@@ -61,7 +71,7 @@ class ShortenedPath:
         found = np.array(rows)
         lengths = lengths_along(found)
         if lengths[-1] < self.length and self._is_free(first, last, one, two):
-            self.nodes, self.lengths = found, lengths
+            self._take(found, lengths)
 
     def cut_corners(self) -> None:
         """Cut every corner whose cut is free, if all that is left of the segments is free, too."""
@@ -78,7 +88,12 @@ class ShortenedPath:
         left = [(a, b) for a, b in edges if a.tobytes() + b.tobytes() not in tested]
         lengths = lengths_along(found)
         if lengths[-1] < self.length and all(self._edges.is_free(a, b) for a, b in left):
-            self.nodes, self.lengths = found, lengths
+            self._take(found, lengths)
+
+    def _take(self, nodes: FloatArray, lengths: FloatArray) -> None:
+        """Go on with a shorter path."""
+        self._before.append(self.nodes)
+        self.nodes, self.lengths = nodes, lengths
 
     def _is_free(self, first: int, last: int, one: FloatArray, two: FloatArray) -> bool:
         """Whether the new edge is free, and what is left of the segments at both of its ends."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import PathChecks, prepare_checks
+from evoexp.collision.planar.ellipse_kernels import PathChecks, prepare_checks
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.mutation import NON_UNIFORM, decode_bits, non_uniform_spread
 from evoexp.evolution.selection import choose_elites

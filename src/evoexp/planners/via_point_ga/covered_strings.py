@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredCollision
+from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import count_collisions, weigh

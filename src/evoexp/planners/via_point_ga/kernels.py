@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.planar_contacts import contacts
+from evoexp.collision.bodies.planar_contacts import contacts
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette

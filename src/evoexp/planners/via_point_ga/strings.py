@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.touching_spheres import SphereCollision
+from evoexp.collision.bodies.touching_spheres import SphereCollision
 from evoexp.evolution import crossover
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms

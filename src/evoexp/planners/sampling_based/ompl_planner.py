@@ -41,7 +41,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
     """A planner of OMPL, by its name."""
 
     component: ClassVar[str] = "ompl"
-    revision: ClassVar[int] = 2  # shortened paths are proven once they are recorded
+    revision: ClassVar[int] = 2
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:

@@ -18,8 +18,8 @@ CUT = 0.25  # [-] of a segment, from a corner to where it is cut
 class ShortenedPath:
     """A path that becomes shorter, attempt by attempt.
 
-    All its edges were tested as edges of their own: what is left of a segment that a shortcut cuts
-    in two is tested anew, because other configurations of it are looked at.
+    A shortcut begins and ends at configurations that were tested on the path: so only the line
+    between them is new, and what is left of the segments that it cuts in two is known to be free.
 
     Attributes:
         nodes: (nodes, nq) [deg]; never changed in place.
@@ -55,14 +55,16 @@ class ShortenedPath:
             self.cut_corners()
 
     def attempt(self, uniforms: FloatArray) -> None:
-        """Try the straight line between two places of the path.
+        """Try the straight line between the tested configurations next to two places of the path.
 
         Args:
             uniforms: (2,) the places, as shares of the length.
         """
         self.num_attempts += 1
-        places = sorted(float(share) * self.length for share in uniforms)
-        (first, one), (last, two) = (place_on_path(self.nodes, self.lengths, at) for at in places)
+        (first, one), (last, two) = (
+            place_on_path(self.nodes, self.lengths, at, self._edges.resolution)
+            for at in sorted(float(share) * self.length for share in uniforms)
+        )
         if first == last:  # the line between them is already part of the path
             return
         kept = [*self.nodes[: first + 1], one, two, *self.nodes[last + 1 :]]
@@ -70,7 +72,7 @@ class ShortenedPath:
         rows = [kept[0], *(b for a, b in itertools.pairwise(kept) if (a != b).any())]
         found = np.array(rows)
         lengths = lengths_along(found)
-        if lengths[-1] < self.length and self._is_free(first, last, one, two):
+        if lengths[-1] < self.length and self._edges.is_free(one, two):
             self._take(found, lengths)
 
     def cut_corners(self) -> None:
@@ -94,12 +96,3 @@ class ShortenedPath:
         """Go on with a shorter path."""
         self._before.append(self.nodes)
         self.nodes, self.lengths = nodes, lengths
-
-    def _is_free(self, first: int, last: int, one: FloatArray, two: FloatArray) -> bool:
-        """Whether the new edge is free, and what is left of the segments at both of its ends."""
-        before, behind = self.nodes[first], self.nodes[last + 1]
-        return all(
-            self._edges.is_free(a, b)
-            for a, b in ((one, two), (before, one), (two, behind))
-            if (a != b).any()
-        )

@@ -63,19 +63,15 @@ def is_proven(
         security_margin: See `certificate`.
         by_margin: Whether the task's margins must be kept, too.
     """
-    return bool(parts) and all(
-        _is_proven_part(part, motion, security_margin, by_margin) for part in parts
-    )
-
-
-def _is_proven_part(part: Part, motion: Motion, security_margin: float, by_margin: bool) -> bool:
-    """Return whether a piece is proven, and its pairs that may touch overlap no deeper."""
-    piece = _piece(part, motion)
-    margin = security_margin if part.margins is None else part.margins
-    if not is_clear(part.scene, piece, margin if by_margin else 0.0):
-        return False
-    depths, _ = contact_depths(part.scene, piece)
-    return all(d.too_deep_at is None and (d.decided or by_margin) for d in depths)
+    for part in parts:
+        piece = _piece(part, motion)
+        margin = security_margin if part.margins is None else part.margins
+        if not is_clear(part.scene, piece, margin if by_margin else 0.0):
+            return False
+        depths, _ = contact_depths(part.scene, piece)
+        if not all(d.too_deep_at is None and (d.decided or by_margin) for d in depths):
+            return False
+    return bool(parts)
 
 
 def _piece(part: Part, motion: Motion) -> Motion:

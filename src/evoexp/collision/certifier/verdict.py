@@ -80,19 +80,18 @@ def certify(
             (pairs,) of each.
         contact_tolerance: A distance at or below it is contact [length unit]; None:
             `Scene.tolerances`.
-        resolution: The clearance is proven up to this part of it [-].
+        resolution: The clearance is proven up to this part of it [-]; inf: not at all.
         limits: Numbers after which the certifier gives up.
 
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
     """
-    _check(scene, motion, security_margin, contact_tolerance, resolution)
-    tolerances, num_pairs = scene.tolerances, len(scene.pairs)
+    tolerances = scene.tolerances
     if contact_tolerance is not None:
-        tolerances = np.full(num_pairs, contact_tolerance)
-    margins = np.empty(num_pairs)
-    margins[:] = security_margin
-    return _Judgement(scene, motion, margins, tolerances, resolution, limits).verdict()
+        if not 0.0 < contact_tolerance < np.inf:
+            raise ValueError(f"contact_tolerance must be above 0, was {contact_tolerance}")
+        tolerances = np.full(len(scene.pairs), contact_tolerance)
+    return _Judgement(scene, motion, security_margin, tolerances, resolution, limits).verdict()
 
 
 def is_clear(
@@ -116,13 +115,8 @@ def is_clear(
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
     """
-    _check(scene, motion, security_margin, None, 1.0)
-    if len(scene.pairs) == 0:
-        return True
-    margins = np.empty(len(scene.pairs))
-    margins[:] = security_margin
-    judgement = _Judgement(scene, motion, margins, scene.tolerances, np.inf, limits)
-    return judgement.is_clear()
+    tolerances = scene.tolerances
+    return _Judgement(scene, motion, security_margin, tolerances, np.inf, limits).is_clear()
 
 
 class _Candidate(NamedTuple):
@@ -140,12 +134,15 @@ class _Judgement:
         self,
         scene: Scene,
         motion: Motion,
-        margins: FloatArray,
+        security_margin: float | FloatArray,
         tolerances: FloatArray,
         resolution: float,
         limits: Limits,
     ) -> None:
-        self.scene, self.motion, self.margins = scene, motion, margins
+        _check(scene, motion, security_margin, resolution)
+        self.margins = np.empty(len(scene.pairs))
+        self.margins[:] = security_margin
+        self.scene, self.motion = scene, motion
         self.tolerances, self.resolution, self.limits = tolerances, resolution, limits
         self.coal = CoalDistance(scene, motion, limits.queries)
         self.floor = 1e-6 * scene.size
@@ -189,6 +186,8 @@ class _Judgement:
 
     def is_clear(self) -> bool:
         """Return whether all pairs are proven to keep their margins, and not to touch."""
+        if len(self.scene.pairs) == 0:
+            return True
         goal = np.maximum(self.margins, self.tolerances)
         level = np.maximum(self.margins - self.tolerances, self.tolerances)
         try:
@@ -339,11 +338,7 @@ def _joined(leaves: FloatArray) -> FloatArray:
 
 
 def _check(
-    scene: Scene,
-    motion: Motion,
-    security_margin: float | FloatArray,
-    contact_tolerance: float | None,
-    resolution: float,
+    scene: Scene, motion: Motion, security_margin: float | FloatArray, resolution: float
 ) -> None:
     """Check that the motion fits the model and that every number is in its range.
 
@@ -370,7 +365,5 @@ def _check(
         in_range = bool(((margins >= 0.0) & (margins < np.inf)).all())
     if not in_range:
         raise ValueError(f"security_margin must be at least 0, was {security_margin}")
-    if contact_tolerance is not None and not 0.0 < contact_tolerance < np.inf:
-        raise ValueError(f"contact_tolerance must be above 0, was {contact_tolerance}")
-    if not 0.0 < resolution < np.inf:
+    if not resolution > 0.0:
         raise ValueError(f"resolution must be above 0, was {resolution}")

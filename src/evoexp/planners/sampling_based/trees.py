@@ -68,9 +68,9 @@ class EdgeTest:
 
     def _are_free(self, q: FloatArray) -> bool:
         """Whether configurations (nq, configurations) [deg] are free."""
-        num_free: int = self._collision.num_free(q)
+        num_free = self._collision.num_free(q)
         self.queries += min(q.shape[1], num_free + LANES)
-        return num_free == q.shape[1]
+        return bool(num_free == q.shape[1])
 
     def num_contacts(self, path: FloatArray) -> int:
         """Return how many of the configurations tested on a path (nodes, nq) collide."""

@@ -127,7 +127,7 @@ def bench_collides_7r(beside: Any, drawn: str, size: int) -> None:
                 1,
             ),
             "whether any of 20 collides": (
-                lambda: [collision.any_collides(edge) for edge in edges],
+                lambda: [collision.num_free(edge) for edge in edges],
                 SIZE,
                 10,
             ),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from collision.certifier_scenes import SAMPLES, brute_force, random_motion, random_scene
-from evoexp.collision.certifier.verdict import certify
+from evoexp.collision.certifier.verdict import certify, is_clear
 from matrix import first
 
 SCENES, BATCH = 200, 20
@@ -24,6 +24,10 @@ def test_brute_force_never_contradicts(first_scene: int) -> None:
         scene = random_scene(rng)
         motion = random_motion(rng, scene.model.nq)
         verdict, brute = certify(scene, motion), brute_force(scene, motion)
+        assert is_clear(scene, motion) == (verdict.status == "certified"), seed
+        near = 0.5 * verdict.clearance, 1.5 * verdict.clearance
+        asked = [margin for margin in near if np.isfinite(margin) and margin > 0.0]
+        assert [is_clear(scene, motion, margin) for margin in asked] == [True, False][: len(asked)]
         statuses.append(verdict.status)
         least, touching = brute.least.min(), brute.t[brute.least <= scene.tolerances[brute.pair]]
         if verdict.status == "certified":

@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 
 from composed import composed
-from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
 from evoexp.collision.bodies.body_shapes import Shapes
-from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
+from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -73,7 +73,7 @@ def test_answers_are_the_signs_of_the_clearances(arm: str, drawn: str, count: in
     assert np.abs(exact).min() > 1e-9
     assert np.array_equal(found, exact < 0.0)
     assert np.array_equal(collision.collides(q), exact < 0.0)
-    assert collision.any_collides(q) == bool((exact < 0.0).any())
+    assert collision.num_free(q) == leading_free(exact < 0.0)
 
 
 @pytest.mark.parametrize("drawn", ["random_configurations", "population"])
@@ -95,11 +95,11 @@ def test_the_search_for_any_collision_ends_where_the_first_is_found(arm: str) ->
     free = q[:, ~hits]
     for place in (0, 5, 8, 50, free.shape[1]):
         mixed = np.insert(free, place, q[:, hits][:, 0], axis=1)
-        assert decided(collision, mixed, at_first=True)[0] == HIT
-        assert collision.any_collides(mixed)
+        assert decided(collision, mixed, at_first=True)[0] == -1 - place // 8 * 8
+        assert collision.num_free(mixed) == place // 8 * 8
     assert decided(collision, free, at_first=True)[0] == 0
-    assert not collision.any_collides(free)
-    assert not collision.any_collides(free[:, :0])
+    assert collision.num_free(free) == free.shape[1]
+    assert collision.num_free(free[:, :0]) == 0
 
 
 def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
@@ -111,8 +111,8 @@ def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
     exact = collision.clearance(q).least
     assert np.array_equal(exact < 0.0, [False, False, True])
     assert np.array_equal(collision.collides(q), exact < 0.0)
-    assert collision.any_collides(q)
-    assert not collision.any_collides(q[:, :2])
+    assert collision.num_free(q) == 0
+    assert collision.num_free(q[:, :2]) == 2
 
 
 def test_centres_within_boxes_without_thickness_collide() -> None:
@@ -179,8 +179,8 @@ def test_capsules_are_answered_in_full() -> None:
     assert not collision.only_spheres
     q = arms_6r.random_configurations(50)
     hits = collision.collides(q)
-    assert collision.any_collides(q)
-    assert not collision.any_collides(q[:, ~hits])
+    assert collision.num_free(q) == leading_free(hits)
+    assert collision.num_free(q[:, ~hits]) == (~hits).sum()
 
 
 @pytest.mark.parametrize("experiment", ["rana_planar", "rana_obstacles", "rana_puma"])
@@ -192,15 +192,16 @@ def test_touching_spheres_find_any_collision(experiment: str) -> None:
     hits = collision.clearance(q).least < 0.0
     assert 0 < hits.sum() < len(hits)
     assert np.array_equal(collision.collides(q), hits)
-    assert collision.any_collides(q)
+    assert collision.num_free(q) == leading_free(hits)
     free = q[:, ~hits]
-    assert not collision.any_collides(free)
+    assert collision.num_free(free) == free.shape[1]
     for count in (1, 7, 8, 9, 20):
         few = q[:, :count]
-        assert collision.any_collides(few) == bool(hits[:count].any())
-        assert collision.any_collides(np.hstack([free[:, :count], q[:, hits][:, :1]]))
+        assert collision.num_free(few) == leading_free(hits[:count])
+        mixed = np.hstack([free[:, :count], q[:, hits][:, :1]])
+        assert collision.num_free(mixed) == count // 8 * 8
     with pytest.raises(ValueError, match="q must have shape"):
-        collision.any_collides(q[:2])
+        collision.num_free(q[:2])
 
 
 PROGRAMME = """

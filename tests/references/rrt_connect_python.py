@@ -4,6 +4,7 @@ A configuration is asked for by a function of one configuration, so that this kn
 collision models. Random numbers are drawn as the planner draws them.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -38,14 +39,17 @@ class Planner:
         self.asked = 0
 
     def free(self, one: Any, two: Any) -> bool:
-        """Whether an edge is free: its last end first, its first left out."""
+        """Whether an edge is free: eight by eight spread over it, its first end left out."""
         parts = max(1, math.ceil(math.dist(one, two) / self.resolution - 1e-6))
-        self.asked += 1
-        if self.collides(two):
-            return False
-        self.asked += parts - 1
-        places = [((parts - k) * one + k * two) / parts for k in range(1, parts)]
-        return not any(self.collides(q) for q in places)
+        rounds = math.ceil(parts / 8)
+        spread = [k for first in range(rounds) for k in range(parts - first, 0, -rounds)]
+        places = [((parts - k) * one + k * two) / parts if k < parts else two for k in spread]
+        for begin in range(0, parts, 8):
+            eight = places[begin : begin + 8]
+            self.asked += len(eight)
+            if any(self.collides(q) for q in eight):
+                return False
+        return True
 
     def grow(self, tree: list[Any], q: Any, target: Any, near: int) -> tuple[Any, str]:
         """EXTEND: one step from a node."""
@@ -89,16 +93,16 @@ class Planner:
             while k < len(edges) - 1 and before + math.dist(*edges[k]) <= at:
                 before += math.dist(*edges[k])
                 k += 1
-            share = (at - before) / math.dist(*edges[k])
-            places.append((k, edges[k][0] + share * (edges[k][1] - edges[k][0])))
+            long, (one, two) = math.dist(*edges[k]), edges[k]
+            parts = max(1, math.ceil(long / self.resolution - 1e-6))
+            part = math.floor((at - before) / long * parts + 0.5)
+            places.append((k, ((parts - part) * one + part * two) / parts))
         (first, one), (last, two) = places
         if first == last:
             return path
-        new = [*path[: first + 1], one, two, *path[last + 1 :]]
-        if length(new) >= total:
-            return path
-        pieces = [(one, two), (path[first], one), (two, path[last + 1])]
-        return new if all(self.free(a, b) for a, b in pieces) else path
+        rows = [*path[: first + 1], one, two, *path[last + 1 :]]
+        new = [rows[0], *(b for a, b in itertools.pairwise(rows) if math.dist(a, b) > 1e-9)]
+        return new if length(new) < total and self.free(one, two) else path
 
 
 def nearest(tree: list[Any], q: Any) -> int:

@@ -1,11 +1,11 @@
 """The exact verdict on a planner's motion, and searches that accept only what it proves."""
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
-from evoexp.collision.certifier.certificate import Certificate, certificate
+from evoexp.collision.certifier.certificate import Certificate, certificate, is_proven
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import Planner
 from evoexp.records import FloatArray
@@ -28,15 +28,10 @@ def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certi
     return certificate(planner.parts(problem, motion), motion, planner.security_margin(problem))
 
 
-class Verdict(NamedTuple):
-    """The verdict on a motion as a search learns it: the same on every processor."""
-
-    proven: bool  # whether the certifier proves it; one that it cannot decide is not proven
-    pair: str  # names of the bodies that touch, " – " between them; empty if none do
-
-
 class Proofs:
     """Judges whole motions for a search that accepts proven ones only, each solution once.
+
+    Answers are the same on every processor; a motion that cannot be decided is not proven.
 
     Attributes:
         planner: The planner.
@@ -51,22 +46,36 @@ class Proofs:
             planner: A planner whose field `acceptance` is not `model`.
         """
         self.planner, self.problem = planner, problem
-        self._known: dict[bytes, Verdict] = {}
+        self._known: dict[bytes, bool] = {}
+        self._touching: dict[bytes, str] = {}
         self.num_certificates = 0
 
-    def verdict(self, solution: FloatArray) -> Verdict:
-        """Return the verdict on a flat solution."""
+    def is_proven(self, solution: FloatArray) -> bool:
+        """Return whether the certifier proves the motion of a flat solution."""
         key = solution.tobytes()
         if key not in self._known:
             if len(self._known) >= KEPT:
                 self._known.clear()
             self.num_certificates += 1
-            motion = self.planner.motion(self.problem, solution)
-            found = judge_motion(self.planner, self.problem, motion)
-            asked = self.planner.acceptance == "margin"
-            proven = found.certified_margin if asked else found.certified
-            self._known[key] = Verdict(proven is True, found.refuted_pair)
+            planner, problem = self.planner, self.problem
+            motion = planner.motion(problem, solution)
+            self._known[key] = motion is not None and is_proven(
+                planner.parts(problem, motion),
+                motion,
+                planner.security_margin(problem),
+                planner.acceptance == "margin",
+            )
         return self._known[key]
+
+    def touching_pair(self, solution: FloatArray) -> str:
+        """Return the bodies that touch first in a motion, " – " between them; empty if none do."""
+        key = solution.tobytes()
+        if key not in self._touching:
+            if len(self._touching) >= KEPT:
+                self._touching.clear()
+            motion = self.planner.motion(self.problem, solution)
+            self._touching[key] = judge_motion(self.planner, self.problem, motion).refuted_pair
+        return self._touching[key]
 
     def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
         """Judge individuals, the cheapest first, until one is proven; refuted ones cost inf.
@@ -83,7 +92,3 @@ class Proofs:
                 return k
             costs[k] = np.inf
         return None
-
-    def is_proven(self, solution: FloatArray) -> bool:
-        """Whether the certifier proves the motion of a flat solution."""
-        return self.verdict(solution).proven

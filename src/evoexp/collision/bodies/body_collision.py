@@ -13,8 +13,9 @@ import numpy as np
 from evoexp.collision.bodies.body_shapes import Pairs, Shapes, arms_of_joints, default_pairs
 from evoexp.collision.bodies.body_tables import FlatTables, flattened
 from evoexp.collision.bodies.clearance_kernels import least_clearances
-from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
+from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.packing import pack_tables
+from evoexp.numeric.vectors import LANES
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
@@ -34,6 +35,11 @@ class Clearances(NamedTuple):
     def least(self) -> FloatArray:
         """Smallest of the three; a configuration collides where it is negative."""
         return np.minimum(np.minimum(self.to_obstacles, self.between_arms), self.to_self)
+
+
+def leading_free(hits: BoolArray) -> int:
+    """Return how many configurations come before the eight of the first hit; all without any."""
+    return int(np.argmax(hits)) // LANES * LANES if hits.any() else len(hits)
 
 
 class BodyCollision(NamedTuple):
@@ -128,11 +134,12 @@ class BodyCollision(NamedTuple):
         least_clearances(self.tables, 0.0, True, q, rows)
         return np.asarray(~(rows[0] >= 0.0))  # all rows are the same
 
-    def any_collides(self, q: FloatArray) -> bool:
-        """Return whether any configuration of a batch collides, as the edges of a planner's graph.
+    def num_free(self, q: FloatArray) -> int:
+        """Return how many configurations come before the eight among which the first collides.
 
-        A robot made of spheres alone is tested until one is found, eight configurations at a time:
-        those that are likely to collide should come first. Others are tested to the end.
+        All of them if none collides. For edges of a planner's graph: a robot made of spheres alone
+        is tested until a contact is met, eight configurations at a time, so those that are likely
+        to collide should come first. Others are tested to the end.
 
         Raises:
             ValueError: If q has another number of rows than the model has coordinates.
@@ -140,9 +147,9 @@ class BodyCollision(NamedTuple):
         q = self._checked(q)
         if self.only_spheres:
             answer = find_contacts(self.tables, True, q, np.empty(q.shape[1], dtype=np.bool_))
-            if answer in (HIT, 0):
-                return answer == HIT
-        return bool(self.collides(q).any())
+            if answer <= 0:
+                return q.shape[1] if answer == 0 else -1 - answer
+        return leading_free(self.collides(q))
 
     def _checked(self, q: FloatArray) -> FloatArray:
         nq = self.table.num_coordinates

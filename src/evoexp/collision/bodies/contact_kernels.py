@@ -58,9 +58,6 @@ from evoexp.robots.forward_kinematics import (
 from evoexp.robots.kinematics import SPATIAL_ROWS, U
 from evoexp.scenarios.obstacles import SPHERE
 
-HIT = -1
-"""Answer of `find_contacts` at the first configuration that collides."""
-
 ROUNDING = 1e-12
 """Clearances below this times the scale are in doubt: rounding errors are a hundredth of it."""
 
@@ -98,7 +95,8 @@ def find_contacts(tables: FlatTables, at_first: bool, q: FloatArray, out: BoolAr
         out: (configurations,) written: whether each collides, true for those in doubt.
 
     Returns:
-        How many are in doubt; `HIT` if it left.
+        How many are in doubt; −1 − the first of the eight among which one is sure to collide, if it
+        left there.
     """
     scene = named_tables(tables[0], tables[1])
     num_joints, num_units = U(len(scene.chain.parent)), U(len(scene.units))
@@ -144,7 +142,7 @@ def _find_contacts(
             least = _meet_each_other(scene, memory, time, limits, at_first, least)
         hits = least < -1.0 * limits.slack
         if at_first and any_lane(hits):
-            return HIT
+            return -1 - first
         # 0: free, 1: in doubt, 2: collides
         state = select(hits, spread(2.0), select(limits.slack < least, spread(0.0), spread(1.0)))
         store(memory.middles, U(0), state)

@@ -82,9 +82,9 @@ class CoveredCollision(NamedTuple):
         """Return which configurations (nq, configurations) [deg] collide."""
         return self.collision.collides(DEGREE * q)
 
-    def any_collides(self, q: FloatArray) -> bool:
-        """Return whether any of some configurations (nq, configurations) [deg] collides."""
-        return self.collision.any_collides(DEGREE * q)
+    def num_free(self, q: FloatArray) -> int:
+        """Return how many configurations (nq, configurations) [deg] precede a contact's eight."""
+        return self.collision.num_free(DEGREE * q)
 
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""

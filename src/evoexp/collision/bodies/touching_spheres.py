@@ -192,16 +192,15 @@ class SphereCollision(NamedTuple):
         contacts(self.tables, q, 0, out)
         return np.asarray(~(out >= 0.0))
 
-    def any_collides(self, q: FloatArray) -> bool:
-        """Return whether any configuration of a batch collides, as the edges of a planner's graph.
+    def num_free(self, q: FloatArray) -> int:
+        """Return how many configurations precede the eight among which the first collides.
 
-        The batch, (nq, configurations) [deg], is tested until one is found, eight at a time: those
-        that are likely to collide should come first.
+        The batch (nq, configurations) [deg] is tested no further: see `BodyCollision.num_free`.
 
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        return self.general.any_collides(DEGREE * self._checked(q))
+        return self.general.num_free(DEGREE * self._checked(q))
 
     def _centers(self, q: FloatArray) -> FloatArray:
         """Return the centres (spheres, 3, configurations) at q (nq, configurations) [rad]."""

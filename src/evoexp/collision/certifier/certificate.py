@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from evoexp.collision.certifier.allowed_contacts import contact_depths
-from evoexp.collision.certifier.verdict import certify
+from evoexp.collision.certifier.verdict import certify, is_clear
 from evoexp.collision.scene import Part
 from evoexp.paths.motion import Motion
 
@@ -52,11 +52,37 @@ def certificate(parts: Sequence[Part], motion: Motion, security_margin: float) -
     return combined(judged) if judged else Certificate()
 
 
+def is_proven(
+    parts: Sequence[Part], motion: Motion, security_margin: float, by_margin: bool
+) -> bool:
+    """Return whether `certificate` would prove a motion, without measuring how clearly.
+
+    Args:
+        parts: See `certificate`; without pieces nothing is proven.
+        motion: The whole motion.
+        security_margin: See `certificate`.
+        by_margin: Whether the task's margins must be kept, too.
+    """
+    for part in parts:
+        piece = _piece(part, motion)
+        margin = security_margin if part.margins is None else part.margins
+        if not is_clear(part.scene, piece, margin if by_margin else 0.0):
+            return False
+        depths, _ = contact_depths(part.scene, piece)
+        if not all(d.too_deep_at is None and (d.decided or by_margin) for d in depths):
+            return False
+    return bool(parts)
+
+
+def _piece(part: Part, motion: Motion) -> Motion:
+    """Return a piece of a motion; its instants begin at 0."""
+    first, last, cubics = part.first, part.last, motion.coefficients
+    return Motion(motion.q[first : last + 1], None if cubics is None else cubics[first:last])
+
+
 def judged_part(part: Part, motion: Motion, security_margin: float) -> Certificate:
     """Judge one piece of a motion by its own bodies; instants are those of the whole motion."""
-    first, last = part.first, part.last
-    cubics = motion.coefficients
-    piece = Motion(motion.q[first : last + 1], None if cubics is None else cubics[first:last])
+    first, piece = part.first, _piece(part, motion)
     margin = security_margin if part.margins is None else part.margins
     verdict = certify(part.scene, piece, margin)
     touching = verdict.status == "refuted"

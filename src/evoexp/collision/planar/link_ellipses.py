@@ -4,6 +4,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.bodies.body_collision import leading_free
 from evoexp.collision.planar.ellipse_kernels import (
     Ellipses,
     TestedPath,
@@ -135,9 +136,12 @@ class EllipseConfigurations:
         angles = np.ascontiguousarray(DEGREE * q)
         return self._collision.collide(angles, angles)
 
-    def any_collides(self, q: FloatArray) -> bool:
-        """Whether any of the configurations (N, count) [deg] collides."""
-        return bool(self.collides(q).any())
+    def num_free(self, q: FloatArray) -> int:
+        """Return how many configurations (N, count) [deg] precede the eight of the first contact.
+
+        All of them if none collides.
+        """
+        return leading_free(self.collides(q))
 
 
 @kernel

@@ -79,10 +79,10 @@ class ProvenTeams:
     def _is_proven(self, populations: FloatArray, found: Evaluated, team: IntArray) -> bool:
         """Whether a team is proven; one that is refuted counts as colliding."""
         solution = self._planner.team_solution(self._problem, populations, team)
-        verdict = self._proofs.verdict(solution)
-        if not verdict.proven:
-            self._refute(found, team, verdict.pair)
-        return verdict.proven
+        proven = self._proofs.is_proven(solution)
+        if not proven:
+            self._refute(found, team, self._proofs.touching_pair(solution))
+        return proven
 
     def _refute(self, found: Evaluated, team: IntArray, bodies: str) -> None:
         """Count one more collision of the robots that touch, or of all if none are named."""

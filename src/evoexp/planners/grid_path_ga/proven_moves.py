@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from evoexp.collision.certifier.certificate import judged_part
+from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part, Scene
 from evoexp.paths.grids import Grid, NodeArray
 from evoexp.paths.motion import Motion
@@ -25,14 +25,10 @@ def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: boo
     """
     neighbours = grid.neighbours.copy()
 
-    def is_proven(line: NodeArray) -> bool:
-        ends = grid.coordinates[line[[0, -1]]].astype(np.float64)
-        found = judged_part(Part(scene, 0, 1), Motion(ends), security_margin)
-        return (found.certified_margin if by_margin else found.certified) is True
-
     def judge(line: NodeArray, move: int) -> None:
         """Forbid the moves of a line of nodes that are not proven."""
-        if is_proven(line):
+        ends = Motion(grid.coordinates[line[[0, -1]]].astype(np.float64))
+        if is_proven((Part(scene, 0, 1),), ends, security_margin, by_margin):
             return
         if len(line) > 2:
             middle = len(line) // 2

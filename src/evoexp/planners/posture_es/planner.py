@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from evoexp.collision.bodies.body_models import CollisionModel
-from evoexp.collision.certifier.certificate import certificate
+from evoexp.collision.certifier.certificate import is_proven
 from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
@@ -137,13 +137,10 @@ class PostureEs(PlannerDefaults, Component):
     def _proves(self, problem: Problem, stage: Stage) -> Callable[[FloatArray, FloatArray], bool]:
         """Return the proof of the way from a parent (nq,) to its child in a phase."""
         part, margin = Part(problem.scene_of(stage), 0, 1), self.security_margin(problem)
-
-        def is_proven(parent: FloatArray, child: FloatArray) -> bool:
-            found = certificate((part,), Motion(np.array([parent, child])), margin)
-            asked = found.certified_margin if self.acceptance == "margin" else found.certified
-            return asked is True
-
-        return is_proven
+        by_margin = self.acceptance == "margin"
+        return lambda parent, child: is_proven(
+            (part,), Motion(np.array([parent, child])), margin, by_margin
+        )
 
     @property
     def chosen(self) -> tuple[int, ...]:

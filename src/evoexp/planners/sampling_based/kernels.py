@@ -74,6 +74,12 @@ def step_toward(q: FloatArray, target: FloatArray, step: float) -> FloatArray:
 
 
 @kernel
+def _num_parts(length: float, resolution: float) -> int:
+    """Return the number of equal parts into which tested configurations divide an edge."""
+    return max(1, int(np.ceil(length / resolution - SLACK)))
+
+
+@kernel
 def tested_configurations(one: FloatArray, two: FloatArray, resolution: float) -> FloatArray:
     """Return configurations at equal distances along an edge, its second end included.
 
@@ -89,7 +95,7 @@ def tested_configurations(one: FloatArray, two: FloatArray, resolution: float) -
     Returns:
         (nq, s).
     """
-    parts = max(1, int(np.ceil(distance(one, two) / resolution - SLACK)))
+    parts = _num_parts(distance(one, two), resolution)
     rounds = (parts + LANES - 1) // LANES
     out, column = np.empty((len(one), parts)), 0
     for first in range(rounds):
@@ -111,20 +117,29 @@ def lengths_along(path: FloatArray) -> FloatArray:
 
 
 @kernel
-def place_on_path(path: FloatArray, lengths: FloatArray, at: float) -> tuple[int, FloatArray]:
-    """Return the place at a length along a path: its segment, and the configuration there.
+def place_on_path(
+    path: FloatArray, lengths: FloatArray, at: float, resolution: float
+) -> tuple[int, FloatArray]:
+    """Return the tested configuration next to a length along a path: its segment, and itself.
+
+    What is left of a segment on either side of it is tested at those of the segment's own
+    configurations that lie there, since both parts are divided as densely as the whole.
 
     Args:
         path: (nodes, nq), two nodes at least.
         lengths: (nodes,) of `lengths_along`.
         at: Length from the start.
+        resolution: Greatest distance of tested neighbours [deg].
     """
     k = 0
     while k < len(path) - 2 and lengths[k + 1] <= at:
         k += 1
     long = lengths[k + 1] - lengths[k]
+    parts = _num_parts(long, resolution)
     share = (at - lengths[k]) / long if long > 0.0 else 0.0
+    part = min(int(share * parts + 0.5), parts)
     q = np.empty(path.shape[1])
     for joint in range(len(q)):
-        q[joint] = path[k, joint] + share * (path[k + 1, joint] - path[k, joint])
+        between = ((parts - part) * path[k, joint] + part * path[k + 1, joint]) / parts
+        q[joint] = between if 0 < part < parts else path[k + part // parts, joint]  # a node itself
     return k, q

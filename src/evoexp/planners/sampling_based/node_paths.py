@@ -122,7 +122,7 @@ class NodePaths(TreePaths, EdgeSettings):
         judged = judge_paths(edges, population.transpose(2, 1, 0))
         feasible, segments = judged.feasible, np.full(len(judged.cost), population.shape[1] - 1)
         for k in np.flatnonzero(feasible):
-            feasible[k] = edges.is_proven(np.ascontiguousarray(population[:, :, k].T))
+            feasible[k] = edges.unproven(np.ascontiguousarray(population[:, :, k].T)) < 0
         cost, length = np.where(feasible, judged.cost, np.inf), judged.terms["length_deg"]
         terms = {"length_deg": length, "segments": segments, **judged.terms}
         return judged._replace(cost=cost, terms=terms)
@@ -210,7 +210,8 @@ class InIterations:
                 costs[count] = cost
                 count += 1
             costs = costs[: max(1, count)]
-            keeper.keep(search.best_cost, search.candidate())
+            best = search.candidate()  # may take the best path over
+            keeper.keep(search.best_cost, best)
             yield keeper.record(
                 cost_statistics(costs),
                 costs,

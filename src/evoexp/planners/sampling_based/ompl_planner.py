@@ -41,6 +41,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
     """A planner of OMPL, by its name."""
 
     component: ClassVar[str] = "ompl"
+    revision: ClassVar[int] = 2
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
@@ -123,7 +124,7 @@ class _Search:
         if self._path is None:
             found = self._library.solve(most)
             shorter = found is not None and path_length(found) < self.cost
-            if found is not None and shorter and self.edges.is_proven(found):
+            if found is not None and shorter and self.edges.unproven(found) < 0:
                 self.nodes, self._shown = found, found.flatten()
             if self._library.is_done:
                 self.stop_reason = "solution" if len(self.nodes) > 1 else "no solution"
@@ -136,7 +137,8 @@ class _Search:
             self._path.improve(self._settings, rng)
         else:
             self.stop_reason = "solution"
-        if self._path.nodes is not self.nodes and self.edges.is_proven(self._path.nodes):
+        self._path.settle()
+        if self._path.nodes is not self.nodes:
             self.nodes, self._shown = self._path.nodes, self._path.nodes.flatten()
 
     def candidate(self) -> Candidate:
@@ -176,7 +178,8 @@ class _Library:
 
             def checkMotion(self, one: Any, two: Any, last: Any = None) -> bool:  # noqa: N802
                 """Whether the edge between two states is free."""
-                return edges.is_free(_array(one, nq), _array(two, nq))
+                ends = np.array([_array(one, nq), _array(two, nq)])
+                return edges.is_free(*ends) and edges.unproven(ends) < 0
 
         self._motions = Edges(self._info)  # kept: OMPL holds no reference
         self._info.setMotionValidator(self._motions)

@@ -31,6 +31,7 @@ class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
     """RRT-Connect and shortcuts."""
 
     component: ClassVar[str] = "rrt_connect"
+    revision: ClassVar[int] = 2
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last path is shortened or given up."""
@@ -67,7 +68,7 @@ class _Search:
         self._path: ShortenedPath | None = None
         self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
         self._starts, self._iterations, self.best_cost = 1, 0, np.inf
-        self._solution, self._shown = problem.start.copy(), problem.start
+        self._solution = problem.start.copy()
 
     @property
     def stop_reason(self) -> str:
@@ -87,20 +88,18 @@ class _Search:
         Returns the length of the path in hand [deg], inf without one.
         """
         if self._is_done():
+            self._keep_shortest()
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)
             self._path, self._starts = None, self._starts + 1
         if self._path is not None:
             self._path.improve(self._planner, rng)
         else:
             self._grow(rng)
-        shorter = self._path is not None and self._path.length < self.best_cost
-        if self._path is not None and shorter and self.edges.is_proven(self._path.nodes):
-            self.best_cost, self._shown = self._path.length, self._path.nodes
-            self._solution = self._shown.flatten()
         return np.inf if self._path is None else self._path.length
 
     def candidate(self) -> Candidate:
         """Return the shortest path as it is recorded, the same array as long as it is the same."""
+        self._keep_shortest()
         terms = {
             "length_deg": self.best_cost,
             "iterations": float(self._iterations),
@@ -108,6 +107,13 @@ class _Search:
         }
         terms |= self._first | self.edges.certificates()
         return Candidate(self._solution, terms, bool(np.isfinite(self.best_cost)))
+
+    def _keep_shortest(self) -> None:
+        """Keep the path in hand if it is the shortest so far, and proven where asked for."""
+        if self._path is not None and self._path.length < self.best_cost:
+            self._path.settle()
+        if self._path is not None and self._path.length < self.best_cost:
+            self.best_cost, self._solution = self._path.length, self._path.nodes.flatten()
 
     def _is_done(self) -> bool:
         """Whether the present start has come to its end."""

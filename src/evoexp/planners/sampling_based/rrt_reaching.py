@@ -48,6 +48,7 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
     """RRT-Connect to postures that reach the via point, and then to some that reach the goal."""
 
     component: ClassVar[str] = "rrt_reaching"
+    revision: ClassVar[int] = 2
     unit: ClassVar[float] = 1.0
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:

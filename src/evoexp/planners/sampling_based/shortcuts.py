@@ -18,24 +18,34 @@ CUT = 0.25  # [-] of a segment, from a corner to where it is cut
 class ShortenedPath:
     """A path that becomes shorter, attempt by attempt.
 
-    All its edges were tested as edges of their own: what is left of a segment that a shortcut cuts
-    in two is tested anew, because other configurations of it are looked at.
+    A shortcut begins and ends at configurations that were tested on the path: so only the line
+    between them is new, and what is left of the segments that it cuts in two is known to be free.
 
     Attributes:
         nodes: (nodes, nq) [deg]; never changed in place.
         lengths: (nodes,) from the start to each [deg].
         num_attempts: Attempts so far.
+
+    Where edges are proven, too, shorter paths are taken by the model first; `settle` judges the
+    one in hand.
     """
 
     def __init__(self, nodes: FloatArray, edges: EdgeTest) -> None:
         """Begin with a path (nodes, nq) that is free."""
         self.nodes, self.lengths = nodes, lengths_along(nodes)
         self._edges, self.num_attempts = edges, 0
+        self._before: list[FloatArray] = []  # the paths since the last one that was judged
 
     @property
     def length(self) -> float:
         """Length of the path [deg]."""
         return float(self.lengths[-1])
+
+    def settle(self) -> None:
+        """Go back to the last path that is proven, if the one in hand is not."""
+        while self._before and self._edges.unproven(self.nodes) >= 0:
+            self.nodes = self._before.pop()
+        self._before, self.lengths = [], lengths_along(self.nodes)
 
     def improve(self, settings: EdgeSettings, rng: np.random.Generator) -> None:
         """Try a shortcut, or cut the corners where all shortcuts were tried."""
@@ -45,14 +55,16 @@ class ShortenedPath:
             self.cut_corners()
 
     def attempt(self, uniforms: FloatArray) -> None:
-        """Try the straight line between two places of the path.
+        """Try the straight line between the tested configurations next to two places of the path.
 
         Args:
             uniforms: (2,) the places, as shares of the length.
         """
         self.num_attempts += 1
-        places = sorted(float(share) * self.length for share in uniforms)
-        (first, one), (last, two) = (place_on_path(self.nodes, self.lengths, at) for at in places)
+        (first, one), (last, two) = (
+            place_on_path(self.nodes, self.lengths, at, self._edges.resolution)
+            for at in sorted(float(share) * self.length for share in uniforms)
+        )
         if first == last:  # the line between them is already part of the path
             return
         kept = [*self.nodes[: first + 1], one, two, *self.nodes[last + 1 :]]
@@ -60,8 +72,8 @@ class ShortenedPath:
         rows = [kept[0], *(b for a, b in itertools.pairwise(kept) if (a != b).any())]
         found = np.array(rows)
         lengths = lengths_along(found)
-        if lengths[-1] < self.length and self._is_free(first, last, one, two):
-            self.nodes, self.lengths = found, lengths
+        if lengths[-1] < self.length and self._edges.is_free(one, two):
+            self._take(found, lengths)
 
     def cut_corners(self) -> None:
         """Cut every corner whose cut is free, if all that is left of the segments is free, too."""
@@ -78,13 +90,9 @@ class ShortenedPath:
         left = [(a, b) for a, b in edges if a.tobytes() + b.tobytes() not in tested]
         lengths = lengths_along(found)
         if lengths[-1] < self.length and all(self._edges.is_free(a, b) for a, b in left):
-            self.nodes, self.lengths = found, lengths
+            self._take(found, lengths)
 
-    def _is_free(self, first: int, last: int, one: FloatArray, two: FloatArray) -> bool:
-        """Whether the new edge is free, and what is left of the segments at both of its ends."""
-        before, behind = self.nodes[first], self.nodes[last + 1]
-        return all(
-            self._edges.is_free(a, b)
-            for a, b in ((one, two), (before, one), (two, behind))
-            if (a != b).any()
-        )
+    def _take(self, nodes: FloatArray, lengths: FloatArray) -> None:
+        """Go on with a shorter path."""
+        self._before.append(self.nodes)
+        self.nodes, self.lengths = nodes, lengths

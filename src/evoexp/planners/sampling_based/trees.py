@@ -9,7 +9,12 @@ from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
 from evoexp.collision.planar.link_ellipses import EllipseConfigurations
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.sampling_based.kernels import nearest_node, step_toward, tested_configurations
+from evoexp.planners.sampling_based.kernels import (
+    LANES,
+    nearest_node,
+    step_toward,
+    tested_configurations,
+)
 from evoexp.records import FloatArray, IntArray
 
 ROOM = 256  # nodes that a tree has room for at first
@@ -19,37 +24,37 @@ class EdgeTest:
     """Tests straight edges, and counts the configurations that were asked for.
 
     Attributes:
-        queries: Configurations asked for so far, also those behind the first contact of an edge.
+        queries: Configurations looked at so far: none behind the eight of an edge's first contact.
     """
 
     def __init__(
         self,
         collision: SphereCollision | CoveredCollision | EllipseConfigurations,  # the model
         resolution: float,  # greatest distance of configurations that are tested [deg]
-        # judge the edges that the model calls free; None: the model is trusted
+        # judge the edges of paths that the model calls free; None: the model is trusted
         proofs: Proofs | None = None,
     ) -> None:
         """Begin with no query."""
-        self._collision, self._resolution, self.queries = collision, resolution, 0
+        self._collision, self.resolution, self.queries = collision, resolution, 0
         self._proofs = proofs
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
         """Whether an edge is free at the configurations tested; its first end is known to be.
 
-        Its second end is asked for first, and the others only if that one is free. With proofs an
-        edge is free only if all that lies between its ends is proven, too.
+        They are asked for eight at a time, up to the first contact; the second end is the first.
         """
-        if not self.is_free_at(two):
-            return False
-        inside = tested_configurations(one, two, self._resolution)[:, 1:]
-        self.queries += inside.shape[1]
-        if inside.size and self._collision.any_collides(np.ascontiguousarray(inside)):
-            return False
-        return self.is_proven(np.stack([one, two]))
+        return self._are_free(tested_configurations(one, two, self.resolution))
 
-    def is_proven(self, path: FloatArray) -> bool:
-        """Whether the certifier proves a path (nodes, nq) [deg]; True where none is asked for."""
-        return self._proofs is None or self._proofs.is_proven(path.ravel())
+    def unproven(self, path: FloatArray) -> int:
+        """Return the first edge of a path (nodes, nq) [deg] that is not proven; −1 if all are.
+
+        All are where no proof is asked for. An edge that was judged before is not judged again.
+        """
+        if self._proofs is not None:
+            for k in range(len(path) - 1):
+                if not self._proofs.is_proven(path[k : k + 2].ravel()):
+                    return k
+        return -1
 
     def certificates(self) -> dict[str, float]:
         """Return how many paths and edges were judged as a term; none where none are."""
@@ -59,13 +64,18 @@ class EdgeTest:
 
     def is_free_at(self, q: FloatArray) -> bool:
         """Whether one configuration (nq,) [deg] is free."""
-        self.queries += 1
-        return not self._collision.any_collides(np.ascontiguousarray(q[:, None]))
+        return self._are_free(np.ascontiguousarray(q[:, None]))
+
+    def _are_free(self, q: FloatArray) -> bool:
+        """Whether configurations (nq, configurations) [deg] are free."""
+        num_free = self._collision.num_free(q)
+        self.queries += min(q.shape[1], num_free + LANES)
+        return bool(num_free == q.shape[1])
 
     def num_contacts(self, path: FloatArray) -> int:
         """Return how many of the configurations tested on a path (nodes, nq) collide."""
         edges = itertools.pairwise(path)
-        tested = [tested_configurations(one, two, self._resolution) for one, two in edges]
+        tested = [tested_configurations(one, two, self.resolution) for one, two in edges]
         if not tested:
             return 0
         q = np.concatenate(tested, axis=1)
@@ -109,6 +119,20 @@ class Tree:
         index, self.count = self.count, self.count + 1
         self._nodes[:, index], self._parents[index] = q, parent
         return index
+
+    def cut(self, one: FloatArray, two: FloatArray) -> None:
+        """Remove the edge between two nodes, if there is one, and all that grew behind it."""
+        ends = {one.tobytes(), two.tobytes()}
+        kept = np.ones(self.count, dtype=np.bool_)
+        for k in range(1, self.count):  # parents are older than their children
+            parent = int(self._parents[k])
+            edge = {self.node(k).tobytes(), self.node(parent).tobytes()}
+            kept[k] = kept[parent] and edge != ends
+        places = np.cumsum(kept) - 1
+        parents = self.parents[kept]
+        nodes, self.count = self._nodes[:, : self.count][:, kept], len(parents)
+        self._nodes[:, : self.count] = nodes
+        self._parents[: self.count] = np.where(parents < 0, -1, places[parents])
 
     def nearest(self, q: FloatArray) -> int:
         """Return the node that is nearest to q, the oldest among equals."""
@@ -160,7 +184,8 @@ class TreePair:
             target: (nq,) q_rand [deg].
 
         Returns:
-            The path from start to goal (nodes, nq) if the trees have met; None if not.
+            The path from start to goal (nodes, nq) if the trees have met and it is proven, where
+            that is asked for; None if not. The first edge that is not is cut from its tree.
         """
         turn = self.num_iterations % 2
         self.num_iterations += 1
@@ -175,7 +200,12 @@ class TreePair:
         # both branches end at the same configuration, which stays once
         branches = own.branch(extended.node), other.branch(met.node)
         first, last = branches if turn == 0 else branches[::-1]
-        return np.concatenate([first, last[-2::-1]])
+        path = np.concatenate([first, last[-2::-1]])
+        if (edge := self._edges.unproven(path)) < 0:
+            return path
+        for tree in self.trees:
+            tree.cut(path[edge], path[edge + 1])
+        return None
 
     def _extend(self, tree: Tree, near: int, target: FloatArray) -> Growth:
         """EXTEND from a given node: one step."""

@@ -156,7 +156,7 @@ def test_no_global_randomness_and_nothing_irreproducible() -> None:
     [
         ("evoexp", ("numpy", "pandas", "hydra", "pinocchio")),
         ("evoexp.cli", ("numpy", "pandas", "hydra", "pinocchio", "numba", "matplotlib")),
-        ("evoexp.evolution.selection", ("hydra", "pandas", "pinocchio", "matplotlib")),
+        ("evoexp.evolution.operators.selection", ("hydra", "pandas", "pinocchio", "matplotlib")),
         ("evoexp.paths.redistribution", ("hydra", "pandas", "pinocchio", "matplotlib")),
         ("evoexp.store.log", ("hydra", "pandas", "pinocchio", "matplotlib", "pyarrow")),
         ("evoexp.batch.replicate", ("hydra", "matplotlib", "pandas")),

@@ -99,3 +99,26 @@ def flip_strings(draws: Block, strings: IntArray, bits: int, count: int, rate: f
         place += 1 + int(passed)
         individual, bit = place // num, place % num
         strings[bit // bits, individual] ^= 1 << (bits - 1 - bit % bits)
+
+
+@kernel
+def decode_bits(bits: FloatArray, count: int, limits: FloatArray, out: FloatArray) -> None:
+    """Decode plain binary numbers n of B bits, the highest first: l + (h − l) n / (2^B − 1).
+
+    Args:
+        bits: (genes × B, ≥ count) 0.0 or 1.0, gene by gene.
+        count: Individuals.
+        limits: (genes, 2) l and h of each gene.
+        out: (genes, ≥ count), written.
+    """
+    num = len(bits) // len(out)
+    greatest = 0.0
+    for _ in range(num):
+        greatest = 2.0 * greatest + 1.0
+    for gene in range(len(out)):
+        low, high = limits[gene, 0], limits[gene, 1]
+        for k in range(count):
+            number = 0.0
+            for bit in range(num):
+                number = 2.0 * number + bits[gene * num + bit, k]
+            out[gene, k] = low + (high - low) * (number / greatest)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.random_stream import Block, draw_many, used_up
 from evoexp.records import FloatArray, IntArray

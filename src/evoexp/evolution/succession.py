@@ -5,6 +5,24 @@ from evoexp.records import FloatArray, IntArray
 
 
 @kernel
+def choose_elites(costs: FloatArray, chosen: IntArray) -> None:
+    """Write the indices of the lowest costs, best first; among equals the lower index wins.
+
+    By insertion: a later equal cost stays behind.
+    """
+    count, filled = len(chosen), 0
+    for k in range(len(costs)):
+        if filled == count and (count == 0 or not costs[k] < costs[chosen[count - 1]]):
+            continue
+        place = filled if filled < count else count - 1
+        while place > 0 and costs[k] < costs[chosen[place - 1]]:
+            chosen[place] = chosen[place - 1]
+            place -= 1
+        chosen[place] = k
+        filled = min(filled + 1, count)
+
+
+@kernel
 def follow_rows(
     population: FloatArray,
     offspring: FloatArray,

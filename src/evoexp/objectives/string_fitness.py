@@ -71,14 +71,6 @@ def weigh(
 
 
 @kernel
-def fill_wheel(fitness_offset: float, costs: FloatArray, weights: FloatArray) -> None:
-    """Write the paper's roulette weights max(F, 0) of costs (individuals,)."""
-    for k in range(len(costs)):
-        fitness = fitness_offset - costs[k]
-        weights[k] = fitness if fitness > 0.0 else 0.0
-
-
-@kernel
 def count_collisions(clearance: FloatArray, collisions: FloatArray) -> None:
     """Count the instants at which each individual collides (Eq. 6).
 

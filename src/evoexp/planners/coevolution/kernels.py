@@ -6,16 +6,10 @@ import numpy as np
 
 from evoexp.collision.models.link_crossing_kernels import crossings, link_points, tolerance_of
 from evoexp.evolution.best_team import CollisionCounts
-from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
-from evoexp.evolution.mutation import mutate_allele
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.pareto import non_dominated
-from evoexp.evolution.selection import (
-    choose_elites,
-    difference_weights,
-    inverse_weights,
-    spin_roulette,
-)
+from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions
@@ -29,10 +23,10 @@ class Heredity(NamedTuple):
     """The rules by which one generation follows another."""
 
     num_elites: int  # individuals copied untouched
-    inverse: bool  # whether weights on the wheel are inverse costs; else differences to the highest
-    crossover_rate: float  # probability that a pair is crossed
-    mutation_step: float  # largest change of an allele (Eq. 9) [rad].
-    symmetric: bool  # whether alleles may decrease, too
+    breeding: Breeding  # rules of the operators
+    # (hall's teams + 1, 3) uniform numbers that selection, crossover and mutation of a robot take
+    # where the hall holds so many teams
+    sizes: IntArray
     moving: BoolArray  # (robots,) false for robots that stand still
     hall: Hall  # with room for as many teams as it may hold
     rules: HallRules  # which teams it takes
@@ -42,18 +36,13 @@ class Heredity(NamedTuple):
 
 
 @kernel
-def num_uniforms(count: int) -> int:
-    """Return how many numbers `breed` takes for so many offspring of a robot.
-
-    One for each parent, two for each pair that may be crossed, three for each mutation.
-    """
-    return count + 2 * (count // 2) + 3 * count
-
-
-@kernel
-def breed(
+def breed_robots(
+    select: Select,
+    cross: Cross,
+    mutate: Mutate,
     # (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation
     uniforms: FloatArray,
+    index: int,  # of the present generation
     mutation_rate: float,  # probability that an allele of an individual is mutated (Eq. 10).
     populations: FloatArray,  # (robots, genes, individuals)
     costs: FloatArray,  # (robots, individuals)
@@ -63,38 +52,33 @@ def breed(
     bred: FloatArray,  # like populations, written
 ) -> None:
     """Write the next populations: offspring, then elites, then members of the hall, unchanged."""
-    size, num_elites = populations.shape[2], heredity.num_elites
+    size, num_elites, sizes = populations.shape[2], heredity.num_elites, heredity.sizes[len(teams)]
     count = size - num_elites - len(teams)
-    last = count + 2 * (count // 2)  # behind the numbers of cross-over
-    weights, parents = np.empty(size), np.empty(count, dtype=np.int64)
-    elites = np.empty(num_elites, dtype=np.int64)
-    row = 0
+    parents, elites = np.empty(count, dtype=np.int64), np.empty(num_elites, dtype=np.int64)
+    rules, normals, row = heredity.breeding, np.empty((0, 0)), 0
     for robot in range(len(populations)):
         if not heredity.moving[robot]:
             bred[robot] = populations[robot]
             continue
         draws, genes, before = uniforms[row], bred[robot], populations[robot]
-        row += 1
-        # parents by roulette
-        if heredity.inverse:
-            inverse_weights(costs[robot], weights)
-        else:
-            difference_weights(costs[robot], weights)
-        spin_roulette(weights, draws[:count], parents)
-        # single-point cross-over of neighbours
-        cross_single_point(draws[count:last], before, parents, heredity.crossover_rate, genes)
-        # mutation of one allele (Eq. 9)
-        mutate_allele(
-            draws[last:],
-            genes,
-            count,
+        own, row = costs[robot], row + 1
+        breed(
+            select,
+            cross,
+            mutate,
+            draws,
+            normals,
+            sizes,
+            index,
             mutation_rate,
-            heredity.mutation_step,
-            HALF_TURN,
-            heredity.symmetric,
+            rules,
+            own,
+            before,
+            parents,
+            genes,
         )
         # elites and members of the hall, untouched
-        choose_elites(costs[robot], elites)
+        choose_elites(own, elites)
         copy_members(before, elites, genes, count)
         copy_members(before, teams[:, robot], genes, count + num_elites)
     for k in range(len(teams)):

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.models.ellipse_kernels import PathChecks, prepare_checks
+from evoexp.evolution.bit_coding import decode_bits
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.mutation import NON_UNIFORM, decode_bits, non_uniform_spread
-from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
+from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.planners.redundant_ga.breeding import Breeding, Draws, breed
 from evoexp.planners.redundant_ga.sub_path_costs import (
     RESULTS,
     Judging,
@@ -25,6 +25,14 @@ from evoexp.planners.redundant_ga.sub_path_costs import (
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 SUMMARY = 4  # of a population: see `summarise_costs`
+
+
+class Coding(NamedTuple):
+    """The meaning of genes."""
+
+    num_genes: int
+    binary: bool  # whether they are bits
+    limits: FloatArray  # (joints, 2) of the joint angles [rad]
 
 
 class Generations(NamedTuple):
@@ -41,20 +49,23 @@ class Memory(NamedTuple):
     elites: IntArray  # (elites,) likewise
     lanes: IntArray  # (individuals + LANES,) scratch
     hit: BoolArray  # (individuals,) scratch
-    num_choosing: int  # uniform numbers for the choice of parents
-    num_crossing: int  # the same for crossover
 
 
 @kernel
 def evolve(
+    select: Select,
+    cross: Cross,
+    mutate: Mutate,
     uniforms: FloatArray,  # (generations, numbers) of those to be computed
-    normals: FloatArray,  # normal deviates, of one generation only; see `Draws`
+    normals: FloatArray,  # normal deviates, of one generation only; see `breed`
     first: int,  # the present generation
     stop_cost: float,  # the first generation whose best costs less ends the search
     # whether generations are bred; if not, each is drawn as the initial one is, as many individuals
     # as would be bred
     evolving: bool,
+    sizes: IntArray,  # (3,) uniform numbers for selection, crossover and mutation
     breeding: Breeding,
+    coding: Coding,
     judging: Judging,
     starts: FloatArray,  # (joints, ≥ individuals) start of the sub-path, the same for all [rad]
     generations: Generations,
@@ -65,24 +76,41 @@ def evolve(
     Returns:
         The last generation that was computed.
     """
-    uniforms, normals, starts, breeding, judging, generations, memory = borrowed(
-        (uniforms, normals, starts, breeding, judging, generations, memory)
+    uniforms, normals, starts, breeding, coding, judging, generations, memory = borrowed(
+        (uniforms, normals, starts, breeding, coding, judging, generations, memory)
     )
     tables, summaries = generations
     count, last = len(memory.parents), first + len(uniforms)
     checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
     for index in range(first, last):
         own, other = index % len(tables), (index + 1) % len(tables)
-        following = tables[other]
-        costs = following[len(following) - RESULTS]
+        population, following, numbers = tables[own], tables[other], uniforms[index - first]
+        costs = following[len(following) - RESULTS, : len(memory.hit)]
         if evolving:
-            draws = _drawn(uniforms[index - first], normals, memory)
-            advance(draws, index, breeding, judging, starts, tables[own], following, memory, checks)
+            # elites, and offspring of genomes
+            before = population[len(population) - RESULTS, : len(memory.hit)]
+            choose_elites(before, memory.elites)
+            genomes, children = population[: coding.num_genes], following[: coding.num_genes]
+            rate, parents = breeding.mutation_rate, memory.parents
+            breed(
+                select,
+                cross,
+                mutate,
+                numbers,
+                normals,
+                sizes,
+                index,
+                rate,
+                breeding,
+                before,
+                genomes,
+                parents,
+                children,
+            )
+            succeed(coding, judging, starts, population, following, memory, checks)
         else:
-            numbers = uniforms[index - first]
-            draw(numbers, count, breeding, judging, starts, following, memory, checks)
+            draw(numbers, count, coding, judging, starts, following, memory, checks)
             costs = costs[:count]
-        costs = costs[: len(memory.hit)]
         summarise_costs(costs, summaries[other])
         if costs[int(summaries[other, 0])] < stop_cost:
             return index + 1
@@ -92,7 +120,7 @@ def evolve(
 @kernel
 def begin(
     uniforms: FloatArray,  # (genes · individuals,)
-    breeding: Breeding,
+    coding: Coding,
     judging: Judging,
     starts: FloatArray,
     generations: Generations,
@@ -101,22 +129,15 @@ def begin(
     """Draw and judge the initial population, at place 0; see `evolve`."""
     (tables, summaries), size = generations, len(memory.hit)
     checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
-    draw(uniforms, size, breeding, judging, starts, tables[0], memory, checks)
+    draw(uniforms, size, coding, judging, starts, tables[0], memory, checks)
     summarise_costs(tables[0, len(tables[0]) - RESULTS, :size], summaries[0])
-
-
-@kernel
-def _drawn(uniforms: FloatArray, normals: FloatArray, memory: Memory) -> Draws:
-    """Return the random numbers of a generation, by their use."""
-    chosen, crossed = memory.num_choosing, memory.num_choosing + memory.num_crossing
-    return Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
 
 
 @kernel
 def draw(
     uniforms: FloatArray,  # (genes · count,)
     count: int,
-    breeding: Breeding,
+    coding: Coding,
     judging: Judging,
     starts: FloatArray,
     table: FloatArray,
@@ -124,37 +145,35 @@ def draw(
     checks: PathChecks,
 ) -> None:
     """Draw and judge the first `count` individuals, uniform within the limits or bit by bit."""
-    num_genes, limits = breeding.num_genes, breeding.limits
+    num_genes, limits = coding.num_genes, coding.limits
     for gene in range(num_genes):
         row, numbers = table[gene], uniforms[gene * count : (gene + 1) * count]
-        if breeding.binary:
+        if coding.binary:
             for k in range(count):
                 row[k] = np.floor(2.0 * numbers[k])
         else:
             low, wide = limits[gene, 0], limits[gene, 1] - limits[gene, 0]
             for k in range(count):
                 row[k] = low + wide * numbers[k]
-    angles = _angles(table, count, breeding, len(starts))
+    angles = _angles(table, count, coding, len(starts))
     measure(starts, angles, count, judging, table)
     lanes, left = memory.lanes, list_inside(table, count, memory.lanes)
     drop_collisions(starts, angles, lanes, left, judging, table, memory.hit, checks)
 
 
 @kernel
-def _angles(table: FloatArray, count: int, breeding: Breeding, num_joints: int) -> FloatArray:
+def _angles(table: FloatArray, count: int, coding: Coding, num_joints: int) -> FloatArray:
     """Return the rows of the joint angles of a table; those of the first `count` are decoded."""
-    first = breeding.num_genes if breeding.binary else 0
+    first = coding.num_genes if coding.binary else 0
     angles = table[first : first + num_joints]
-    if breeding.binary:
-        decode_bits(table[: breeding.num_genes], count, breeding.limits, angles)
+    if coding.binary:
+        decode_bits(table[: coding.num_genes], count, coding.limits, angles)
     return angles
 
 
 @kernel
-def advance(
-    draws: Draws,
-    index: int,
-    breeding: Breeding,
+def succeed(
+    coding: Coding,
     judging: Judging,
     starts: FloatArray,
     population: FloatArray,
@@ -162,19 +181,10 @@ def advance(
     memory: Memory,
     checks: PathChecks,
 ) -> None:
-    """Write the population that follows generation `index`: offspring, then elites, best first."""
-    elites, count, num_genes = memory.elites, len(memory.parents), breeding.num_genes
-    costs = population[len(population) - RESULTS, : len(memory.hit)]
-    choose_elites(costs, elites)
-    # offspring, decoded and judged
-    spread = breeding.mutation_std
-    if breeding.mutation == NON_UNIFORM:
-        spread = non_uniform_spread(index, breeding.num_generations, breeding.mutation_power)
-    genomes, children = population[:num_genes], following[:num_genes]
-    breed(draws, spread, breeding, costs, genomes, memory.parents, children)
-    angles = _angles(following, count, breeding, len(starts))
+    """Judge the offspring in the population that follows another; put the elites behind them."""
+    elites, count, num_genes = memory.elites, len(memory.parents), coding.num_genes
+    angles = _angles(following, count, coding, len(starts))
     judge_children(starts, angles, num_genes, judging, population, following, memory, checks)
-    # succession
     for row in range(len(population)):
         for k in range(len(elites)):
             following[row, count + k] = population[row, elites[k]]

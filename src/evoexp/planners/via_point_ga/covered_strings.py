@@ -1,23 +1,20 @@
 """Strings of via-points of robots whose bodies are covered: they keep within the joints' limits.
 
-A generation goes through the same steps as one of `strings`, between kernels of their own: what
-covered bodies are tested for takes far longer than what Python does between the steps.
+A generation goes through the same steps as one of `strings`, each a call of its own: testing
+covered bodies takes far longer than Python takes between the steps.
 """
-
-from collections.abc import Callable
 
 import numpy as np
 
 from evoexp.collision.models.covered_bodies import CoveredCollision
-from evoexp.evolution.selection import choose_elites
-from evoexp.numeric.elementary import DEGREE
+from evoexp.evolution.operators.breeding import breed
+from evoexp.evolution.succession import choose_elites
 from evoexp.objectives.string_fitness import count_collisions, weigh
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
-from evoexp.planners.arm_tasks import UNLIMITED
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
+from evoexp.planners.via_point_ga.strings import Judgement, Problem, Run, Strings
 from evoexp.records import FloatArray
 
 
@@ -30,9 +27,7 @@ class CoveredStrings(Strings):
         super().__init__(planner, problem)
         assert isinstance(problem.collision, CoveredCollision)
         self.collision = problem.collision
-        model = problem.assembly.model
-        limits = np.array([model.lowerPositionLimit, model.upperPositionLimit])
-        low, high = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
+        low, high = problem.limits.T
         # ends that lie on a limit lie within it, whatever the last bit of the conversion is
         self.low = np.minimum(low, np.minimum(problem.start, problem.goal))[:, None, None]
         self.high = np.maximum(high, np.maximum(problem.start, problem.goal))[:, None, None]
@@ -54,29 +49,23 @@ class CoveredStrings(Strings):
         self._judge(strings, judged)
         return judged
 
-    def evolver(
-        self, table: kernels.Population, summaries: FloatArray
-    ) -> Callable[[FloatArray, int], None]:
-        """Return a function that goes on from a generation to those behind it; see `Strings`."""
-        scratch, counts, places = self.scratch(), self.counts, len(summaries)
-        judged = Judgement(scratch.terms.cost, scratch.terms, 0)
-
-        def go_on(uniforms: FloatArray, first: int) -> None:
-            for step, drawn in enumerate(uniforms, start=first):
-                population, following = (
-                    kernels.Population(*(array[g % places] for array in table))
-                    for g in (step, step + 1)
-                )
-                strings, costs, _ = population
-                choose_elites(costs, scratch.elites)
-                slices, offspring = self.problem.arm_slices, scratch.offspring
-                kernels.breed(drawn, counts, slices, self.breeding, strings, costs, offspring)
-                self.smooth(offspring, counts.offspring)
-                self._judge(offspring, judged)
-                kernels.follow(population, scratch, counts.offspring, following)
-                kernels.summarise_strings(*following[1:], summaries[(step + 1) % places])
-
-        return go_on
+    def evolve(self, run: Run, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+        """Go on from a generation to those behind it; see `Strings`."""
+        (offspring, terms, elites, parents), places = run.scratch, len(run.summaries)
+        judged, rate = Judgement(terms.cost, terms, 0), run.breeding.mutation_rate
+        for index, numbers in enumerate(uniforms, start=first):
+            before, after = (
+                kernels.Population(*(array[g % places] for array in run.table))
+                for g in (index, index + 1)
+            )
+            choose_elites(before.costs, elites)
+            rules = run.sizes, index, rate, run.breeding, before.costs
+            genomes, children = kernels.by_gene(before.strings), kernels.by_gene(offspring)
+            breed(*run.operators, numbers, normals, *rules, genomes, parents, children)
+            self.smooth(offspring, len(parents))
+            self._judge(offspring, judged)
+            kernels.follow(before, run.scratch, after)
+            kernels.summarise_strings(*after[1:], run.summaries[(index + 1) % places])
 
     def _judge(self, strings: FloatArray, judged: Judgement) -> None:
         """Write the terms of strings (Eqs. 2–7)."""

@@ -1,14 +1,14 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.models.touching_spheres import SphereCollision
-from evoexp.evolution import crossover
+from evoexp.evolution.operators.breeding import Breeding
+from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk_strings
@@ -17,7 +17,7 @@ from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.table_search import generations_per_call
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.records import BoolArray, FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 
 LANES = 8  # individuals are padded to whole vectors
 PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
@@ -100,26 +100,24 @@ class Judgement(NamedTuple):
         return named | {"collisions": float(collisions[individual])}
 
 
+class Run(Protocol):
+    """One run: its operators, and memory for its generations."""
+
+    operators: tuple[Any, Any, Any]  # kernels of selection, crossover and mutation
+    breeding: Breeding  # their rules
+    sizes: IntArray  # (3,) uniform numbers that each takes
+    table: kernels.Population  # of some generations
+    scratch: kernels.Scratch
+    summaries: FloatArray  # (places, 4) see `kernels.summarise_strings`
+
+
 class Strings:
     """The population-wide steps of one planner on one problem."""
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
-        self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
-        self.num_arms, max_turn = len(problem.arm_slices), DEGREE * planner.max_turn
+        self.planner, self.problem, spline = planner, problem, problem.spline
+        self.num_arms = len(problem.arm_slices)
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
-        pair_uniforms = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
-        self.counts = kernels.Counts(ga.num_offspring, pair_uniforms, planner.num_new_trajectories)
-        self.breeding = kernels.Breeding(
-            fitness_offset=planner.objective.fitness_offset,
-            crossover_rate=ga.crossover_rate,
-            crossover_distance=planner.crossover_distance,
-            exchanges_segment=planner.crossover_reading == "segment",
-            mutation_rate=ga.mutation_rate,
-            walk_step=planner.walk_step,
-            max_turn=max_turn,
-            start=problem.start,
-            goal=problem.goal,
-        )
         self.smoothing = kernels.Smoothing(
             redistribution=planner.redistribution,
             samples=spline.samples_per_segment,
@@ -142,9 +140,13 @@ class Strings:
         )
 
     @property
-    def num_drawn(self) -> int:
-        """Uniform numbers that a generation takes."""
-        return sum(self.counts) + self.counts.new * (1 + self.num_uniforms)
+    def genome(self) -> Genome:
+        """The coordinates of via-points as operators see them; the ends of a string are fixed."""
+        problem, shape = self.problem, (len(self.problem.start), self.planner.num_via_points + 1)
+        limits = np.empty((*shape, 2))
+        limits[...] = problem.limits[:, None]
+        limits[:, 0], limits[:, -1] = problem.start[:, None], problem.goal[:, None]
+        return Genome(limits.reshape(-1, 2), problem.arm_slices, shape[1])
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
@@ -168,7 +170,7 @@ class Strings:
         """Return new random walks from start to goal (section 3.3), smoothed and padded."""
         problem, strings = self.problem, self.empty(count)
         uniforms, lanes = rng.random((count, self.num_uniforms)), np.arange(count)
-        step, max_turn = self.breeding.walk_step, self.breeding.max_turn
+        step, max_turn = self.planner.walk_step, DEGREE * self.planner.max_turn
         ends = problem.start, problem.goal
         walk_strings(strings, lanes, uniforms, *ends, problem.arm_slices, step, max_turn)
         self.smooth(strings, count)
@@ -190,28 +192,26 @@ class Strings:
         costs, collisions = np.empty((2, places, size))
         return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
 
-    def scratch(self) -> kernels.Scratch:
-        """Return memory that `evolve` takes."""
-        count, elites = self.counts.offspring, np.empty(self.planner.ga.num_elites, int)
-        offspring = self.empty(count)
-        return kernels.Scratch(offspring, self.unjudged(offspring, count).terms, elites)
-
-    def evolver(
-        self, table: kernels.Population, summaries: FloatArray
-    ) -> Callable[[FloatArray, int], None]:
-        """Return a function that goes on from a generation to those behind it (section 3.4).
+    def evolve(self, run: "Run", uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+        """Go on from a generation to those behind it (section 3.4).
 
         Args:
-            table: Of the populations of some generations, written.
-            summaries: (places, 4) written; see `kernels.summarise_strings`.
-
-        Returns:
-            It takes the numbers (generations, `num_drawn`) and the present generation.
+            run: Its operators breed; its generations are written.
+            uniforms: (generations, numbers) in [0, 1).
+            normals: Normal deviates, see `breed`.
+            first: The present generation.
         """
-        settings = kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging)
-        scratch, slices = self.scratch(), self.problem.arm_slices
-        return lambda uniforms, first: kernels.evolve(
-            uniforms, first, slices, settings, table, scratch, summaries
+        settings = kernels.Settings(run.breeding, run.sizes, self.smoothing, self.judging)
+        kernels.evolve(
+            *run.operators,
+            uniforms,
+            normals,
+            first,
+            self.problem.arm_slices,
+            settings,
+            run.table,
+            run.scratch,
+            run.summaries,
         )
 
     def unjudged(self, strings: FloatArray, count: int) -> Judgement:

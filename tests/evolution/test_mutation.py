@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp import testing as drawn
 from evoexp.evolution.operators.mutation import AlleleMutation
-from evoexp.evolution.operators.operator import Context, Genome
+from evoexp.evolution.operators.operator import Genome
+from evoexp.testing import operator_checks as drawn
 
 LIMIT, STEP = np.pi, np.pi / 5.0
 LAST = np.nextafter(1.0, 0.0)  # the largest uniform number there can be
@@ -27,8 +27,8 @@ def mutated(
 def mutate_one(gene: float, uniforms: list[float], symmetric: bool) -> float:
     """Return what becomes of a genome of one gene by three uniform numbers."""
     genomes, operator = np.full((1, 1), gene), AlleleMutation(step=STEP, symmetric=symmetric)
-    context = Context(1.0, 0.0, operator.settings, genome_of(genomes))
-    operator.mutate(np.array(uniforms), np.empty((0, 0)), genomes, 1, context)
+    context = drawn.context_of(operator, np.array(uniforms), 1.0, genome_of(genomes))
+    operator.mutate(genomes, 1, context)
     return genomes.item()
 
 

@@ -54,13 +54,7 @@ class Forgetful(OnePoint):
     component: ClassVar[str] = "forgetful"
 
     @staticmethod
-    def cross(  # type: ignore[override]
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         out[:, : len(parents) // 2] = genomes[:, parents[: len(parents) // 2]]
 
 
@@ -70,10 +64,8 @@ class Escaping(UniformReset):
     component: ClassVar[str] = "escaping"
 
     @staticmethod
-    def mutate(  # type: ignore[override]
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
-        genomes[:, :count] += np.where(uniforms.reshape(-1, count) < context.rate, 9.0, 0.0)
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
+        genomes[:, :count] += np.where(context.uniforms.reshape(-1, count) < context.rate, 9.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp import testing as drawn
 from evoexp.evolution.operators.crossover import OnePoint
-from evoexp.evolution.operators.operator import Context, Genome
+from evoexp.evolution.operators.operator import Genome
+from evoexp.testing import operator_checks as drawn
 
 
 def population(num_genes: int = 8, individuals: int = 12) -> np.ndarray:
@@ -91,6 +91,7 @@ def test_sites_and_rate_are_drawn_evenly() -> None:
 
 def test_the_last_site_is_the_last_gene_even_for_the_largest_draw() -> None:
     genomes, out = population(), np.empty((8, 2))
-    context = Context(1.0, 0.0, np.empty(0), genome_of(genomes))
-    OnePoint.cross(np.array([0.0, np.nextafter(1.0, 0.0)]), genomes, np.array([0, 1]), context, out)
+    uniforms = np.array([0.0, np.nextafter(1.0, 0.0)])
+    context = drawn.context_of(OnePoint(), uniforms, 1.0, genome_of(genomes))
+    OnePoint.cross(genomes, np.array([0, 1]), context, out)
     assert (out[:, 0] != genomes[:, 0]).tolist() == [False] * 7 + [True]

@@ -44,7 +44,7 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     return cast(Function, numba.njit(**options)(function))
 
 
-class KernelAddress(numba.types.WrapperAddressProtocol):  # type: ignore[misc]  # untyped
+class KernelAddress(numba.types.WrapperAddressProtocol):
     """A kernel that other kernels take as an argument, by its address and the types it takes.
 
     They are compiled once for all kernels of a signature, and kept; were they handed the kernel

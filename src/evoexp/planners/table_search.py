@@ -173,7 +173,6 @@ class GeneticSearch(TableSearch):
     Attributes:
         operators: Their kernels, the first arguments of a kernel that breeds.
         breeding: Their rules.
-        sizes: (3,) uniform numbers that each takes.
         num_drawn: Uniform numbers of a generation.
         num_normals: Normal deviates of a generation: genes, offspring.
         parents: (offspring,) memory.
@@ -192,9 +191,9 @@ class GeneticSearch(TableSearch):
         # normal deviates take no fixed number of uniform ones: generations are drawn one by one
         takes_normals, count = operators.mutation.takes_normals, ga.num_offspring
         super().__init__(ga, 1 if takes_normals else per_call)
-        self.operators, self.breeding = operators.addresses, Breeding.of(operators, genome, ga)
-        self.sizes = operators.sizes(genome, ga.population_size, count)
-        self.num_drawn = int(self.sizes.sum())
+        self.operators = operators.addresses
+        self.breeding = Breeding.of(operators, genome, ga, [count])
+        self.num_drawn = int(self.breeding.sizes.sum())
         self.num_normals = len(genome.limits) if takes_normals else 0, count
         self.parents, self.elites = (np.empty(n, np.int64) for n in (count, ga.num_elites))
 

@@ -2,11 +2,24 @@
 
 import numpy as np
 
-from evoexp.evolution.operators.operator import Context, Crossover, Genome, Mutation, Selection
+from evoexp.evolution.operators.operator import (
+    Context,
+    Crossover,
+    Genome,
+    Mutation,
+    Operator,
+    Selection,
+)
 from evoexp.records import FloatArray, IntArray
 from evoexp.testing.evolution_record import ContractBroken
 
 NUM_GENES, SIZE, SPARE = 6, 9, 4  # of a small population; SPARE columns pad the offspring
+NOTHING = np.empty((0, 2))
+
+
+def context_of(operator: Operator, uniforms: FloatArray, rate: float, genome: Genome) -> Context:
+    """Return the context of an operator in the initial generation, without normal deviates."""
+    return Context(uniforms, NOTHING, rate, 0.0, operator.settings, genome)
 
 
 def selected(
@@ -15,7 +28,7 @@ def selected(
     """Return the indices of `count` parents, drawn by costs (individuals,)."""
     parents = np.full(count, -1)
     uniforms = rng.random(operator.num_uniforms(len(costs), count))
-    operator.select(uniforms, costs, operator.settings, parents)
+    operator.select(costs, context_of(operator, uniforms, 1.0, Genome.of(NOTHING)), parents)
     return parents
 
 
@@ -30,8 +43,7 @@ def crossed(
     """Return the offspring (genes, parents) of a population (genes, individuals)."""
     out = np.full((len(genomes), len(parents) + SPARE), np.nan)
     uniforms = rng.random(operator.num_uniforms(genome, len(parents)))
-    context = Context(rate, 0.0, operator.settings, genome)
-    operator.cross(uniforms, genomes, parents, context, out)
+    operator.cross(genomes, parents, context_of(operator, uniforms, rate, genome), out)
     _check(bool(np.isnan(out[:, len(parents) :]).all()), operator, "leaves the padding alone")
     return out[:, : len(parents)]
 
@@ -49,13 +61,13 @@ def mutated(
     out = np.pad(genomes, [(0, 0), (0, SPARE)], constant_values=np.nan)
     uniforms = rng.random(operator.num_uniforms(genome, count))
     normals = rng.standard_normal((num_genes, count) if operator.takes_normals else (0, 0))
-    context = Context(rate, progress, operator.settings, genome)
-    operator.mutate(uniforms, normals, out, count, context)
+    context = context_of(operator, uniforms, rate, genome)
+    operator.mutate(out, count, context._replace(normals=normals, progress=progress))
     _check(bool(np.isnan(out[:, count:]).all()), operator, "leaves the padding alone")
     return out[:, :count]
 
 
-def check_operator(operator: Selection | Crossover | Mutation) -> None:
+def check_operator(operator: Operator) -> None:
     """Check the obligations of an operator on small populations.
 
     Parents are individuals; at the rate 0 nobody is changed; every gene is written and within its
@@ -71,7 +83,7 @@ def check_operator(operator: Selection | Crossover | Mutation) -> None:
             costs = np.where(rng.random(SIZE) < 0.3, np.inf, rng.random(SIZE))
             parents = selected(operator, rng, costs, count)
             _check(bool(((parents >= 0) & (parents < SIZE)).all()), operator, "draws individuals")
-        else:
+        elif isinstance(operator, Crossover | Mutation):
             _check_children(operator, rng, rng.integers(0, SIZE, count))
 
 
@@ -95,6 +107,6 @@ def _check_children(
     _check(np.array_equal(found, children(0.8)), operator, "gives the same bits again")
 
 
-def _check(is_kept: bool, operator: Selection | Crossover | Mutation, obligation: str) -> None:
+def _check(is_kept: bool, operator: Operator, obligation: str) -> None:
     if not is_kept:
         raise ContractBroken(f"operator {operator.component!r}: is one that {obligation}")

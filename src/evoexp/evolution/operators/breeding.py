@@ -1,6 +1,6 @@
 """Offspring of a population by the operators of a configuration, compiled."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -9,9 +9,8 @@ from evoexp.evolution.operators.operator import Context, Crossover, Genome, Muta
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.records import FloatArray, IntArray
 
-Select = Callable[[FloatArray, FloatArray, FloatArray, IntArray], None]
-Cross = Callable[[FloatArray, FloatArray, IntArray, Context, FloatArray], None]
-Mutate = Callable[[FloatArray, FloatArray, FloatArray, int, Context], None]
+Select = Cross = Mutate = Any
+"""Kernels of operators, by their addresses; see `Selection`, `Crossover`, `Mutation`."""
 
 
 class Operators(NamedTuple):
@@ -26,22 +25,6 @@ class Operators(NamedTuple):
         """Their kernels, as other kernels take them."""
         return self.selection.address, self.crossover.address, self.mutation.address
 
-    def sizes(self, genome: Genome, size: int, count: int) -> IntArray:
-        """Return how many uniform numbers each takes, (3,).
-
-        Args:
-            genome: Of every individual.
-            size: Individuals of the population.
-            count: Offspring.
-        """
-        return np.array(
-            [
-                self.selection.num_uniforms(size, count),
-                self.crossover.num_uniforms(genome, count),
-                self.mutation.num_uniforms(genome, count),
-            ]
-        )
-
 
 class Breeding(NamedTuple):
     """The rules of breeding, as kernels take them."""
@@ -50,16 +33,35 @@ class Breeding(NamedTuple):
     crossover_rate: float  # probability that a pair is crossed
     mutation_rate: float  # probability of a mutation, of whatever the operator mutates
     num_generations: int  # T
+    most: int  # offspring
+    # (most − least offspring + 1, 3) uniform numbers that selection, crossover and mutation take
+    # for so many offspring, the most first
+    sizes: IntArray
     selecting: FloatArray  # settings of the selection
     crossing: FloatArray  # settings of the crossover
     mutating: FloatArray  # settings of the mutation
 
     @classmethod
-    def of(cls, operators: Operators, genome: Genome, ga: Any) -> Self:
-        """Return the rules by which `ga`, a component with rates and generations, breeds."""
+    def of(cls, operators: Operators, genome: Genome, ga: Any, counts: Sequence[int]) -> Self:
+        """Return the rules of breeding.
+
+        Args:
+            genome: Of every individual.
+            ga: A component with the population's size, rates and generations.
+            counts: Numbers of offspring that there may be: each one less than the one before.
+        """
+        selection, crossover, mutation = operators
+        sizes = [
+            (
+                selection.num_uniforms(ga.population_size, count),
+                crossover.num_uniforms(genome, count),
+                mutation.num_uniforms(genome, count),
+            )
+            for count in counts
+        ]
         settings = (operator.settings for operator in operators)
         rates = ga.crossover_rate, ga.mutation_rate
-        return cls(genome, *rates, ga.num_generations, *settings)
+        return cls(genome, *rates, ga.num_generations, counts[0], np.array(sizes), *settings)
 
 
 @kernel
@@ -69,7 +71,6 @@ def breed(
     mutate: Mutate,
     uniforms: FloatArray,  # those of selection, then of crossover, then of mutation
     normals: FloatArray,  # (genes, ≥ offspring) normal deviates, if the mutation takes any
-    sizes: IntArray,  # (3,) see `Operators.sizes`
     index: int,  # t of the parents' generation
     mutation_rate: float,  # on the way to the next one
     breeding: Breeding,
@@ -79,10 +80,12 @@ def breed(
     out: FloatArray,  # (genes, ≥ offspring) written
 ) -> None:
     """Write offspring: selected, crossed and mutated."""
-    progress = index / breeding.num_generations
+    genome, rate, count = breeding.genome, breeding.crossover_rate, len(parents)
+    progress, sizes = index / breeding.num_generations, breeding.sizes[breeding.most - count]
     first, last = sizes[0], sizes[0] + sizes[1]
-    select(uniforms[:first], costs, breeding.selecting, parents)
-    crossing = Context(breeding.crossover_rate, progress, breeding.crossing, breeding.genome)
-    cross(uniforms[first:last], genomes, parents, crossing, out)
-    mutating = Context(mutation_rate, progress, breeding.mutating, breeding.genome)
-    mutate(uniforms[last : last + sizes[2]], normals, out, len(parents), mutating)
+    one, two, three = uniforms[:first], uniforms[first:last], uniforms[last : last + sizes[2]]
+    select(costs, Context(one, normals, 1.0, progress, breeding.selecting, genome), parents)
+    crossing = Context(two, normals, rate, progress, breeding.crossing, genome)
+    cross(genomes, parents, crossing, out)
+    mutating = Context(three, normals, mutation_rate, progress, breeding.mutating, genome)
+    mutate(out, count, mutating)

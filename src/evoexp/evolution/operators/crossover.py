@@ -33,16 +33,10 @@ class OnePoint(Crossover):
 
     @staticmethod
     @kernel
-    def cross(
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
         copy_parents(genomes, parents, out)
-        num_genes = len(genomes)
+        num_genes, uniforms = len(genomes), context.uniforms
         for pair in range(len(parents) // 2):
             first, second = 2 * pair, 2 * pair + 1
             if num_genes > 1 and uniforms[first] < context.rate:
@@ -76,18 +70,12 @@ class UniformCrossover(GeneCrossover):
 
     @staticmethod
     @kernel
-    def cross(
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
         copy_parents(genomes, parents, out)
         num_genes = len(genomes)
         for pair in range(len(parents) // 2):
-            draws = uniforms[pair * (1 + 2 * num_genes) :]
+            draws = context.uniforms[pair * (1 + 2 * num_genes) :]
             if not draws[0] < context.rate:
                 continue
             for gene in range(num_genes):
@@ -106,18 +94,12 @@ class ArithmeticCrossover(GeneCrossover):
 
     @staticmethod
     @kernel
-    def cross(
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
         copy_parents(genomes, parents, out)
         num_genes = len(genomes)
         for pair in range(len(parents) // 2):
-            draws = uniforms[pair * (1 + 2 * num_genes) :]
+            draws = context.uniforms[pair * (1 + 2 * num_genes) :]
             if not draws[0] < context.rate:
                 continue
             for gene in range(num_genes):
@@ -140,18 +122,12 @@ class BlxAlpha(GeneCrossover):
 
     @staticmethod
     @kernel
-    def cross(
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
         copy_parents(genomes, parents, out)
         num_genes, alpha = len(genomes), context.settings[0]
         for pair in range(len(parents) // 2):
-            draws = uniforms[pair * (1 + 2 * num_genes) :]
+            draws = context.uniforms[pair * (1 + 2 * num_genes) :]
             if not draws[0] < context.rate:
                 continue
             for gene in range(num_genes):

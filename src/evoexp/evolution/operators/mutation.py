@@ -23,13 +23,13 @@ class GeneMutation(Mutation):
 
 
 @kernel
-def draw_amounts(uniforms: FloatArray, num_genes: int, count: int, context: Context) -> FloatArray:
+def draw_amounts(num_genes: int, count: int, context: Context) -> FloatArray:
     """Return for every gene (genes, count) how it is mutated: a uniform number, or −1 if it is not.
 
     Where every gene may be, one number decides and, divided by the rate, is the amount: below the
     rate the ratio is uniform again.
     """
-    amounts, rate = np.empty((num_genes, count)), context.rate
+    amounts, rate, uniforms = np.empty((num_genes, count)), context.rate, context.uniforms
     if context.settings[0] == 0.0:
         for gene in range(num_genes):
             for k in range(count):
@@ -63,12 +63,10 @@ class NonUniformMutation(GeneMutation):
 
     @staticmethod
     @kernel
-    def mutate(
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
         """Change offspring; see `Mutation`."""
         spread = pow_int(1.0 - context.progress, int(context.settings[1]))
-        amounts = draw_amounts(uniforms, len(genomes), count, context)
+        amounts = draw_amounts(len(genomes), count, context)
         for gene in range(len(genomes)):
             row, (low, high) = genomes[gene], limits_of(gene, context)
             for k in range(count):
@@ -89,15 +87,13 @@ class GaussianMutation(GeneMutation):
 
     @staticmethod
     @kernel
-    def mutate(
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
         """Change offspring; see `Mutation`."""
-        std, amounts = context.settings[1], draw_amounts(uniforms, len(genomes), count, context)
+        std, amounts = context.settings[1], draw_amounts(len(genomes), count, context)
         for gene in range(len(genomes)):
             row, (low, high) = genomes[gene], limits_of(gene, context)
             for k in range(count):
-                mutant = min(max(row[k] + std * (high - low) * normals[gene, k], low), high)
+                mutant = min(max(row[k] + std * (high - low) * context.normals[gene, k], low), high)
                 row[k] = mutant if amounts[gene, k] >= 0.0 else row[k]
 
 
@@ -108,11 +104,9 @@ class UniformReset(GeneMutation):
 
     @staticmethod
     @kernel
-    def mutate(
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
         """Change offspring; see `Mutation`."""
-        amounts = draw_amounts(uniforms, len(genomes), count, context)
+        amounts = draw_amounts(len(genomes), count, context)
         for gene in range(len(genomes)):
             row, (low, high) = genomes[gene], limits_of(gene, context)
             for k in range(count):
@@ -139,11 +133,9 @@ class AlleleMutation(Mutation):
 
     @staticmethod
     @kernel
-    def mutate(
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
         """Change offspring; see `Mutation`."""
-        num_genes, limits = len(genomes), context.genome.limits
+        num_genes, limits, uniforms = len(genomes), context.genome.limits, context.uniforms
         step, symmetric = context.settings[0], context.settings[1] != 0.0
         for k in range(count):
             if not uniforms[3 * k] < context.rate:
@@ -167,11 +159,9 @@ class BitFlips(Mutation):
 
     @staticmethod
     @kernel
-    def mutate(
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
         """Change offspring; see `Mutation`."""
         for row in range(len(genomes)):
             for k in range(count):
-                if uniforms[row * count + k] < context.rate:
+                if context.uniforms[row * count + k] < context.rate:
                     genomes[row, k] = 1.0 - genomes[row, k]

@@ -33,8 +33,10 @@ class Genome(NamedTuple):
 
 
 class Context(NamedTuple):
-    """The circumstances of crossover or mutation."""
+    """The numbers and rules that an operator works with."""
 
+    uniforms: FloatArray  # (`num_uniforms`,) in [0, 1)
+    normals: FloatArray  # (genes, ≥ offspring) normal deviates for a mutation that takes them
     rate: float  # probability in [0, 1]: of a pair to be crossed, or of a mutation
     progress: float  # t / T of the parents' generation, 0 of the initial one
     settings: FloatArray  # of the operator, see `Operator.settings`
@@ -43,7 +45,8 @@ class Context(NamedTuple):
 
 VECTOR, ROWS = numba.float64[::1], numba.float64[:, ::1]
 INDICES, COUNT = numba.int64[::1], numba.int64
-CONTEXT = numba.typeof(Context(0.0, 0.0, np.zeros(1), Genome.of(np.zeros((1, 2)))))
+_NONE = np.zeros(1), np.zeros((1, 2))
+CONTEXT = numba.typeof(Context(*_NONE, 0.0, 0.0, _NONE[0], Genome.of(_NONE[1])))
 
 
 class Operator(Component):
@@ -71,16 +74,16 @@ def _address(function: Callable[..., None], signature: Any) -> KernelAddress:
 class Selection(Operator):
     """Draws parents by their costs.
 
-    Its kernel is `select(uniforms, costs, settings, parents)`:
+    Its kernel is the static method `select(costs, context, parents)`:
 
-    - uniforms: (`num_uniforms`,) in [0, 1).
     - costs: (individuals,) lower is better; inf where an individual is infeasible.
-    - settings: The operator's own.
+    - context: Numbers and settings.
     - parents: (parents,) written: indices of individuals. Neighbours are a pair.
     """
 
     kernel_name: ClassVar[str] = "select"
-    signature: ClassVar[Any] = numba.void(VECTOR, VECTOR, VECTOR, INDICES)
+    select: ClassVar[Any]
+    signature: ClassVar[Any] = numba.void(VECTOR, CONTEXT, INDICES)
 
     def num_uniforms(self, size: int, count: int) -> int:
         """Return the number of uniform numbers: here one for each of `count` parents."""
@@ -90,17 +93,17 @@ class Selection(Operator):
 class Crossover(Operator):
     """Makes offspring of parents; parents 2k and 2k + 1 form a pair, an odd last one stays alone.
 
-    Its kernel is `cross(uniforms, genomes, parents, context, out)`:
+    Its kernel is the static method `cross(genomes, parents, context, out)`:
 
-    - uniforms: (`num_uniforms`,) in [0, 1).
     - genomes: (genes, individuals, padding allowed).
     - parents: (offspring,) indices of individuals.
-    - context: Rate, settings, genes; a pair that is not crossed is copied.
+    - context: Numbers, rate, settings, genes; a pair that is not crossed is copied.
     - out: (genes, ≥ offspring) written, every gene of all offspring.
     """
 
     kernel_name: ClassVar[str] = "cross"
-    signature: ClassVar[Any] = numba.void(VECTOR, ROWS, INDICES, CONTEXT, ROWS)
+    cross: ClassVar[Any]
+    signature: ClassVar[Any] = numba.void(ROWS, INDICES, CONTEXT, ROWS)
 
     def num_uniforms(self, genome: Genome, count: int) -> int:
         """Return the number of uniform numbers that `count` offspring take."""
@@ -110,17 +113,16 @@ class Crossover(Operator):
 class Mutation(Operator):
     """Changes offspring in place.
 
-    Its kernel is `mutate(uniforms, normals, genomes, count, context)`:
+    Its kernel is the static method `mutate(genomes, count, context)`:
 
-    - uniforms: (`num_uniforms`,) in [0, 1).
-    - normals: (genes, ≥ count) normal deviates if the operator `takes_normals`, else empty.
     - genomes: (genes, ≥ count) changed.
     - count: Individuals; columns behind them are left alone.
-    - context: Rate, progress, settings, genes.
+    - context: Numbers, rate, progress, settings, genes.
     """
 
     kernel_name: ClassVar[str] = "mutate"
-    signature: ClassVar[Any] = numba.void(VECTOR, ROWS, ROWS, COUNT, CONTEXT)
+    mutate: ClassVar[Any]
+    signature: ClassVar[Any] = numba.void(ROWS, COUNT, CONTEXT)
     takes_normals: ClassVar[bool] = False
 
     def num_uniforms(self, genome: Genome, count: int) -> int:

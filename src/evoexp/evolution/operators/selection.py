@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from evoexp.evolution.operators.operator import Selection
+from evoexp.evolution.operators.operator import Context, Selection
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray, IntArray
 from evoexp.validation import Count, NonNegative
@@ -56,9 +56,7 @@ class InverseRoulette(Selection):
 
     @staticmethod
     @kernel
-    def select(
-        uniforms: FloatArray, costs: FloatArray, settings: FloatArray, parents: IntArray
-    ) -> None:
+    def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
         """Draw parents; see `Selection`."""
         weights, any_zero = np.empty(len(costs)), False
         for k in range(len(costs)):
@@ -67,7 +65,7 @@ class InverseRoulette(Selection):
             inverse = 1.0 / costs[k] if costs[k] < np.inf else 0.0
             free = 1.0 if costs[k] < 1e-300 else 0.0
             weights[k] = free if any_zero else inverse
-        spin_roulette(weights, uniforms, parents)
+        spin_roulette(weights, context.uniforms, parents)
 
 
 class DifferenceRoulette(Selection):
@@ -81,9 +79,7 @@ class DifferenceRoulette(Selection):
 
     @staticmethod
     @kernel
-    def select(
-        uniforms: FloatArray, costs: FloatArray, settings: FloatArray, parents: IntArray
-    ) -> None:
+    def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
         """Draw parents; see `Selection`."""
         weights, highest, lowest = np.empty(len(costs)), -np.inf, np.inf
         for k in range(len(costs)):
@@ -93,7 +89,7 @@ class DifferenceRoulette(Selection):
         for k in range(len(costs)):
             weight = highest - costs[k] if highest > lowest else 1.0
             weights[k] = weight if np.isfinite(costs[k]) else 0.0
-        spin_roulette(weights, uniforms, parents)
+        spin_roulette(weights, context.uniforms, parents)
 
 
 class FitnessRoulette(Selection):
@@ -105,15 +101,13 @@ class FitnessRoulette(Selection):
 
     @staticmethod
     @kernel
-    def select(
-        uniforms: FloatArray, costs: FloatArray, settings: FloatArray, parents: IntArray
-    ) -> None:
+    def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
         """Draw parents; see `Selection`."""
-        weights, fitness_offset = np.empty(len(costs)), settings[0]
+        weights, fitness_offset = np.empty(len(costs)), context.settings[0]
         for k in range(len(costs)):
             fitness = fitness_offset - costs[k]
             weights[k] = fitness if fitness > 0.0 else 0.0
-        spin_roulette(weights, uniforms, parents)
+        spin_roulette(weights, context.uniforms, parents)
 
 
 class LinearRanking(Selection):
@@ -131,11 +125,9 @@ class LinearRanking(Selection):
 
     @staticmethod
     @kernel
-    def select(
-        uniforms: FloatArray, costs: FloatArray, settings: FloatArray, parents: IntArray
-    ) -> None:
+    def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
         """Draw parents; see `Selection`."""
-        num, pressure = len(costs), settings[0]
+        num, pressure = len(costs), context.settings[0]
         weights = np.empty(num)
         # from the highest cost to the lowest; equal costs share a rank
         order = np.argsort(-costs, kind="mergesort")  # stable: the same on every machine
@@ -149,7 +141,7 @@ class LinearRanking(Selection):
             for k in range(first, stop):
                 weights[order[k]] = weight
             first = stop
-        spin_roulette(weights, uniforms, parents)
+        spin_roulette(weights, context.uniforms, parents)
 
 
 class Tournament(Selection):
@@ -170,11 +162,9 @@ class Tournament(Selection):
 
     @staticmethod
     @kernel
-    def select(
-        uniforms: FloatArray, costs: FloatArray, settings: FloatArray, parents: IntArray
-    ) -> None:
+    def select(costs: FloatArray, context: Context, parents: IntArray) -> None:
         """Draw parents; see `Selection`."""
-        num, size = len(costs), int(settings[0])
+        num, size, uniforms = len(costs), int(context.settings[0]), context.uniforms
         for k in range(len(parents)):
             winner = min(int(uniforms[k * size] * num), num - 1)
             for t in range(1, size):

@@ -136,7 +136,7 @@ def follow(
     moving = 0
     for robot in range(len(before)):
         moving += heredity.moving[robot]
-    numbers, teams = np.sum(heredity.sizes[num_teams[0]]), hall.teams[: num_teams[0]]
+    numbers, teams = np.sum(heredity.breeding.sizes[num_teams[0]]), hall.teams[: num_teams[0]]
     draws = uniforms[: moving * numbers].reshape((moving, numbers))
     costs, following = judged.costs[own], table.populations[other]
     breed_robots(
@@ -174,12 +174,10 @@ class TeamSearch(TableSearch):
         num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
         genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
         counts = [free - teams for teams in range(ga.num_hall_teams + 1)]
-        sizes = np.array([operators.sizes(genome, self._size, count) for count in counts])
         self._operators = operators.addresses
         self._heredity = Heredity(
             ga.num_elites,
-            Breeding.of(operators, genome, ga),
-            sizes,
+            Breeding.of(operators, genome, ga, counts),
             problem.moving,
             Hall.room(ga.num_hall_teams, robots),
             HallRules(
@@ -196,7 +194,7 @@ class TeamSearch(TableSearch):
         self._table.populations[0] = self._planner.sample(self._problem, rng, self._size)
         self._judge(0)
         most = int(np.count_nonzero(self._problem.moving))
-        most *= int(self._heredity.sizes.sum(axis=1).max())
+        most *= int(self._heredity.breeding.sizes.sum(axis=1).max())
         self._ahead = DrawnAhead(rng, max(most, self._table.populations[0].size))
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
@@ -210,8 +208,8 @@ class TeamSearch(TableSearch):
             self._judge(last % self.num_places)
         else:
             task = self._planner.task(self._problem)
-            given = uniforms, rates, first, task, *arguments, self.summaries, taken
-            if not evolve(*self._operators, *given):
+            given = task, *arguments, self.summaries, taken
+            if not evolve(*self._operators, uniforms, rates, first, *given):
                 raise ValueError(NOT_FINITE)
         self.states = self._ahead.take(taken.tolist())
         return last

@@ -24,9 +24,6 @@ class Heredity(NamedTuple):
 
     num_elites: int  # individuals copied untouched
     breeding: Breeding  # rules of the operators
-    # (hall's teams + 1, 3) uniform numbers that selection, crossover and mutation of a robot take
-    # where the hall holds so many teams
-    sizes: IntArray
     moving: BoolArray  # (robots,) false for robots that stand still
     hall: Hall  # with room for as many teams as it may hold
     rules: HallRules  # which teams it takes
@@ -52,8 +49,8 @@ def breed_robots(
     bred: FloatArray,  # like populations, written
 ) -> None:
     """Write the next populations: offspring, then elites, then members of the hall, unchanged."""
-    size, num_elites, sizes = populations.shape[2], heredity.num_elites, heredity.sizes[len(teams)]
-    count = size - num_elites - len(teams)
+    num_elites = heredity.num_elites
+    count = populations.shape[2] - num_elites - len(teams)
     parents, elites = np.empty(count, dtype=np.int64), np.empty(num_elites, dtype=np.int64)
     rules, normals, row = heredity.breeding, np.empty((0, 0)), 0
     for robot in range(len(populations)):
@@ -68,7 +65,6 @@ def breed_robots(
             mutate,
             draws,
             normals,
-            sizes,
             index,
             mutation_rate,
             rules,

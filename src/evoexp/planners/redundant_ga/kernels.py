@@ -63,7 +63,6 @@ def evolve(
     # whether generations are bred; if not, each is drawn as the initial one is, as many individuals
     # as would be bred
     evolving: bool,
-    sizes: IntArray,  # (3,) uniform numbers for selection, crossover and mutation
     breeding: Breeding,
     coding: Coding,
     judging: Judging,
@@ -98,7 +97,6 @@ def evolve(
                 mutate,
                 numbers,
                 normals,
-                sizes,
                 index,
                 rate,
                 breeding,

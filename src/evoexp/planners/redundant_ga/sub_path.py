@@ -128,7 +128,6 @@ class Search(GeneticSearch):
             first,
             self._stop_cost,
             self.evolving,
-            self.sizes,
             self.breeding,
             self._coding,
             self._judging,

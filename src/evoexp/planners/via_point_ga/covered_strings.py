@@ -4,6 +4,8 @@ A generation goes through the same steps as one of `strings`, each a call of its
 covered bodies takes far longer than Python takes between the steps.
 """
 
+from typing import Any
+
 import numpy as np
 
 from evoexp.collision.models.covered_bodies import CoveredCollision
@@ -14,7 +16,7 @@ from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Judgement, Problem, Run, Strings
+from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
 from evoexp.records import FloatArray
 
 
@@ -49,7 +51,7 @@ class CoveredStrings(Strings):
         self._judge(strings, judged)
         return judged
 
-    def evolve(self, run: Run, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+    def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
         """Go on from a generation to those behind it; see `Strings`."""
         (offspring, terms, elites, parents), places = run.scratch, len(run.summaries)
         judged, rate = Judgement(terms.cost, terms, 0), run.breeding.mutation_rate
@@ -59,9 +61,19 @@ class CoveredStrings(Strings):
                 for g in (index, index + 1)
             )
             choose_elites(before.costs, elites)
-            rules = run.sizes, index, rate, run.breeding, before.costs
             genomes, children = kernels.by_gene(before.strings), kernels.by_gene(offspring)
-            breed(*run.operators, numbers, normals, *rules, genomes, parents, children)
+            breed(
+                *run.operators,
+                numbers,
+                normals,
+                index,
+                rate,
+                run.breeding,
+                before.costs,
+                genomes,
+                parents,
+                children,
+            )
             self.smooth(offspring, len(parents))
             self._judge(offspring, judged)
             kernels.follow(before, run.scratch, after)

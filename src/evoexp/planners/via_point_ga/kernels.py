@@ -44,7 +44,6 @@ class Settings(NamedTuple):
     """Settings of a whole generation."""
 
     breeding: Breeding  # of section 3.4 (a), (b), (d)
-    sizes: IntArray  # (3,) uniform numbers of each operator
     smoothing: Smoothing  # of section 3.4 (c)
     judging: Judging  # of Eqs. 2–7.
 
@@ -85,7 +84,7 @@ def evolve(
     """Go on from one generation to others."""
     settings, table, scratch, summaries = borrowed((settings, table, scratch, summaries))
     (strings, costs, collisions), offspring, count = table, scratch.offspring, len(scratch.parents)
-    breeding, sizes, rate = settings.breeding, settings.sizes, settings.breeding.mutation_rate
+    breeding = settings.breeding
     for index in range(first, first + len(uniforms)):
         own, other = index % len(costs), (index + 1) % len(costs)
         # elites: the lowest costs
@@ -98,9 +97,8 @@ def evolve(
             mutate,
             uniforms[index - first],
             normals,
-            sizes,
             index,
-            rate,
+            breeding.mutation_rate,
             breeding,
             costs[own],
             by_gene(strings[own]),

@@ -40,13 +40,7 @@ class StringCrossover(Crossover):
 
     @staticmethod
     @kernel
-    def cross(
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
         arms, num_points = context.genome.arms, context.genome.num_points
         max_distance, segment = context.settings[0], context.settings[1] != 0.0
@@ -55,7 +49,7 @@ class StringCrossover(Crossover):
         mates = parents.copy()
         sites = np.full((num_arms, num_offspring), num_points)
         for pair in range(num_offspring // 2):
-            draw = uniforms[pair * (1 + num_arms) :]
+            draw = context.uniforms[pair * (1 + num_arms) :]
             first, second = parents[2 * pair], parents[2 * pair + 1]
             if num_points < 3 or not draw[0] < context.rate:
                 continue
@@ -121,11 +115,10 @@ class NewTrajectories(Mutation):
 
     @staticmethod
     @kernel
-    def mutate(
-        uniforms: FloatArray, normals: FloatArray, genomes: FloatArray, count: int, context: Context
-    ) -> None:
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
         """Change offspring; see `Mutation`."""
         arms, num_points = context.genome.arms, context.genome.num_points
+        uniforms = context.uniforms
         new, step, max_turn = int(context.settings[0]), context.settings[1], context.settings[2]
         if new == 0:
             return

@@ -1,13 +1,12 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.models.touching_spheres import SphereCollision
-from evoexp.evolution.operators.breeding import Breeding
 from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
@@ -17,7 +16,7 @@ from evoexp.planners.arm_tasks import ArmProblem
 from evoexp.planners.table_search import generations_per_call
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import BoolArray, FloatArray
 
 LANES = 8  # individuals are padded to whole vectors
 PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
@@ -98,17 +97,6 @@ class Judgement(NamedTuple):
         for a, row in enumerate(unevenness):
             named[f"unevenness_arm_{a + 1}_deg"] = float(row[individual])
         return named | {"collisions": float(collisions[individual])}
-
-
-class Run(Protocol):
-    """One run: its operators, and memory for its generations."""
-
-    operators: tuple[Any, Any, Any]  # kernels of selection, crossover and mutation
-    breeding: Breeding  # their rules
-    sizes: IntArray  # (3,) uniform numbers that each takes
-    table: kernels.Population  # of some generations
-    scratch: kernels.Scratch
-    summaries: FloatArray  # (places, 4) see `kernels.summarise_strings`
 
 
 class Strings:
@@ -192,16 +180,16 @@ class Strings:
         costs, collisions = np.empty((2, places, size))
         return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
 
-    def evolve(self, run: "Run", uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+    def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
         """Go on from a generation to those behind it (section 3.4).
 
         Args:
-            run: Its operators breed; its generations are written.
+            run: A `Search`, whose operators breed and whose generations are written.
             uniforms: (generations, numbers) in [0, 1).
             normals: Normal deviates, see `breed`.
             first: The present generation.
         """
-        settings = kernels.Settings(run.breeding, run.sizes, self.smoothing, self.judging)
+        settings = kernels.Settings(run.breeding, self.smoothing, self.judging)
         kernels.evolve(
             *run.operators,
             uniforms,

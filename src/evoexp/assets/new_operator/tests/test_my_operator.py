@@ -1,5 +1,7 @@
 """The operator keeps every obligation of an operator."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from evoexp.evolution.operators.operator import Genome
 from evoexp.registry import component_class
 from evoexp.testing import check_operator, crossed
 
-MyOperator = component_class("my_operator")  # as a configuration names it
+MyOperator: Any = component_class("my_operator")  # as a configuration names it
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])

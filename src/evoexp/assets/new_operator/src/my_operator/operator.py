@@ -22,18 +22,16 @@ class MyOperator(Crossover):
 
     @staticmethod
     @kernel
-    def cross(
-        uniforms: FloatArray,
-        genomes: FloatArray,
-        parents: IntArray,
-        context: Context,
-        out: FloatArray,
-    ) -> None:
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
         copy_parents(genomes, parents, out)
         num_genes, share = len(genomes), context.settings[0]
         for pair in range(len(parents) // 2):
-            draws, first, second = uniforms[pair * (1 + num_genes) :], 2 * pair, 2 * pair + 1
+            draws, first, second = (
+                context.uniforms[pair * (1 + num_genes) :],
+                2 * pair,
+                2 * pair + 1,
+            )
             if draws[0] < context.rate:
                 for gene in range(num_genes):
                     if draws[1 + gene] < share:

@@ -3,8 +3,10 @@
 Property tests draw the same examples each time, and no time is an assertion.
 """
 
+import functools
 import gc
 import os
+from collections.abc import Iterator
 from typing import Any
 
 # as in evoexp's workers: two test processes with two threads each wait for each other on two cores
@@ -62,6 +64,31 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def composed_once() -> Iterator[None]:
+    """Have Hydra compose no choice of options twice: a fifth of a second each time."""
+    from composed_once import compositions_remembered
+
+    with compositions_remembered():
+        yield
+
+
+@pytest.fixture
+def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have every figure of a report blank: drawing takes nine tenths of its time."""
+    from evoexp.report.figures import style
+
+    draw = style.drawn
+
+    @functools.cache
+    def blank(formats: tuple[str, ...]) -> dict[str, bytes]:
+        from matplotlib.figure import Figure
+
+        return draw(lambda: Figure((1.0, 1.0)), formats, 20)
+
+    monkeypatch.setattr(style, "drawn", lambda drawing, formats, *_: blank(tuple(formats)))
 
 
 def pytest_collection_finish() -> None:

@@ -12,11 +12,12 @@ from matplotlib.figure import Figure
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.report import build, style
-from evoexp.report.claim_rules import Rule
-from evoexp.report.judging import Hearing
+from evoexp.report.figures import style
+from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, gather
+from evoexp.report.results.stored_results import ConditionResults, Results, gather
+from evoexp.report.statistics.claim_rules import Rule
+from evoexp.report.statistics.judging import Hearing
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory
 

@@ -79,6 +79,7 @@ def test_a_guests_planner_is_run_reproduced_and_reported(
     site: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
+    blank_figures: None,
 ) -> None:
     assert origin("planner", "my_planner") == origin("experiment", "my_planner") == "my-planner 0.3"
     assert {"my_planner", "rana_planar"} <= set(options("experiment"))

@@ -83,7 +83,8 @@ def test_contents(wheel: Path) -> None:
     package = {
         path.relative_to(SOURCE.parent).as_posix()
         for path in SOURCE.rglob("*")
-        if path.suffix in (".py", ".typed") or path.name in ("claims.yaml", "words.yaml")
+        if path.suffix in (".py", ".typed")
+        or path.name in ("claims.yaml", "words.yaml", "claim_kinds.yaml")
     }
     assets = {
         path.relative_to(SOURCE.parent).as_posix()

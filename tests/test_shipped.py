@@ -147,15 +147,6 @@ def test_nothing_to_compare(
     assert "MATCH" not in printed.out + printed.err
 
 
-def test_an_ambiguous_prefix_lists_the_candidates(
-    nowhere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    twins = [TABLE[0]._replace(condition_id=f"abc{digit}" + 60 * "0") for digit in "12"]
-    monkeypatch.setattr(shipped, "shipped", lambda: tuple(twins))
-    assert main(["reproduce", "abc"]) == 2
-    assert "ambiguous: abc100000000, abc200000000" in capsys.readouterr().err
-
-
 def test_a_hash_is_found_once_in_the_smallest_experiment_that_has_it() -> None:
     sizes = Counter((row.experiment, row.budget) for row in TABLE)
     found = {row.condition_id: row for row in shipped.find("")}

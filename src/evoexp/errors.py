@@ -5,10 +5,12 @@ error is none of these: it keeps its traceback.
 """
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 _SHOWN = 200  # [-] characters of a value in a message
 _LONGEST = 1200  # [-] characters of any other text in it, such as a list of names
+_MOST_NAMES = 12  # [-] names that a message lists; of more it lists the nearest
+_NEAREST = 5  # [-] names listed then
 
 
 class EvoexpError(Exception):
@@ -39,6 +41,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean '{brief(matches[0], _SHOWN)}'?" if matches else ""
 
 
+def listed_names(known: Sequence[str], name: str) -> str:
+    """Return all known names where they are few, else those nearest to a name, and their number."""
+    if len(known) <= _MOST_NAMES:
+        return ", ".join(known) or "none"
+    near = difflib.get_close_matches(name, known, n=_NEAREST, cutoff=0.0)
+    return f"{', '.join(near)}, … {len(known)} in all"
+
+
 class SettingError(EvoexpError):
     """A setting that is refused: the field, the values it may have, the value given, a near name.
 
@@ -58,7 +68,7 @@ class SettingError(EvoexpError):
 
 
 class UnknownSetting(EvoexpError):
-    """A key that no component has; lists the valid ones and names the nearest."""
+    """A key that no component has; names the nearest, and lists them where they are few."""
 
     def __init__(self, field: str, known: Iterable[str]) -> None:
         self.field = field
@@ -66,12 +76,12 @@ class UnknownSetting(EvoexpError):
         last = field.rsplit(".", 1)[-1]
         super().__init__(
             f"{field}: unknown setting{nearest(last, self.known)} (known here: "
-            f"{', '.join(self.known) or 'none'})"
+            f"{listed_names(self.known, last)})"
         )
 
 
 class UnknownOption(EvoexpError):
-    """A name that is no option of its kind (experiment, robot, planner, …); lists the options."""
+    """A name that is no option of its kind (experiment, robot, planner, …); names the nearest."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind = kind
@@ -79,7 +89,7 @@ class UnknownOption(EvoexpError):
         self.known = sorted(known)
         super().__init__(
             f"{kind}: no option '{name}'{nearest(name, self.known)} (options: "
-            f"{', '.join(self.known) or 'none'})"
+            f"{listed_names(self.known, name)})"
         )
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
-from evoexp.store.run_context import ORIGIN, run_context
+from evoexp.store.run_context import ORIGIN, origin_of, run_context
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_generations, read_summaries
 
@@ -28,6 +28,26 @@ class Frames(NamedTuple):
     # `summary.parquet`
     summaries: pd.DataFrame
 
+    def __repr__(self) -> str:
+        """Return the conditions and the size of each frame."""
+        keys = self.summaries[["label", "condition"]].value_counts(sort=False).reset_index()
+        rows = [
+            f"  {label}  {key[:12]}  {count} replicates"
+            for label, key, count in keys.itertuples(index=False)
+        ]
+        sizes = f"generations: {_size(self.generations)}, summaries: {_size(self.summaries)}"
+        return "\n".join([sizes, *rows])
+
+    def _repr_html_(self) -> str:
+        """Return the conditions with medians, for a notebook."""
+        groups = self.summaries.groupby(["label", "condition"], sort=False)
+        table = groups.agg(
+            replicates=("replicate", "size"),
+            solved=("solved", "sum"),
+            median_best_cost=("best_cost", "median"),
+        ).reset_index()
+        return str(table.assign(condition=table["condition"].str[:12]).to_html(index=False))
+
 
 def load(
     what: str,
@@ -37,7 +57,9 @@ def load(
     outputs: Path | str | None = None,
     config_dir: Sequence[Path | str] = (),
 ) -> Frames:
-    """Load results: `evoexp.load("rana_planar")`, `evoexp.load("9a95c3")`.
+    """Load the stored results of an experiment, or of one run by its hash.
+
+    `evoexp.load("4da921").summaries.groupby("label")[["best_cost", "cpu_s"]].median()`
 
     Args:
         what: Name or file of an experiment, or any unique prefix of a run's hash.
@@ -48,7 +70,7 @@ def load(
         config_dir: Folders of options that are searched before all others.
 
     Returns:
-        Frames whose column `label` names the condition as the figures do; a hash is its own label.
+        Frames whose column `label` names the condition as the figures do, `condition` by its hash.
 
     Raises:
         UnknownOption: If `what` is neither.
@@ -82,10 +104,15 @@ def load(
             )
     else:
         run = _run(root, what, known)
-        runs, labels = [run], [(run.hash12, run.condition_id)]
+        label = origin_of(run)["label"] or run.hash12
+        runs, labels = [run], [(label, run.condition_id)]
     summaries = read_summaries(runs, thorough=True)  # first: what is damaged is left out
     summaries = summaries.assign(**_settings(runs, summaries))
     return Frames(_labelled(read_generations(runs), labels), _labelled(summaries, labels))
+
+
+def _size(frame: pd.DataFrame) -> str:
+    return f"{len(frame)} rows × {len(frame.columns)} columns"
 
 
 def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str, pd.Series]:

@@ -1,5 +1,6 @@
 """A planner that can be told to fail, installed as a plug-in, and conditions that use it."""
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,6 +23,16 @@ def plug_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
+def heard_signals() -> Iterator[None]:
+    """Have commands start with no signal ignored, wherever tests were started."""
+    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
 def installed(plug_in: Path) -> Iterator[None]:
     """Install it in this process and in the workers that it starts."""
     with on_path(plug_in, HERE):
@@ -38,8 +49,11 @@ def faulty() -> Condition:
     return experiment.conditions[0].condition
 
 
-@pytest.fixture
-def undisturbed(faulty: Condition, tmp_path: Path) -> dict[int, str]:
+@pytest.fixture(scope="session")
+def undisturbed(plug_in: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[int, str]:
     """Return the digests that every way of running it must come to."""
-    run(tmp_path / "undisturbed", (faulty, 12))
-    return digests(tmp_path / "undisturbed", faulty)
+    outputs = tmp_path_factory.mktemp("undisturbed")
+    with on_path(plug_in, HERE):
+        condition = compose.expand(WORDS)[0].conditions[0].condition
+        run(outputs, (condition, 12))
+        return digests(outputs, condition)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 VICTIMS = ("main", "worker", "server", "group")
 PATIENCE_S = 600.0  # [s] for a command on a busy machine
 STARTING_S = 3.0  # [s] in which a command loads libraries and starts workers
-FEW = ("rana_obstacles", "corsepius_ball")  # experiments
+FEW = ("rana_obstacles",)  # experiments
 ALL = (  # every planner, control and reference
     *("rana_obstacles", "rana_planar", "curkovic_motion", "curkovic_pareto"),
     *("lavoie_controls", "lavoie_coding", "corsepius_ball", "corsepius_pick_and_place"),

@@ -32,8 +32,10 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def strike(words: list[str], directory: Path, num_blows: int) -> None:
-    """Strike a batch until so many blows met; each time it is complete, compare and begin anew."""
+@pytest.mark.matrix
+def test_blows_at_random_moments_over_all_planners(tmp_path: Path) -> None:
+    """Strike a batch until enough blows met; each time it is complete, compare and begin anew."""
+    words, directory = command(ALL, 4), tmp_path
     rng = random.Random(SEED)
     run_undisturbed(words, directory / "undisturbed")
     expected, all_logs = (
@@ -43,7 +45,7 @@ def strike(words: list[str], directory: Path, num_blows: int) -> None:
     met = list[Blow]()
     for store in itertools.count():
         outputs, complete, since = directory / f"struck_{store}", False, len(met)
-        while not complete and len(met) < num_blows:
+        while not complete and len(met) < NUM_BLOWS:
             blow = random_blow(rng, VICTIMS[len(met) % len(VICTIMS)], num_logs(outputs), all_logs)
             hit, complete = run_struck(words, outputs, blow)
             met += [blow] if hit else []
@@ -52,14 +54,14 @@ def strike(words: list[str], directory: Path, num_blows: int) -> None:
         found = differing(expected, masked_store(outputs))
         assert found == [], f"after {met[since:]}"
         shutil.rmtree(outputs)
-        if len(met) == num_blows:
+        if len(met) == NUM_BLOWS:
             return
 
 
-def test_one_blow_of_each_kind(tmp_path: Path) -> None:
-    strike(command(FEW, 6), tmp_path, len(VICTIMS))
-
-
-@pytest.mark.matrix
-def test_blows_at_random_moments_over_all_planners(tmp_path: Path) -> None:
-    strike(command(ALL, 4), tmp_path, NUM_BLOWS)
+def test_a_command_that_is_killed_at_half_of_its_logs_goes_on(tmp_path: Path) -> None:
+    words = command(FEW, 12)
+    run_undisturbed(words, tmp_path / "undisturbed")
+    run_struck(words, tmp_path / "struck", Blow("group", 6, 0.0))
+    run_undisturbed(words, tmp_path / "struck")
+    expected = masked_store(tmp_path / "undisturbed")
+    assert differing(expected, masked_store(tmp_path / "struck")) == []

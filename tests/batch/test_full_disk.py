@@ -12,6 +12,7 @@ from batch_samples import WORDS, digests
 
 from evoexp.cli import KEPT, main
 from evoexp.condition import Condition
+from matrix import first
 
 COMMAND = ["run", *WORDS, "runner=serial", "--no-report"]
 FULL = Path("/dev/full")
@@ -29,8 +30,9 @@ def failing(after: int, number: int) -> Callable[[int], None]:
     return fsync
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EDQUOT])
-@pytest.mark.parametrize("after", [0, 3, 9])
+@pytest.mark.parametrize(
+    ("number", "after"), [(errno.ENOSPC, 0), (errno.EIO, 3), (errno.EDQUOT, 9)]
+)
 def test_a_run_stops_in_one_line_and_the_same_command_goes_on(
     number: int,
     after: int,
@@ -65,6 +67,7 @@ def test_other_commands_name_the_file_and_leave_nothing(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
+    blank_figures: None,
 ) -> None:
     outputs = tmp_path / "outputs"
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(outputs))
@@ -106,8 +109,9 @@ def run_to(path: Path | None, *words: str, unbuffered: bool) -> tuple[int, str]:
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
-@pytest.mark.parametrize("unbuffered", [False, True])
-@pytest.mark.parametrize("words", ["list", "list --json", "completion bash"])
+@pytest.mark.parametrize(
+    ("words", "unbuffered"), first(1, [("completion bash", True), ("list", False)])
+)
 def test_a_full_standard_output_is_named(words: str, unbuffered: bool) -> None:
     code, err = run_to(FULL, *words.split(), unbuffered=unbuffered)
     assert (code, err) == (2, "evoexp: standard output: No space left on device\n")
@@ -128,6 +132,7 @@ def test_outputs_that_are_a_file_are_named(
     assert err.endswith(": Not a directory\n")
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("place", ["deep", "missing"])
 def test_temporary_files_may_be_anywhere(
     place: str, faulty: Condition, tmp_path: Path, plug_in: Path

@@ -44,9 +44,6 @@ def started(outputs: Path, plug_in: Path, faults: str = HANGING) -> Iterator[sub
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(
-            signal.SIGINT, signal.SIG_DFL
-        ),  # ignored by what starts in the background
     )
     try:
         yield process

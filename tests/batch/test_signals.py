@@ -30,7 +30,6 @@ from matrix import examples
 
 PROGRESS = re.compile(r".{0,20}replicates|.*\d+/12 +\d+ failed")
 LINE = f"evoexp: interrupted; {KEPT}"
-MOMENTS_S = (0.2, 0.4, 0.6, 0.9, 1.2, 1.5, 2.0, 2.5, 3.5)  # after the command was started
 
 
 class Terminal:
@@ -96,8 +95,7 @@ class Terminal:
 
 # The terminal becomes the process's own; signals are handled when Python has started.
 _IN_TERMINAL = """
-import fcntl, signal, sys, termios
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever started the tests may ignore it
+import fcntl, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 from evoexp.cli import main
 print("begun", flush=True)
@@ -153,7 +151,7 @@ def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path)
     assert not list(folder.rglob("*.tmp"))
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", examples(WAYS, lambda way: way is terminate))
 def test_a_batch_ends_in_one_line_and_goes_on(
     way: Callable[[Terminal], None],
     faulty: Condition,
@@ -181,19 +179,22 @@ def wait_for_logs(directory: RunDirectory, count: int, window: Terminal) -> None
         window.look(0.02)
 
 
-EXAMPLES = ((repeatedly, 0.2), (terminate_all, 0.9), (repeatedly, 1.5))
+STARTING = {"libraries": 1, "server": 2, "workers": 4}  # processes there are at the least
+EXAMPLES = ((repeatedly, "libraries"), (terminate_all, "server"))
 
 
 @pytest.mark.parametrize(
-    ("way", "moment_s"),
-    examples([(way, moment) for way in WAYS for moment in MOMENTS_S], EXAMPLES.__contains__),
+    ("way", "step"),
+    examples([(way, step) for way in WAYS for step in STARTING], EXAMPLES.__contains__),
 )
-def test_any_moment_will_do(
-    way: Callable[[Terminal], None], moment_s: float, tmp_path: Path, plug_in: Path
+def test_a_batch_that_starts_ends_in_one_line(
+    way: Callable[[Terminal], None], step: str, tmp_path: Path, plug_in: Path
 ) -> None:
-    """While it starts, compiles, or runs: the assertions hold at all moments."""
+    """While it loads libraries, starts its server, or has all of its workers."""
     with terminal(tmp_path / "outputs", plug_in, "hang:0,1,2,3") as window:
-        window.look(moment_s)
+        while len(alive(window.process.pid)) < STARTING[step]:
+            window.look(0.01)
+            assert window.process.poll() is None, window.shown
         way(window)
         check_ended(window, way, tmp_path)
 
@@ -236,7 +237,7 @@ def test_a_library_that_catches_everything_does_not_keep_a_batch_alive(
             signal.raise_signal(signal.SIGTERM)
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
-            time.sleep(0.01)
+            pass
 
     with pytest.raises(Interrupted):
         go_on()
@@ -277,7 +278,7 @@ import os, signal, sys, threading
 from evoexp import cli
 from evoexp.commands import interruption
 
-def command(words, is_process):
+def command(words):
     threading.Thread(target=threading.Event().wait).start()  # whom nobody will tell anything
     interrupted = threading.Event()
     broken = threading.Thread(target=lambda: interrupted.wait() and 1 / 0)
@@ -290,13 +291,15 @@ def command(words, is_process):
         broken.join()
 
 interruption.ENDING_S = 0.5
-cli._run = command
+cli.command_module = lambda name: type("", (), {"main": command})
 sys.exit(cli.main())
 """
 
 
 def test_threads_that_an_interruption_leaves_behind_keep_nobody_waiting_and_say_nothing() -> None:
-    done = subprocess.run([sys.executable, "-c", LEFT], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", LEFT, "list"], capture_output=True, text=True, timeout=60
+    )
     assert (done.returncode, done.stderr) == (-signal.SIGINT, "evoexp: interrupted\n")
 
 

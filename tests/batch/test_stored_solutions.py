@@ -20,6 +20,7 @@ from evoexp.store.integrity import LogCheck, check_logs
 from evoexp.store.log import SUMMARY, array_file
 from evoexp.store.log_reader import read_log
 from forged_logs import Row, with_attachment, with_message, with_metadata
+from matrix import first
 from store.log_anatomy import put_together, take_apart
 
 DATA = Path(__file__).parents[1] / "store" / "data"
@@ -117,10 +118,9 @@ RECORDS: dict[str, tuple[Forgery, str]] = {
 
 
 @pytest.mark.parametrize("what", RECORDS)
-@pytest.mark.parametrize("name", ["via_point_ga", "coevolution", "grid_path_ga"])
-def test_reproduce_names_a_replaced_record(name: str, what: str, tmp_path: Path) -> None:
+def test_reproduce_names_a_replaced_record(what: str, tmp_path: Path) -> None:
     forge, expected = RECORDS[what]
-    assert expected in reproduced(forge(log_of(name)), tmp_path)
+    assert expected in reproduced(forge(log_of("via_point_ga")), tmp_path)
 
 
 def criterion(row: Row) -> Row:
@@ -173,7 +173,7 @@ def moved(name: str) -> Callable[[Row], Row]:
     return move
 
 
-@pytest.mark.parametrize("which", [0, -1])
+@pytest.mark.parametrize("which", first(1, [-1, 0]))
 @pytest.mark.parametrize("name", [*PLANNERS, REFERENCE, "redundant_ga", "two_stage", "urdf"])
 def test_verify_evaluates_solutions(name: str, which: int, tmp_path: Path) -> None:
     forged = with_message(log_of(name), "/solution", moved(name), which)

@@ -1,7 +1,7 @@
 """A worker may be killed at any moment, while it sends its result, too: every batch ends.
 
-No result differs from the undisturbed one. With ./scripts/test --exhaustive, 300 workers are
-killed. `EVOEXP_KILLS` names a file for a line about each.
+No result differs from the undisturbed one. With ./scripts/test --all, twenty workers are killed at
+random moments, with --exhaustive 300. `EVOEXP_KILLS` names a file for a line about each.
 """
 
 import os
@@ -63,6 +63,7 @@ def deaths(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return found
 
 
+@pytest.mark.matrix
 def test_every_batch_ends_and_nothing_differs(deaths: list[int], tmp_path: Path) -> None:
     rng, lines, number = random.Random(SEED), list[str](), 0
     while len(deaths) < NUM_KILLS:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -73,10 +74,12 @@ def test_a_first_call_that_fails_or_ends_the_server_costs_no_result(call: tuple[
 
 def test_a_server_that_dies_is_started_again(tmp_path: Path) -> None:
     with Workers(2) as workers:
-        workers._server.kill()  # while it loads
+        for loading in children():
+            os.kill(loading, signal.SIGKILL)
         assert list(in_order(workers, abs, ((-k,) for k in range(4)))) == [0, 1, 2, 3]
-        workers._server.kill()
-        workers._server.wait()
+        (server,) = in_order(workers, os.getppid, [()])
+        os.kill(server, signal.SIGKILL)
+        assert not is_running(server)
         tasks = [(k, str(tmp_path), "kill") for k in range(4)]
         assert list(in_order(workers, end_once, tasks)) == list(range(4))
 
@@ -119,34 +122,28 @@ import os, signal, sys, time
 from evoexp import cli
 from evoexp.batch.workers import Workers, in_order
 
-def command(words, is_process):
+def command(words):
     with Workers(2) as workers:
         for process in in_order(workers, os.getpid, [()] * 8):
             print(process)
-        print(workers._server.pid, flush=True)
-        list(in_order(workers, time.sleep, [(3600,)] * 2)) if sys.argv[1] == "wait" else None
-    {last}
+        print(*in_order(workers, os.getppid, [()]), flush=True)  # the server
+        list(in_order(workers, time.sleep, [(3600,)] * 2))
     return 0
 
-cli._run = command
+cli.command_module = lambda name: type("", (), {"main": command})
 sys.exit(cli.main())
 """
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
 def test_workers_end_with_their_parent_whatever_they_do(name: str) -> None:
     number = getattr(signal, name)
-    code = BUSY.format(last="pass")
     with subprocess.Popen(
-        [sys.executable, "-c", code, "wait"],
+        [sys.executable, "-c", BUSY, "list"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: (
-            [signal.signal(n, signal.SIG_DFL) for n in (number, signal.SIGINT)]
-            if name not in ("SIGKILL",)
-            else None
-        ),
     ) as process:
         assert process.stdout is not None and process.stderr is not None
         processes = {int(process.stdout.readline()) for _ in range(9)}
@@ -164,7 +161,7 @@ import os, signal, sys, threading
 from evoexp import cli
 from evoexp.commands import interruption
 
-def command(words, is_process):
+def command(words):
     try:
         os.kill(os.getpid(), signal.SIGTERM)
         threading.Event().wait(60)
@@ -172,7 +169,7 @@ def command(words, is_process):
         threading.Event().wait()  # a library that waits for somebody who is gone
 
 interruption.PATIENCE_S = 0.5
-cli._run = command
+cli.command_module = lambda name: type("", (), {"main": command})
 sys.exit(cli.main())
 """
 
@@ -180,10 +177,21 @@ sys.exit(cli.main())
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer here")
 def test_what_an_interrupted_command_waits_for_is_interrupted_too() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", LOCKED], capture_output=True, text=True, timeout=PATIENCE_S
+        [sys.executable, "-c", LOCKED, "list"], capture_output=True, text=True, timeout=PATIENCE_S
     )
     assert done.returncode == 128 + signal.SIGTERM
     assert done.stderr == "evoexp: interrupted\n"
+
+
+def children() -> list[int]:
+    """Return the servers of workers that this process has started."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parent = stat.read_text().rpartition(") ")[2].split()[1]
+            is_server = b"worker_server" in (stat.parent / "cmdline").read_bytes()
+            found += [int(stat.parent.name)] if int(parent) == os.getpid() and is_server else []
+    return found
 
 
 def is_running(number: int, patience_s: float = 20.0) -> bool:

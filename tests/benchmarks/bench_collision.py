@@ -111,30 +111,3 @@ def bench_judging(beside: Any, when: str) -> None:
         amount=INDIVIDUALS,
         repeat=10,
     )
-
-
-@pytest.mark.parametrize("limit", [0.0, np.inf])
-@pytest.mark.parametrize("when", ["fresh", "finished"])
-def bench_clearance(beside: Any, when: str, limit: float) -> None:
-    given = condition()
-    _, problem = given.prepare()
-    rana = rana_numpy.from_condition(given)
-    q = np.ascontiguousarray(population_of(when)[:, 1:].reshape(4, -1))
-    as_arms = q.reshape(2, 2, -1).transpose(2, 0, 1).copy()  # (configurations, arms, joints)
-    pair_by_pair, broad_phase = coal_collisions(problem.collision)
-    some = np.deg2rad(q[:, :: q.shape[1] // HANDFUL][:, :HANDFUL])
-    expected = problem.collision.clearance(q, limit).least < 0.0
-    assert np.array_equal(rana_numpy.colliding(rana, as_arms), expected)
-    beside(
-        f"circles of {q.shape[1]} configurations, {when}, "
-        + ("collisions" if limit == 0.0 else "all distances"),
-        lambda: problem.collision.clearance(q, limit),
-        {
-            "numpy": (lambda: rana_numpy.colliding(rana, as_arms), q.shape[1], 1),
-            "Pinocchio + coal, pair by pair, collisions": (lambda: pair_by_pair(some), HANDFUL, 1),
-            "Pinocchio + coal, broad phase, collisions": (lambda: broad_phase(some), HANDFUL, 1),
-        },
-        unit="configuration",
-        amount=q.shape[1],
-        repeat=10,
-    )

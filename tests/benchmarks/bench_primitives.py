@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.models.primitives import PrimitiveCollision, shapes_of_geometry
+from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.scenarios.obstacles import obstacle_table
 from references import arms_6r, arms_7r, primitives_numpy
 
@@ -24,17 +24,21 @@ DRAWN = {"random": arms_6r.random_configurations, "population": arms_6r.populati
 DRAWN_7R = {"random": arms_7r.random_configurations, "population": arms_7r.population}
 
 
-def collision_of(shapes: str) -> PrimitiveCollision:
+def collision_of(shapes: str) -> BodyCollision:
     model = arms_6r.model()
     table = obstacle_table(arms_6r.OBSTACLES)
-    return PrimitiveCollision.from_geometry(
-        model, getattr(arms_6r, shapes)(model), table, arms_6r.SELF_PAIRS, IGNORED
+    return BodyCollision.build(
+        model,
+        arms_6r.shapes_of(getattr(arms_6r, shapes)(model)),
+        table,
+        arms_6r.SELF_PAIRS,
+        IGNORED,
     )
 
 
-def collision_of_7r() -> PrimitiveCollision:
+def collision_of_7r() -> BodyCollision:
     table = obstacle_table(arms_7r.OBSTACLES)
-    return PrimitiveCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
+    return BodyCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
 
 
 def coal_collisions(shapes: str, broad_phase: bool) -> Callable[[Any], Any]:
@@ -54,7 +58,7 @@ def numpy_clearance() -> Callable[[Any], Any]:
     """Return a function of q (nq, configurations): the least clearance of the spheres."""
     model = arms_6r.model()
     collision, table = collision_of("spheres"), obstacle_table(arms_6r.OBSTACLES)
-    shapes = shapes_of_geometry(arms_6r.spheres(model))
+    shapes = arms_6r.shapes_of(arms_6r.spheres(model))
     local = np.array(
         [collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)]
     )

@@ -18,7 +18,6 @@ from evoexp.configuration import compose
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.via_point_ga.strings import PER_CALL
 from evoexp.records import generations
-from evoexp.store.log import Log
 from paths.string_operators import redistribute, relax
 from references import rana_numpy
 
@@ -63,31 +62,6 @@ def bench_redistribution_and_relaxation(beside: Any) -> None:
         unit="path",
         amount=100,
         repeat=10,
-        rounds=100,
-    )
-
-
-def bench_walks(beside: Any) -> None:
-    given = condition()
-    planner, problem = given.prepare()
-    rana = rana_numpy.from_condition(given)
-    rng, other = np.random.default_rng(0), np.random.default_rng(0)
-    found = planner.sample(problem, np.random.default_rng(0), 50)
-    expected = rana_numpy.smooth(rana, rana_numpy.walks(rana, np.random.default_rng(0), 50))
-    assert np.abs(found[:2].transpose(2, 1, 0) - expected[:, 0]).max() < 1.0
-    beside(
-        "50 new trajectories: walk, redistribution, relaxation",
-        lambda: planner.sample(problem, rng, 50),
-        {
-            "numpy + scipy": (
-                lambda: rana_numpy.smooth(rana, rana_numpy.walks(rana, other, 50)),
-                50,
-                1,
-            )
-        },
-        unit="individual",
-        amount=50,
-        repeat=5,
         rounds=100,
     )
 
@@ -147,33 +121,3 @@ def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
         "median": float(np.median(cpu)),
         "replicates": len(cpu),
     }
-
-
-def bench_log(beside: Any) -> None:
-    """The log's share: the messages of all generations of a replicate, recorded beforehand.
-
-    Beside the run itself.
-    """
-    given = condition()
-    planner, problem = given.prepare()
-    recorded = list(generations(planner.evolve(problem, given.rng(0))).stretches(lambda: 0.0))
-    rng, condition_id, config_json = given.rng(0), given.id, given.to_json()  # once per batch
-    finished = run_replicate(given, 0).summary
-
-    def ours() -> None:
-        log = Log(condition_id, config_json, 0, rng)
-        for stretch in recorded:
-            log.write_stretch(stretch)
-        log.finish(finished)
-
-    def run() -> None:
-        for _ in generations(planner.evolve(problem, given.rng(0))).stretches(lambda: 0.0):
-            pass
-
-    beside(
-        "the log of a replicate (501 generations)",
-        ours,
-        {"the replicate without log": (run, 1, 1)},
-        unit="replicate",
-        rounds=20,
-    )

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from evoexp.collision.models import link_crossing_kernels as kernels
-from evoexp.collision.models.link_crossings import Crossings, everyone, no_crossings
+from evoexp.collision.planar.arm_pairs import Crossings, count_pairs
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.records import FloatArray
 
 Base = tuple[float, float]
@@ -14,7 +14,16 @@ def count_exactly(
 ) -> Crossings:
     """Count crossings of points (K, 4, N1) and (K, 4, N2) as they are given."""
     first, second = (np.ascontiguousarray(points) for points in (points_1, points_2))
-    counted = no_crossings(first.shape[2], second.shape[2])
-    rows, others, columns = everyone(counted)
-    assert kernels.crossings(base_1, first, rows, others, base_2, second, columns, 0.0, *counted)
+    sums = (np.zeros(points.shape[2], dtype=np.int64) for points in (first, second))
+    counted = Crossings(np.zeros((first.shape[2], second.shape[2]), dtype=np.int16), *sums)
+    arms = longest_arm(base_1, first), longest_arm(base_2, second)
+    count_pairs(arms[0], first, arms[1], second, 0.0, None, *counted)
     return counted
+
+
+def longest_arm(base: Base, points: FloatArray) -> Arm:
+    """Return an arm whose links are no shorter than those of any individual."""
+    elbow, tip = points[:, :2], points[:, 2:]
+    steps = elbow - np.array(base)[:, None], tip - elbow
+    first, second = (float(np.hypot(*np.moveaxis(step, 1, 0)).max()) for step in steps)
+    return Arm((float(base[0]), float(base[1])), (first, second))

@@ -3,9 +3,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from evoexp.collision.bodies.body_models import BodyCapsules
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.models.body_covers import MOST_SPHERES, Cover, capsule_cover, sphere_cover
-from evoexp.collision.models.body_models import BodyCapsules
+from evoexp.collision.covers.body_covers import MOST_SPHERES, Cover, capsule_cover, sphere_cover
 
 PLACE = pin.SE3(
     pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix(), np.array([0.3, -0.2, 0.1])

@@ -4,7 +4,7 @@ import pinocchio as pin
 import pytest
 
 from composed import composed
-from evoexp.collision.models.body_models import BodyCapsules, BodyModel, SphereSets
+from evoexp.collision.bodies.body_models import BodyCapsules, BodyModel, SphereSets
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table

@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 
 from composed import composed
-from evoexp.collision.models.contact_kernels import HIT, find_contacts
-from evoexp.collision.models.primitive_tables import Shapes
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.contact_kernels import HIT, find_contacts
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -26,35 +26,39 @@ from references import arms_6r, arms_7r
 COUNTS = [1, 7, 8, 9, 100, 333]
 
 
-def arm_7r() -> PrimitiveCollision:
+def arm_7r() -> BodyCollision:
     table = obstacle_table(arms_7r.OBSTACLES)
-    return PrimitiveCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
+    return BodyCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
 
 
-def arm_6r() -> PrimitiveCollision:
+def arm_6r() -> BodyCollision:
     model, table = arms_6r.model(), obstacle_table(arms_6r.OBSTACLES)
-    return PrimitiveCollision.from_geometry(
-        model, arms_6r.spheres(model), table, arms_6r.SELF_PAIRS, [(1, arms_6r.FLOOR)]
+    return BodyCollision.build(
+        model,
+        arms_6r.shapes_of(arms_6r.spheres(model)),
+        table,
+        arms_6r.SELF_PAIRS,
+        [(1, arms_6r.FLOOR)],
     )
 
 
 ARMS = {"6R": (arm_6r, arms_6r), "7R": (arm_7r, arms_7r)}
 
 
-def decided(collision: PrimitiveCollision, q: FloatArray, at_first: bool) -> tuple[int, BoolArray]:
+def decided(collision: BodyCollision, q: FloatArray, at_first: bool) -> tuple[int, BoolArray]:
     """Return the kernel's answer without the exact one behind it."""
     out = np.empty(q.shape[1], dtype=np.bool_)
-    return find_contacts(*collision.packed.contacts, at_first, np.ascontiguousarray(q), out), out
+    return find_contacts(collision.tables, at_first, np.ascontiguousarray(q), out), out
 
 
-def slider(size: float, obstacles: tuple[Any, ...], radius: float = 0.1) -> PrimitiveCollision:
+def slider(size: float, obstacles: tuple[Any, ...], radius: float = 0.1) -> BodyCollision:
     """A ball that slides along x, and one that turns about z at its end."""
     model = pin.Model()
     first = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
     model.addJoint(first, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
     center = np.array([[0.0, 0.0, 0.0], [size, 0.0, 0.0]])
     shapes = Shapes(np.array([1, 2]), center, center, np.array([radius, radius]))
-    return PrimitiveCollision.build(model, shapes, obstacle_table(obstacles), ())
+    return BodyCollision.build(model, shapes, obstacle_table(obstacles), ())
 
 
 @pytest.mark.parametrize("arm", ARMS)
@@ -156,7 +160,7 @@ def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
         for one in arms_6r.OBSTACLES
         if isinstance(one, SphereObstacle | BoxObstacle)
     )
-    collision = PrimitiveCollision.build(model, shapes, obstacle_table(obstacles))
+    collision = BodyCollision.build(model, shapes, obstacle_table(obstacles))
     q = rng.uniform(-np.pi, np.pi, size=(6, 1)) + rng.choice([0.1, 3.0]) * rng.normal(size=(6, 203))
     doubts, found = decided(collision, q, at_first=False)
     assert doubts == 0
@@ -165,10 +169,14 @@ def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
 
 def test_capsules_are_answered_in_full() -> None:
     model, table = arms_6r.model(), obstacle_table(arms_6r.OBSTACLES)
-    collision = PrimitiveCollision.from_geometry(
-        model, arms_6r.capsules(model), table, arms_6r.SELF_PAIRS, [(1, arms_6r.FLOOR)]
+    collision = BodyCollision.build(
+        model,
+        arms_6r.shapes_of(arms_6r.capsules(model)),
+        table,
+        arms_6r.SELF_PAIRS,
+        [(1, arms_6r.FLOOR)],
     )
-    assert not collision.packed.contacts.known
+    assert not collision.only_spheres
     q = arms_6r.random_configurations(50)
     hits = collision.collides(q)
     assert collision.any_collides(q)

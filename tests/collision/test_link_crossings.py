@@ -11,15 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from collision.exact_crossings import count_exactly
-from evoexp.collision.models.link_crossings import (
-    Arm,
-    Crossings,
-    closed_form,
-    count_crossings,
-    path_configurations,
-    update_crossings,
-)
-from evoexp.collision.models.segment_predicates import orientation, touching
+from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
+from evoexp.collision.planar.closed_form import closed_form
+from evoexp.collision.planar.planar_arms import Arm, path_configurations
+from evoexp.collision.planar.segment_predicates import orientation, touching
 from matrix import first
 from references import link_crossings_numpy as plain
 
@@ -31,7 +26,7 @@ def populations(
     rng: np.random.Generator, arms: Any, num_1: int, num_2: int, size: int = 4
 ) -> tuple[Any, Any]:
     return tuple(
-        arm.points(rng.uniform(0.0, np.pi, (size, 2, n)))
+        arm.outlines(rng.uniform(0.0, np.pi, (size, 2, n)))[:, :4]
         for arm, n in zip(arms, (num_1, num_2), strict=True)
     )
 
@@ -44,7 +39,7 @@ def check_sums(found: Crossings) -> None:
 def test_points_are_the_links_ends() -> None:
     q = np.random.default_rng(0).uniform(-7.0, 7.0, (3, 2, 5))
     one = UNEQUAL[0]
-    ends = one.points(q).reshape(3, 2, 2, 5)  # (K, elbow and tip, x and y, N)
+    ends = one.outlines(q)[:, :4].reshape(3, 2, 2, 5)  # (K, elbow and tip, x and y, N)
     steps = np.stack([np.cos(q), np.sin(q)], axis=2) * np.array(one.lengths)[:, None, None]
     assert np.allclose(ends[:, 0], np.array(one.base)[:, None] + steps[:, 0], rtol=0.0, atol=1e-15)
     assert np.allclose(ends[:, 1], ends[:, 0] + steps[:, 1], rtol=0.0, atol=1e-15)
@@ -56,7 +51,7 @@ def test_points_are_the_links_ends() -> None:
 )
 def test_counts_are_numpy_s(arms: Any, num_1: int, num_2: int) -> None:
     points_1, points_2 = populations(np.random.default_rng(num_2), arms, num_1, num_2)
-    found = count_crossings(arms[0], points_1, arms[1], points_2)
+    found = count_collisions(arms[0], points_1, arms[1], points_2)
     assert np.array_equal(
         found.counts, plain.counts_of_populations(arms[0].base, points_1, arms[1].base, points_2)
     )  # random links are far from touching
@@ -188,34 +183,6 @@ def test_mirror_and_exchange_change_nothing(kind: str) -> None:
     assert np.array_equal(exchanged.sums_2, found.sums_1)
 
 
-@given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-@settings(max_examples=40)
-def test_updates_are_full_counts(seed: int, rate_1: float, rate_2: float) -> None:
-    rng = np.random.default_rng(seed)
-    num_1, num_2 = rng.integers(1, 120, 2)
-    points = [p.copy() for p in populations(rng, SCENE_A, num_1, num_2, 2)]
-    found = count_crossings(SCENE_A[0], points[0], SCENE_A[1], points[1])
-    changed = [rng.random(num_1) < rate_1, rng.random(num_2) < rate_2]
-    for old, new, which in zip(
-        points, populations(rng, SCENE_A, num_1, num_2, 2), changed, strict=True
-    ):
-        old[:, :, which] = new[:, :, which]
-    update_crossings(found, SCENE_A[0], points[0], SCENE_A[1], points[1], *changed)
-    full = count_crossings(SCENE_A[0], points[0], SCENE_A[1], points[1])
-    for mine, theirs in zip(found, full, strict=True):
-        assert np.array_equal(mine, theirs)
-
-
-def test_unchanged_pairs_are_not_looked_at() -> None:
-    points_1, points_2 = populations(np.random.default_rng(1), SCENE_A, 60, 70)
-    found = count_crossings(SCENE_A[0], points_1, SCENE_A[1], points_2)
-    found.counts[3, 5] = 77
-    changed_1, changed_2 = np.arange(60) == 4, np.arange(70) == 6
-    update_crossings(found, SCENE_A[0], points_1, SCENE_A[1], points_2, changed_1, changed_2)
-    assert found.counts[3, 5] == 77
-    check_sums(found)
-
-
 @pytest.mark.parametrize("arms", [SCENE_A, UNEQUAL, (SCENE_A[1], SCENE_A[0])])
 def test_the_closed_form_decides_the_same(arms: Any) -> None:
     rng, size = np.random.default_rng(2), 350_000
@@ -223,9 +190,9 @@ def test_the_closed_form_decides_the_same(arms: Any) -> None:
     q_2[:, : size // 10] = q_1[:, : size // 10]  # parallel links
     q_2[:, size // 10 : size // 5] = q_1[::-1, size // 10 : size // 5]
     found = closed_form(arms[0], q_1, arms[1], q_2)
-    points_1, points_2 = arms[0].points(q_1[None]), arms[1].points(q_2[None])
-    one = [np.array(arms[0].base)[:, None], points_1[0, :2], points_1[0, 2:]]
-    two = [np.array(arms[1].base)[:, None], points_2[0, :2], points_2[0, 2:]]
+    points_1, points_2 = arms[0].outlines(q_1[None]), arms[1].outlines(q_2[None])
+    one = [np.array(arms[0].base)[:, None], points_1[0, :2], points_1[0, 2:4]]
+    two = [np.array(arms[1].base)[:, None], points_2[0, :2], points_2[0, 2:4]]
     for pair, (m, n) in enumerate(np.ndindex(2, 2)):
         expected = plain.crossing(one[m], one[m + 1], two[n], two[n + 1])
         met = np.isfinite(found.mu[pair])
@@ -315,18 +282,18 @@ def test_substeps_divide_every_segment(steps: int, size: int) -> None:
 
 def test_many_configurations_and_all_colliding() -> None:
     q = np.zeros((300, 2, 3))
-    found = count_crossings(SCENE_A[0], SCENE_A[0].points(q), SCENE_A[1], SCENE_A[1].points(q))
+    found = count_collisions(SCENE_A[0], SCENE_A[0].outlines(q), SCENE_A[1], SCENE_A[1].outlines(q))
     assert (found.counts == 300).all()
     assert (found.sums_1 == 900).all()
 
 
 def test_empty_populations() -> None:
-    found = count_crossings(
-        SCENE_A[0], np.empty((4, 4, 0)), SCENE_A[1], SCENE_A[1].points(np.zeros((4, 2, 3)))
+    found = count_collisions(
+        SCENE_A[0], np.empty((4, 4, 0)), SCENE_A[1], SCENE_A[1].outlines(np.zeros((4, 2, 3)))
     )
     assert found.counts.shape == (0, 3)
     assert np.array_equal(found.sums_2, np.zeros(3))
-    none = count_crossings(SCENE_A[0], np.empty((0, 4, 2)), SCENE_A[1], np.empty((0, 4, 3)))
+    none = count_collisions(SCENE_A[0], np.empty((0, 4, 2)), SCENE_A[1], np.empty((0, 4, 3)))
     assert not none.counts.any()
 
 
@@ -336,34 +303,22 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(
         ValueError, match=r"q must have shape \(configurations, 2, individuals\), was \(3, 4\)"
     ):
-        one.points(np.zeros((3, 4)))
+        one.outlines(np.zeros((3, 4)))
     with pytest.raises(
-        ValueError, match=r"points_2 must have shape \(configurations, 4, individuals\)"
+        ValueError, match=r"outlines_2 must have shape \(configurations, 4 or 8, individuals\)"
     ):
-        count_crossings(one, points_1, two, points_2[:, :3])
+        count_collisions(one, points_1, two, points_2[:, :3])
     with pytest.raises(ValueError, match="as many configurations, had 4 and 3"):
-        count_crossings(one, points_1, two, points_2[:3])
+        count_collisions(one, points_1, two, points_2[:3])
     with pytest.raises(ValueError, match="at most 32767 configurations, were 32768"):
-        count_crossings(one, np.zeros((32768, 4, 1)), two, np.zeros((32768, 4, 1)))
-    found = count_crossings(one, points_1, two, points_2)
-    everyone = np.ones(5, dtype=np.bool_), np.ones(6, dtype=np.bool_)
-    with pytest.raises(
-        ValueError, match=r"crossings.counts must have shape \(4, 6\), was \(5, 6\)"
-    ):
-        update_crossings(found, one, points_1[:, :, :4], two, points_2, *everyone)
-    with pytest.raises(
-        ValueError, match=r"changed_1 must be bool of shape \(5,\), was bool of shape \(6,\)"
-    ):
-        update_crossings(found, one, points_1, two, points_2, everyone[1], everyone[1])
-    with pytest.raises(ValueError, match="changed_2 must be bool"):
-        update_crossings(found, one, points_1, two, points_2, everyone[0], np.arange(6))  # type: ignore[arg-type]
+        count_collisions(one, np.zeros((32768, 4, 1)), two, np.zeros((32768, 4, 1)))
     for value in (np.nan, np.inf, 1e200):
         wrong = points_2.copy()
         wrong[2, 1, 3] = value
         with pytest.raises(ValueError, match="finite and below 1e150"):
-            count_crossings(one, points_1, two, wrong)
+            count_collisions(one, points_1, two, wrong)
     with pytest.raises(ValueError, match="finite"):
-        count_crossings(Arm((np.nan, 0.0), (1.0, 1.0)), points_1, two, points_2)
+        count_collisions(Arm((np.nan, 0.0), (1.0, 1.0)), points_1, two, points_2)
     with pytest.raises(ValueError, match=r"both have shape \(2, n\), were \(2, 3\) and \(2, 4\)"):
         closed_form(one, np.zeros((2, 3)), two, np.zeros((2, 4)))
     with pytest.raises(ValueError, match="collision_substeps must be at least 1, was 0"):

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.models.envelope_contact import Envelope, colliding
-from evoexp.collision.models.link_crossings import Arm, count_crossings
-from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions, update_collisions
+from evoexp.collision.planar.arm_pairs import count_collisions
+from evoexp.collision.planar.planar_arms import Arm, boundary, colliding, tolerance_of
 from references import link_crossings_numpy as plain
 
 SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))
@@ -29,16 +28,24 @@ def outlines(arms: Any, rng: np.random.Generator, num_1: int, num_2: int, size: 
 def expected(arms: Any, drawn: Any) -> np.ndarray:
     parts: list[Any] = []
     for arm, outline in zip(arms, drawn, strict=True):
-        parts += [arm.boundaries(outline), outline[:, 2:4], arm.tcp_radius]
+        parts += [boundaries(arm, outline), outline[:, 2:4], arm.tcp_radius]
     return plain.envelope_counts(*parts)
 
 
+def boundaries(arm: Arm, outlines: np.ndarray) -> np.ndarray:
+    """Return the four boundary lines of all outlines, (4, 4, K, N)."""
+    wide = arm._replace(half_width=max(arm.half_width, 1e-300))
+    lines = np.empty((4, 4, outlines.shape[0], outlines.shape[2]))
+    for line, k, n in np.ndindex(4, outlines.shape[0], outlines.shape[2]):
+        lines[line, :, k, n] = boundary(wide, outlines, k, n, line)
+    return lines
+
+
 def test_boundaries_are_parallel_to_the_links() -> None:
-    arm = EnvelopedArm(UNEQUAL[1], 0.04, 0.1)
+    arm = Arm(*UNEQUAL[1][:2], 0.04, 0.1)
     q = np.random.default_rng(0).uniform(0.0, np.pi, (3, 2, 5))
-    points, drawn = arm.arm.points(q), arm.outlines(q)
-    assert np.array_equal(drawn[:, :4], points)
-    lines = arm.boundaries(drawn)
+    drawn = arm.outlines(q)
+    points, lines = drawn[:, :4], boundaries(arm, drawn)
     middle = 0.5 * (lines[0::2] + lines[1::2])  # of right and left
     assert np.allclose(middle[0, 2:], points[:, :2].swapaxes(0, 1), rtol=0.0, atol=1e-15)
     assert np.allclose(middle[1], points.swapaxes(0, 1), rtol=0.0, atol=1e-15)
@@ -57,7 +64,7 @@ def test_boundaries_are_parallel_to_the_links() -> None:
     [(0.02, 0.05, 0.02, 0.05), (0.03, 0.0, 0.0, 0.2), (0.0, 0.1, 0.05, 0.0), (0.2, 0.3, 0.1, 0.4)],
 )
 def test_counts_are_numpy_s(arms: Any, sizes: Any) -> None:
-    enveloped = EnvelopedArm(arms[0], *sizes[:2]), EnvelopedArm(arms[1], *sizes[2:])
+    enveloped = Arm(*arms[0][:2], *sizes[:2]), Arm(*arms[1][:2], *sizes[2:])
     drawn = outlines(enveloped, np.random.default_rng(3), 100, 61)
     found = count_collisions(enveloped[0], drawn[0], enveloped[1], drawn[1])
     assert np.array_equal(found.counts, expected(enveloped, drawn))
@@ -66,41 +73,22 @@ def test_counts_are_numpy_s(arms: Any, sizes: Any) -> None:
     assert np.array_equal(found.sums_2, found.counts.sum(axis=0))
 
 
-@pytest.mark.parametrize("right_angles", [False, True])
-def test_without_width_and_radius_they_are_the_plain_arms(right_angles: bool) -> None:
-    rng = np.random.default_rng(5)
-    arms = [Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.25, 0.0), (0.25, 0.25))]
-    angles = [
-        rng.integers(0, 13, (4, 2, 70)) * (np.pi / 12.0)
-        if right_angles
-        else rng.uniform(0.0, np.pi, (4, 2, 70))
-        for _ in arms
-    ]
-    points = [arm.points(q) for arm, q in zip(arms, angles, strict=True)]
-    enveloped = [EnvelopedArm(arm, 0.0, 0.0) for arm in arms]
-    drawn = [arm.outlines(q) for arm, q in zip(enveloped, angles, strict=True)]
-    found = count_collisions(enveloped[0], drawn[0], enveloped[1], drawn[1])
-    assert np.array_equal(
-        found.counts, count_crossings(arms[0], points[0], arms[1], points[1]).counts
-    )
-
-
 def test_single_precision_decides_nothing_that_is_close() -> None:
     """Almost touching lines and circles: the same counts as by the careful test alone."""
     rng = np.random.default_rng(12)
     arms = (
-        EnvelopedArm(Arm((0.0, 0.0), (0.5, 0.5)), 0.125, 0.25),
-        EnvelopedArm(Arm((0.75, 0.0), (0.5, 0.5)), 0.125, 0.25),
+        Arm((0.0, 0.0), (0.5, 0.5), 0.125, 0.25),
+        Arm((0.75, 0.0), (0.5, 0.5), 0.125, 0.25),
     )
     angles = [rng.integers(0, 5, (3, 2, 80)) * (np.pi / 4.0) for _ in arms]
     drawn = [
         arm.outlines(q + rng.uniform(-1.0, 1.0, q.shape) * 10.0 ** rng.uniform(-9.0, -5.0, q.shape))
         for arm, q in zip(arms, angles, strict=True)
     ]
-    one, two = (Envelope(*arm.arm, arm.half_width, arm.tcp_radius) for arm in arms)
+    near = tolerance_of(*arms)
     counts = np.zeros((80, 80), dtype=np.int64)
     for k, i, j in np.ndindex(3, 80, 80):
-        counts[i, j] += colliding(one, drawn[0], i, two, drawn[1], j, k)
+        counts[i, j] += colliding(arms[0], drawn[0], i, arms[1], drawn[1], j, k, near)
     assert np.array_equal(count_collisions(arms[0], drawn[0], arms[1], drawn[1]).counts, counts)
 
 
@@ -110,12 +98,12 @@ def test_touching_boundary_lines_are_exact() -> None:
     which = np.array(np.meshgrid([0, 1, 2], [0, 1, 2])).reshape(2, -1)
     drawn = []
     arms = [
-        EnvelopedArm(Arm((0.0, 0.0), (0.5, 0.5)), 0.125, 0.0),
-        EnvelopedArm(Arm((0.75, 0.0), (0.5, 0.5)), 0.125, 0.0),
+        Arm((0.0, 0.0), (0.5, 0.5), 0.125, 0.0),
+        Arm((0.75, 0.0), (0.5, 0.5), 0.125, 0.0),
     ]
     for enveloped in arms:
         first, second = exact[which[0]].T, exact[which[1]].T
-        elbow = np.array(enveloped.arm.base)[:, None] + 0.5 * first
+        elbow = np.array(enveloped.base)[:, None] + 0.5 * first
         drawn.append(np.concatenate([elbow, elbow + 0.5 * second, first, second])[None])
     found = count_collisions(arms[0], drawn[0], arms[1], drawn[1])
     assert np.array_equal(found.counts, exact_line_counts(arms, drawn))
@@ -124,7 +112,7 @@ def test_touching_boundary_lines_are_exact() -> None:
 
 def exact_line_counts(arms: Any, drawn: Any) -> np.ndarray:
     one, two = (
-        arm.boundaries(outline)[:, :, 0] for arm, outline in zip(arms, drawn, strict=True)
+        boundaries(arm, outline)[:, :, 0] for arm, outline in zip(arms, drawn, strict=True)
     )  # (4, 4, N)
     counts = np.zeros((one.shape[2], two.shape[2]), dtype=np.int64)
     for i, j in np.ndindex(counts.shape):
@@ -147,7 +135,7 @@ def exact_line_counts(arms: Any, drawn: Any) -> np.ndarray:
 def test_exchanged_arms_collide_as_often(
     half_1: float, radius_1: float, half_2: float, radius_2: float, seed: int
 ) -> None:
-    arms = EnvelopedArm(UNEQUAL[0], half_1, radius_1), EnvelopedArm(UNEQUAL[1], half_2, radius_2)
+    arms = Arm(*UNEQUAL[0][:2], half_1, radius_1), Arm(*UNEQUAL[1][:2], half_2, radius_2)
     drawn = outlines(arms, np.random.default_rng(seed), 20, 13)
     found = count_collisions(arms[0], drawn[0], arms[1], drawn[1])
     assert np.array_equal(
@@ -158,35 +146,17 @@ def test_exchanged_arms_collide_as_often(
 @given(st.integers(0, 1000), st.floats(0.0, 0.1))
 @settings(max_examples=25)
 def test_a_larger_circle_never_collides_less(seed: int, more: float) -> None:
-    small = EnvelopedArm(SCENE_A[0], 0.02, 0.05), EnvelopedArm(SCENE_A[1], 0.02, 0.05)
-    large = EnvelopedArm(SCENE_A[0], 0.02, 0.05 + more), small[1]
+    small = Arm(*SCENE_A[0][:2], 0.02, 0.05), Arm(*SCENE_A[1][:2], 0.02, 0.05)
+    large = Arm(*SCENE_A[0][:2], 0.02, 0.05 + more), small[1]
     drawn = outlines(small, np.random.default_rng(seed), 20, 20)
     before = count_collisions(small[0], drawn[0], small[1], drawn[1]).counts
     assert (count_collisions(large[0], drawn[0], large[1], drawn[1]).counts >= before).all()
 
 
-@given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-@settings(max_examples=25)
-def test_updates_are_full_counts(seed: int, rate_1: float, rate_2: float) -> None:
-    rng = np.random.default_rng(seed)
-    num_1, num_2 = rng.integers(1, 120, 2)
-    arms = EnvelopedArm(SCENE_A[0], 0.02, 0.05), EnvelopedArm(SCENE_A[1], 0.01, 0.1)
-    drawn = outlines(arms, rng, num_1, num_2, 2)
-    found = count_collisions(arms[0], drawn[0], arms[1], drawn[1])
-    changed = [rng.random(num_1) < rate_1, rng.random(num_2) < rate_2]
-    for old, new, which in zip(drawn, outlines(arms, rng, num_1, num_2, 2), changed, strict=True):
-        old[:, :, which] = new[:, :, which]
-    update_collisions(found, arms[0], drawn[0], arms[1], drawn[1], *changed)
-    for mine, theirs in zip(
-        found, count_collisions(arms[0], drawn[0], arms[1], drawn[1]), strict=True
-    ):
-        assert np.array_equal(mine, theirs)
-
-
 def test_links_without_length_leave_the_circles() -> None:
     arms = (
-        EnvelopedArm(Arm((0.0, 0.0), (0.0, 0.0)), 0.0, 0.25),
-        EnvelopedArm(Arm((0.5, 0.0), (0.0, 0.0)), 0.0, 0.25),
+        Arm((0.0, 0.0), (0.0, 0.0), 0.0, 0.25),
+        Arm((0.5, 0.0), (0.0, 0.0), 0.0, 0.25),
     )
     drawn = [arm.outlines(np.zeros((1, 2, 1))) for arm in arms]
     assert count_collisions(arms[0], drawn[0], arms[1], drawn[1]).counts[0, 0] == 1  # circles touch
@@ -195,7 +165,7 @@ def test_links_without_length_leave_the_circles() -> None:
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    arms = EnvelopedArm(SCENE_A[0], 0.02, 0.05), EnvelopedArm(SCENE_A[1], 0.02, 0.05)
+    arms = Arm(*SCENE_A[0][:2], 0.02, 0.05), Arm(*SCENE_A[1][:2], 0.02, 0.05)
     drawn = outlines(arms, np.random.default_rng(0), 3, 4)
     with pytest.raises(
         ValueError, match=r"outlines_1 must have shape \(configurations, 8, individuals\)"
@@ -205,13 +175,9 @@ def test_what_does_not_fit_is_refused() -> None:
         ValueError, match="one: half_width and tcp_radius must be at least 0, were -0.1 and 0.05"
     ):
         count_collisions(arms[0]._replace(half_width=-0.1), drawn[0], arms[1], drawn[1])
-    with pytest.raises(ValueError, match="two must be finite"):
+    with pytest.raises(ValueError, match="two and its outlines must be finite"):
         count_collisions(arms[0], drawn[0], arms[1]._replace(tcp_radius=np.nan), drawn[1])
-    with pytest.raises(ValueError, match="two must be finite"):
+    with pytest.raises(ValueError, match="two and its outlines must be finite"):
         count_collisions(arms[0], drawn[0], arms[1]._replace(tcp_radius=np.inf), drawn[1])
-    with pytest.raises(ValueError, match="outlines must be finite"):
+    with pytest.raises(ValueError, match="one and its outlines must be finite"):
         count_collisions(arms[0], drawn[0] + np.nan, arms[1], drawn[1])
-    with pytest.raises(
-        ValueError, match=r"outlines must have shape \(configurations, 8, individuals\)"
-    ):
-        arms[0].boundaries(drawn[0][:, :4])

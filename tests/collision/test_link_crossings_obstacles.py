@@ -6,13 +6,9 @@ import coal
 import numpy as np
 import pytest
 
-from evoexp.collision.models.link_crossings import Arm
-from evoexp.collision.models.link_envelopes import EnvelopedArm
-from evoexp.collision.models.link_obstacles import (
-    count_enveloped_obstacle_collisions,
-    count_obstacle_collisions,
-    planar_obstacles,
-)
+from collision.test_link_crossings_envelopes import boundaries
+from evoexp.collision.planar.arm_obstacles import count_obstacle_collisions, planar_obstacles
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,
@@ -66,11 +62,11 @@ def distance(first: Any, second: Any) -> float:
 def test_counts_are_coal_s(names: Any) -> None:
     table = obstacle_table(tuple(OBSTACLES[name] for name in names))
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (4, 2, 60))
-    points = ARM.points(q)
+    points = ARM.outlines(q)
     found = count_obstacle_collisions(ARM, points, planar_obstacles(table))
     least = np.empty((4, 60))
     for k, n in np.ndindex(4, 60):
-        rods = [rod([*ARM.base, *points[k, :2, n]]), rod(points[k, :, n])]
+        rods = [rod([*ARM.base, *points[k, :2, n]]), rod(points[k, :4, n])]
         least[k, n] = min(
             distance(one, solid(table, o)) for one in rods for o in range(len(table.kind))
         )
@@ -85,10 +81,10 @@ def test_counts_are_coal_s(names: Any) -> None:
 @pytest.mark.parametrize("names", [*([name] for name in OBSTACLES), list(OBSTACLES)], ids=" ".join)
 def test_envelopes_are_coal_s(names: Any) -> None:
     table = obstacle_table(tuple(OBSTACLES[name] for name in names))
-    arm = EnvelopedArm(ARM, 0.03, 0.07)
+    arm = ARM._replace(half_width=0.03, tcp_radius=0.07)
     drawn = arm.outlines(np.random.default_rng(7).uniform(-np.pi, np.pi, (4, 2, 60)))
-    found = count_enveloped_obstacle_collisions(arm, drawn, planar_obstacles(table))
-    lines = arm.boundaries(drawn)
+    found = count_obstacle_collisions(arm, drawn, planar_obstacles(table))
+    lines = boundaries(arm, drawn)
     least = np.empty((4, 60))
     for k, n in np.ndindex(4, 60):
         ball = coal.Sphere(arm.tcp_radius), coal.Transform3s(np.array([*drawn[k, 2:4, n], 0.0]))
@@ -101,14 +97,6 @@ def test_envelopes_are_coal_s(names: Any) -> None:
     ).any()  # a rod has no inside: where it crosses, coal may say 0
     assert np.array_equal(found, (least <= 0.0).sum(axis=0))
     assert 0 < found.sum() < least.size
-
-
-def test_without_width_and_radius_they_are_the_plain_arms() -> None:
-    obstacles = planar_obstacles(obstacle_table(tuple(OBSTACLES.values())))
-    q = np.random.default_rng(8).uniform(-np.pi, np.pi, (4, 2, 200))
-    arm = EnvelopedArm(ARM, 0.0, 0.0)
-    found = count_enveloped_obstacle_collisions(arm, arm.outlines(q), obstacles)
-    assert np.array_equal(found, count_obstacle_collisions(ARM, ARM.points(q), obstacles))
 
 
 @pytest.mark.parametrize(
@@ -134,13 +122,13 @@ def test_touching_counts(obstacle: Any, touches: float, misses: float) -> None:
     for height, expected in ((touches, 1), (misses, 0)):
         arm = Arm((0.0, height), (0.5, 0.5))
         assert (
-            count_obstacle_collisions(arm, arm.points(np.zeros((1, 2, 1))), obstacles)[0]
+            count_obstacle_collisions(arm, arm.outlines(np.zeros((1, 2, 1))), obstacles)[0]
             == expected
         )
 
 
 def test_a_link_inside_collides_and_nothing_collides_with_nothing() -> None:
-    points = ARM.points(np.random.default_rng(1).uniform(0.0, np.pi, (4, 2, 9)))
+    points = ARM.outlines(np.random.default_rng(1).uniform(0.0, np.pi, (4, 2, 9)))
     for name, obstacle in {
         "disc": SphereObstacle(shape="sphere", center=(0.0, 0.0), radius=3.0),
         "box": BoxObstacle(
@@ -173,7 +161,6 @@ def test_obstacles_out_of_the_plane_are_refused(obstacle: Any) -> None:
 
 
 def test_points_of_another_shape_are_refused() -> None:
-    with pytest.raises(
-        ValueError, match=r"points must have shape \(configurations, 4, individuals\), was \(4, 3\)"
-    ):
-        count_obstacle_collisions(ARM, np.zeros((4, 3)), planar_obstacles(obstacle_table(())))
+    nothing = planar_obstacles(obstacle_table(()))
+    with pytest.raises(ValueError, match=r"outlines must have shape .* was \(4, 3\)"):
+        count_obstacle_collisions(ARM, np.zeros((4, 3)), nothing)

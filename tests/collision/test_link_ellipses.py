@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pytest
 
-from evoexp.collision.models.link_ellipses import EllipseCollision, LinkEllipses, _spread
+from evoexp.collision.planar.link_ellipses import EllipseCollision, LinkEllipses, _spread
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.arms import Arms

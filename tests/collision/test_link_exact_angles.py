@@ -12,18 +12,10 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.collision.models.link_crossings import (
-    Arm,
-    closed_form,
-    count_crossings,
-    update_crossings,
-)
-from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions
-from evoexp.collision.models.link_obstacles import (
-    count_enveloped_obstacle_collisions,
-    count_obstacle_collisions,
-    planar_obstacles,
-)
+from evoexp.collision.planar.arm_obstacles import count_obstacle_collisions, planar_obstacles
+from evoexp.collision.planar.arm_pairs import count_collisions
+from evoexp.collision.planar.closed_form import closed_form
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.proofs import judge_motion
@@ -82,17 +74,9 @@ def test_lines_collide_as_in_exact_arithmetic(step: int, end: int, distance: int
         [any(exact_touch(*a, *b) for a in one for b in two) for two in exact_2] for one in exact_1
     ]
     q = angles(chosen)
-    points = first.points(q), second.points(q)
-    counts = count_crossings(first, points[0], second, points[1]).counts
+    points = first.outlines(q), second.outlines(q)
+    counts = count_collisions(first, points[0], second, points[1]).counts
     check(counts, expected)
-    # arms without envelopes, the update of changed individuals, the closed form
-    plain = [EnvelopedArm(arm, 0.0, 0.0) for arm in (first, second)]
-    outlines = [arm.outlines(q) for arm in plain]
-    check(count_collisions(plain[0], outlines[0], plain[1], outlines[1]).counts, expected)
-    flipped = count_crossings(first, points[0][:, :, ::-1].copy(), second, points[1])
-    everyone = np.ones(len(chosen), dtype=np.bool_)
-    update_crossings(flipped, first, points[0], second, points[1], everyone, ~everyone)
-    check(flipped.counts, expected)
     pairs = np.array(list(np.ndindex(len(chosen), len(chosen)))).T
     closed = closed_form(first, q[0][:, pairs[0]], second, q[0][:, pairs[1]])
     check(closed.colliding.reshape(counts.shape), expected)
@@ -101,7 +85,7 @@ def test_lines_collide_as_in_exact_arithmetic(step: int, end: int, distance: int
 def test_multiples_of_15_degrees_collide_as_in_exact_arithmetic() -> None:
     chosen, distance = postures(15), (300, 100)
     q, first, second = angles(chosen), arm_at(0), arm_at(*distance)
-    counts = count_crossings(first, first.points(q), second, second.points(q)).counts
+    counts = count_collisions(first, first.outlines(q), second, second.outlines(q)).counts
     exact_1 = [lines_of(exact_arm((0, 0), LINK, posture)) for posture in chosen]
     exact_2 = [lines_of(exact_arm(distance, LINK, posture)) for posture in chosen]
     drawn = np.random.default_rng(3).integers(0, len(chosen), (1000, 2))
@@ -115,7 +99,7 @@ def test_envelopes_collide_as_in_exact_arithmetic(
 ) -> None:
     """Widths and radii at which boundary lines lie on one line, and circles touch them."""
     chosen = postures(45)
-    enveloped = [EnvelopedArm(arm_at(x), half_width * UNIT, radius * UNIT) for x in (0, distance)]
+    enveloped = [Arm(*arm_at(x)[:2], half_width * UNIT, radius * UNIT) for x in (0, distance)]
     exact = [
         [
             (
@@ -186,17 +170,17 @@ def test_obstacles_are_hit_as_in_exact_arithmetic() -> None:
         ),
     ]
     arm = arm_at(0)
-    circled = EnvelopedArm(arm, 0.0, RADIUS * UNIT)
+    circled = arm._replace(tcp_radius=RADIUS * UNIT)
     for obstacle, touches in cases:
         flat = planar_obstacles(obstacle_table((obstacle,)))
         links = [any(touches(line, 0) for line in lines_of(points)) for points in arms]
-        check(count_obstacle_collisions(arm, arm.points(angles(chosen)), flat), links)
+        check(count_obstacle_collisions(arm, arm.outlines(angles(chosen)), flat), links)
         tips = [
             met or touches((points[2], points[2]), RADIUS)
             for met, points in zip(links, arms, strict=True)
         ]
         outlines = circled.outlines(angles(chosen))
-        check(count_enveloped_obstacle_collisions(circled, outlines, flat), tips)
+        check(count_obstacle_collisions(circled, outlines, flat), tips)
 
 
 def turned(t: Fraction) -> tuple[Fraction, Fraction]:
@@ -234,7 +218,7 @@ def test_parallel_links_are_decided_at_any_angle(offset: float, tilt: Fraction) 
                 expected.append(
                     any(exact_touch(*m, *n) for m in lines_of(one) for n in lines_of(two))
                 )
-                counts = count_crossings(first, first.points(q_1), second, second.points(q_2))
+                counts = count_collisions(first, first.outlines(q_1), second, second.outlines(q_2))
                 found.append(counts.counts[0, 0])
     check(found, expected)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from collision.touching_arms import ONE_PLANAR, THREE_PLANAR, TWO_PLANAR, TWO_SPATIAL
-from evoexp.collision.models.planar_contacts import contacts, link_lines
-from evoexp.collision.models.touching_spheres import SphereCollision, TouchingSpheres
+from evoexp.collision.bodies.planar_contacts import contacts, link_lines
+from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.robots.arms import Arms
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_chain import PlanarChain

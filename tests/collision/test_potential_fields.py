@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.collision.models.potential_fields import PotentialFields
+from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.papers.chen.fields_page import (
     MISSING,

@@ -10,12 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.models.primitives import (
-    PrimitiveCollision,
-    Shapes,
-    default_pairs,
-    shapes_of_geometry,
-)
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_shapes import Shapes, default_pairs
 from evoexp.robots.kinematics import UnsupportedJoint
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -167,7 +163,7 @@ def check_against_plain(
     table = obstacle_table(random_obstacles(rng))
     joints = {one.parentJoint for one in geometry.geometryObjects}
     pairs, arms = default_pairs(model, joints), [-1, *rng.integers(0, 2, size=model.nq).tolist()]
-    collision = PrimitiveCollision.from_geometry(model, geometry, table, arms=arms)
+    collision = BodyCollision.build(model, arms_6r.shapes_of(geometry), table, arms=arms)
     q = rng.uniform(-np.pi, np.pi, size=(model.nq, 5))
     found = collision.clearance(q)
     for sample in range(q.shape[1]):
@@ -206,8 +202,12 @@ def test_a_6r_arm_agrees_with_coal(shapes: str) -> None:
     model = arms_6r.model()
     geometry = getattr(arms_6r, shapes)(model)
     ignored = [(1, arms_6r.FLOOR)]
-    collision = PrimitiveCollision.from_geometry(
-        model, geometry, obstacle_table(arms_6r.OBSTACLES), arms_6r.SELF_PAIRS, ignored
+    collision = BodyCollision.build(
+        model,
+        arms_6r.shapes_of(geometry),
+        obstacle_table(arms_6r.OBSTACLES),
+        arms_6r.SELF_PAIRS,
+        ignored,
     )
     scene = arms_6r.with_obstacles(geometry, arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, ignored)
     data, places = model.createData(), scene.createData()
@@ -232,7 +232,7 @@ def test_depths_agree_with_plain_numpy_in_a_crowd_of_large_obstacles() -> None:
     Where a ball around a body is nearer than it is deep.
     """
     model, rng = arms_6r.model(), np.random.default_rng(7)
-    shapes = shapes_of_geometry(arms_6r.spheres(model))
+    shapes = arms_6r.shapes_of(arms_6r.spheres(model))
     obstacles = (*arms_6r.OBSTACLES, *random_obstacles(rng)[:-1])
     large = (
         BoxObstacle(
@@ -244,7 +244,7 @@ def test_depths_agree_with_plain_numpy_in_a_crowd_of_large_obstacles() -> None:
         HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, 0.6), normal=(0.1, 0.2, 1.0)),
     )
     table = obstacle_table(obstacles + large)
-    collision = PrimitiveCollision.build(model, shapes, table)
+    collision = BodyCollision.build(model, shapes, table)
     q = arms_6r.random_configurations(1000)
     local = np.array(
         [collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)]
@@ -265,8 +265,8 @@ def test_verdicts_agree_with_coal(shapes: str, drawn: str) -> None:
     geometry = getattr(arms_6r, shapes)(model)
     ignored = [(1, arms_6r.FLOOR)]
     table = obstacle_table(arms_6r.OBSTACLES)
-    collision = PrimitiveCollision.from_geometry(
-        model, geometry, table, arms_6r.SELF_PAIRS, ignored
+    collision = BodyCollision.build(
+        model, arms_6r.shapes_of(geometry), table, arms_6r.SELF_PAIRS, ignored
     )
     scene = arms_6r.with_obstacles(geometry, arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, ignored)
     pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(model, scene, 1)
@@ -278,13 +278,13 @@ def test_verdicts_agree_with_coal(shapes: str, drawn: str) -> None:
 
 def collision_of(
     seed: int, size: int = 6, arms: int = 2
-) -> tuple[PrimitiveCollision, np.random.Generator]:
+) -> tuple[BodyCollision, np.random.Generator]:
     rng = np.random.default_rng(seed)
     model = random_tree(rng, size, chain=True)
     geometry = random_geometry(rng, model, 20, 6)
     cut = [-1, *(k * arms // model.nq for k in range(model.nq))]
     table = obstacle_table(random_obstacles(rng))
-    return PrimitiveCollision.from_geometry(model, geometry, table, arms=cut), rng
+    return BodyCollision.build(model, arms_6r.shapes_of(geometry), table, arms=cut), rng
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -338,7 +338,7 @@ def test_pairs_arms_and_ignored_obstacles_are_the_callers() -> None:
     q = np.zeros((2, 1))
 
     def clearance(**options: Any) -> list[float]:
-        collision = PrimitiveCollision.build(model, shapes, obstacle_table((floor,)), **options)
+        collision = BodyCollision.build(model, shapes, obstacle_table((floor,)), **options)
         return [float(row[0]) for row in collision.clearance(q)]
 
     assert clearance() == [-1.0, 3.0, np.inf]  # 5 m apart, two trees; the world is their parent
@@ -354,32 +354,6 @@ def two_sticks() -> Any:
     return model
 
 
-def test_more_obstacles_and_pairs_than_a_word_has_bits() -> None:
-    rng = np.random.default_rng(3)
-    model = random_tree(rng, 14, chain=True)
-    geometry = random_geometry(rng, model, 60, 0)
-    obstacles = tuple(one for _ in range(21) for one in random_obstacles(rng))
-    table = obstacle_table(obstacles)
-    q = rng.uniform(-np.pi, np.pi, size=(14, 3))
-    collision = PrimitiveCollision.from_geometry(model, geometry, table)
-    assert len(collision.pairs) > 64
-    pairs = default_pairs(model, {one.parentJoint for one in geometry.geometryObjects})
-    found = collision.clearance(q)
-    for sample in range(2):
-        expected = plain_clearances(
-            model, geometry, table, pairs, [0] * model.njoints, q[:, sample]
-        )
-        agree([row[sample] for row in found], expected, -np.inf)
-    # more encounters at once than are listed: of equal obstacles, all are near
-    equal = obstacle_table(random_obstacles(rng) * 21)
-    collision = PrimitiveCollision.from_geometry(model, geometry, equal)
-    crowd = q[:, :1] + rng.normal(size=(14, 130)) * 1e-3
-    together = collision.clearance(crowd)
-    for sample in range(crowd.shape[1]):
-        alone = collision.clearance(np.ascontiguousarray(crowd[:, sample : sample + 1]))
-        assert [row[sample] for row in together] == [row[0] for row in alone]
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -393,7 +367,7 @@ def test_more_obstacles_and_pairs_than_a_word_has_bits() -> None:
 def test_wrong_shapes_are_refused(changes: dict[str, np.ndarray], message: str) -> None:
     good = Shapes(np.array([1, 2]), np.zeros((2, 3)), np.ones((2, 3)), np.ones(2))
     with pytest.raises(ValueError, match=message):
-        PrimitiveCollision.build(two_sticks(), good._replace(**changes), NONE)
+        BodyCollision.build(two_sticks(), good._replace(**changes), NONE)
 
 
 @pytest.mark.parametrize(
@@ -411,10 +385,10 @@ def test_wrong_shapes_are_refused(changes: dict[str, np.ndarray], message: str) 
 def test_wrong_pairs_are_refused(options: dict[str, Any], message: str) -> None:
     shapes = Shapes(np.array([1, 2]), np.zeros((2, 3)), np.ones((2, 3)), np.ones(2))
     with pytest.raises(ValueError, match=message):
-        PrimitiveCollision.build(two_sticks(), shapes, NONE, **options)
+        BodyCollision.build(two_sticks(), shapes, NONE, **options)
 
 
-def test_wrong_arguments_and_geometries_are_refused() -> None:
+def test_wrong_arguments_are_refused() -> None:
     collision, _ = collision_of(1)
     with pytest.raises(ValueError, match=r"q must have shape \(6, configurations\), was \(5, 2\)"):
         collision.collides(np.zeros((5, 2)))
@@ -422,16 +396,8 @@ def test_wrong_arguments_and_geometries_are_refused() -> None:
         collision.clearance(np.zeros(6))
     with pytest.raises(ValueError, match="limit must be a number, was nan"):
         collision.clearance(np.zeros((6, 1)), np.nan)
-    geometry = pin.GeometryModel()
-    geometry.addGeometryObject(
-        pin.GeometryObject("cube", 1, 0, pin.SE3.Identity(), coal.Box(1.0, 1.0, 1.0))
-    )
-    with pytest.raises(
-        ValueError, match=r"object 'cube' must be a coal.Sphere or a coal.Capsule, is a Box"
-    ):
-        shapes_of_geometry(geometry)
     free = pin.Model()
     free.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
     shapes = Shapes(np.array([1]), np.zeros((1, 3)), np.zeros((1, 3)), np.ones(1))
     with pytest.raises(UnsupportedJoint):
-        PrimitiveCollision.build(free, shapes, NONE)
+        BodyCollision.build(free, shapes, NONE)

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.models.primitives import PrimitiveCollision, Shapes
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
@@ -55,7 +56,7 @@ def clearance(
     """Clearances of shapes on a hinge at rest, and on the world beside it."""
     shapes = Shapes(np.array(joints), np.array(starts), np.array(ends), np.array(radii))
     pairs = [(0, 1)] if len(joints) > 1 else []
-    collision = PrimitiveCollision.build(hinge(), shapes, obstacle_table(obstacles), pairs)
+    collision = BodyCollision.build(hinge(), shapes, obstacle_table(obstacles), pairs)
     return collision.clearance(np.zeros((1, 1)))
 
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from collision.touching_arms import ONE_PLANAR, THREE_PLANAR, TWO_PLANAR, TWO_SPATIAL
-from evoexp.collision.models.touching_spheres import SphereCollision, TouchingSpheres
+from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.numeric.rotations import rotation_matrix
 from evoexp.robots.arms import Arms
 from evoexp.robots.assembly import Robot

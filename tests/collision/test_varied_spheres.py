@@ -6,8 +6,8 @@ import pinocchio as pin
 import pytest
 
 from collision.test_hulls import cloud, convex
-from evoexp.collision.models import body_covers
-from evoexp.collision.models.body_covers import MOST_VARIED, sphere_cover
+from evoexp.collision.covers import body_covers
+from evoexp.collision.covers.body_covers import MOST_VARIED, sphere_cover
 
 SIZES = {"ball": 0.1, "cloud": 0.04, "plate": 0.03, "cylinder": 0.07}
 

@@ -16,8 +16,8 @@ def outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def evoexp(outputs: Path, capsys: pytest.CaptureFixture[str]) -> Evoexp:
-    """Return what runs a command."""
+def evoexp(outputs: Path, capsys: pytest.CaptureFixture[str], blank_figures: None) -> Evoexp:
+    """Return what runs a command; figures of its reports are blank."""
 
     def run(*words: str) -> Said:
         capsys.readouterr()

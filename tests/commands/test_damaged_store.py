@@ -89,15 +89,6 @@ def test_load_warns(run: RunDirectory) -> None:
     assert frames.generations["replicate"].unique().tolist() == [1]
 
 
-def test_a_damaged_replicate_beyond_those_asked_for_runs_again(
-    evoexp: Evoexp, run: RunDirectory
-) -> None:
-    run.log_path(1).write_bytes(b"")
-    assert evoexp("run", *PLANAR, "num_replicates=1", "--no-report").code == 0
-    assert run.log_path(1).stat().st_size > 0
-    assert evoexp("reproduce", run.hash12).code == 0
-
-
 def test_a_damaged_log_that_was_never_asked_for_is_set_aside_alone(
     evoexp: Evoexp, run: RunDirectory
 ) -> None:
@@ -131,32 +122,6 @@ def test_two_logs_that_changed_places(
     assert evoexp("reproduce", str(first)).code == 0, "anywhere, a log is compared by itself"
     assert evoexp("run", *PLANAR, "--no-report").code == 0
     assert evoexp("reproduce", run.hash12).code == 0
-
-
-@pytest.mark.parametrize("name", ["config.json", "manifest.json"])
-@pytest.mark.parametrize("content", [None, b"", b'{"condition": "0"}'])
-def test_run_writes_configuration_and_manifest_again(
-    evoexp: Evoexp, run: RunDirectory, name: str, content: bytes | None
-) -> None:
-    path = run.path / name
-    whole = path.read_bytes()
-    path.unlink()
-    if content is not None:
-        path.write_bytes(content)
-    said = evoexp("run", *PLANAR, "--no-report")
-    assert said.code == 0
-    (line,) = lines(said.err)
-    assert line.startswith(f"evoexp: run {run.hash12}: damaged, and written again: {name} (")
-    assert "nothing to run" in said.out
-    assert (run.path / f"{name}.damaged").exists() == (content is not None)
-    if name == "config.json":
-        assert path.read_bytes() == whole
-    else:
-        restored, before = json.loads(path.read_bytes()), json.loads(whole)
-        assert restored.pop("restored_from") == "0000.mcap"
-        assert restored.pop("exact_boxes") == {"coal": True}
-        assert restored == before | {"git": None, "command": restored["command"]}
-    assert evoexp("list").err == ""
 
 
 def test_a_run_without_its_configuration_is_not_answered_from_the_shipped_table(

@@ -4,7 +4,6 @@ What is stored, what is shipped, what failed, what is damaged.
 """
 
 import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import pytest
 from command_samples import SMALL, Evoexp
 
 from evoexp import shipped
-from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import description, options
 from evoexp.shipped import Shipped
@@ -111,24 +109,6 @@ def test_damaged_runs_are_listed_beside_the_others(
     assert "0001.mcap (cut" in said.err
 
 
-def test_show_takes_from_a_log_what_is_damaged(
-    evoexp: Evoexp, refused: Callable[..., str], stored: Path
-) -> None:
-    first, second, *_ = find_runs(stored)
-    whole = evoexp("show", first.hash12).out
-    (first.path / "config.json").write_text("{}")
-    said = evoexp("show", first.hash12)
-    assert (said.code, said.out) == (0, whole)
-    assert f"{first.path}/config.json: damaged" in said.err
-    assert "taken from 0000.mcap" in said.err
-    (second.path / "manifest.json").write_text("[")
-    said = evoexp("show", second.hash12)
-    assert said.code == 0
-    assert f"{second.path}/manifest.json: damaged" in said.err
-    shutil.rmtree(second.replicates)
-    assert f"{second.path}/manifest.json: damaged" in refused("show", second.hash12)
-
-
 def test_show(evoexp: Evoexp, stored: Path, width: int) -> None:
     for run in find_runs(stored):
         run.write_failure(7, "ArithmeticError: [/] is told to fail", "Traceback …")
@@ -188,23 +168,6 @@ def test_a_shipped_condition_that_never_ran_here(
     )
     assert "\ncontrol      random_search()\n" in said.out
     assert not outputs.exists()
-
-
-def test_reproduce_compares_with_the_shipped_table(
-    evoexp: Evoexp, one_shipped: Shipped, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    said = evoexp("reproduce", one_shipped.condition_id[:6])
-    assert (said.code, "DIVERGES" in said.out, "MATCH" in said.out) == (1, True, False)
-    said = evoexp("reproduce", one_shipped.condition_id[:6], "--replicate", "1")
-    assert said.code == 2
-    assert said.err.startswith("evoexp: NOTHING TO COMPARE: replicate 1 of ")
-    condition = (
-        compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
-    )
-    right = one_shipped._replace(digest=run_replicate(condition, 0).summary.digest)
-    monkeypatch.setattr(shipped, "shipped", lambda: (right,))
-    said = evoexp("reproduce", one_shipped.condition_id[:6], "--replicate", "0")
-    assert (said.code, "replicate 0 against the shipped table: MATCH" in said.out) == (0, True)
 
 
 def test_an_ambiguous_shipped_hash_lists_the_candidates(

@@ -141,7 +141,7 @@ def test_a_manifest_of_other_kinds_is_damaged(
     with_manifest(run, **entries)
     (problems,) = (r["problems"] for r in json.loads(evoexp("verify", run.hash12, "--json").out))
     assert problems["manifest.json"].startswith("damaged: ")
-    for words in (("list",), ("show", run.hash12), ("report", run.hash12)):
+    for words in (("list",), ("show", run.hash12)):
         said = evoexp(*words)
         assert said.code == 0 and "Traceback" not in said.err and "\x1b" not in said.out
 

@@ -24,8 +24,7 @@ Refused = Callable[..., str]
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 ARMS = ("experiment=rana_obstacles", *SERIAL)
-EXPERIMENTS = ", ".join(options("experiment"))
-OPTIONS = f"(options: {EXPERIMENTS})"
+CHOSEN = f"must be chosen: experiment=NAME, one of {len(options('experiment'))}: evoexp list"
 
 
 @pytest.mark.examples(11)
@@ -41,7 +40,6 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("gaa.mutation_rate=1", "gaa: unknown setting; did you mean 'ga'?"),
         ("mutation_rate=1", "mutation_rate: unknown setting; did you mean 'ga.mutation_rate'?"),
         ("+ga.temperature=1", "ga.temperature: unknown setting"),
-        ("++temperature=1", "temperature: unknown setting (known here:"),
         (
             "+reference=x",
             "reference: no option 'x' (options: grid_frontier, placement_conventional, ",
@@ -50,25 +48,13 @@ OPTIONS = f"(options: {EXPERIMENTS})"
             "robot.arms.0.length=1",
             "robot.arms[0].length: unknown setting; did you mean 'link_lengths'?",
         ),
-        (
-            "robot.arms.x.length=1",
-            "robot.arms.x: must be an index from 0 to 1 (+robot.arms.2=… adds one), was 'x'",
-        ),
-        (
-            "scenario.obstacles.7.radius=3",
-            "scenario.obstacles.7: must be ",
-        ),
         ("ga=rana_plana", "ga: no option 'rana_plana'; did you mean 'rana_planar'? (options: "),
         ("robot=../robot/two_planar_2r", "robot: no option '../robot/two_planar_2r'"),
         ("report.figures=ranna", "report.figures: no option 'ranna'; did you mean 'rana'?"),
         ("runner.workers=1", "runner.workers: unknown setting; did you mean 'num_workers'?"),
         # types and ranges
         ("ga.mutation_rate=often", "ga.mutation_rate: must be a number, was 'often'"),
-        ("ga.mutation_rate=nan", "ga.mutation_rate: must be a finite number, was nan"),
-        ("ga.mutation_rate=1.5", "ga.mutation_rate: must be at most 1.0, was 1.5"),
         ("ga.num_elites=1.5", "ga.num_elites: must be a whole number, was 1.5"),
-        ("ga.num_elites=null", "ga.num_elites: must be a whole number, was None"),
-        ("planner.redistribution=1", "planner.redistribution: must be true or false, was 1"),
         (
             "planner.spline_end=natur",
             "planner.spline_end: must be one of 'natural' or 'clamped', was 'natur'; did you",
@@ -78,16 +64,7 @@ OPTIONS = f"(options: {EXPERIMENTS})"
             "scenario.obstacles[0]: must be one of 'sphere', 'box', 'capsule', 'cylinder', "
             "'half_space', 'ellipse'",
         ),
-        (
-            "robot.arms.0.link_lengths=[4,-1]",
-            "robot.arms[0].link_lengths[1]: must be greater than 0",
-        ),
-        ("seed=1.5", "seed: must be a whole number, at least 0, was 1.5"),
-        ("num_replicates=0", "num_replicates: must be a whole number, at least 1, was 0"),
         ("report.dpi=fine", "report.dpi: must be a whole number, was 'fine'"),
-        ("runner.num_workers=0", "runner.num_workers: must be at least 1, was 0"),
-        ("budget.max_generations=0", "budget.max_generations: must be at least 1, was 0"),
-        ("~ga.mutation_rate", "ga.mutation_rate: must be given, was None"),
         # pairs
         ("ga.num_elites=9", "ga.num_elites: must be at most population_size (8), was 9"),
         (
@@ -107,19 +84,13 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         # what a configuration may not name
         ("ga._target_=os.system", "ga._target_: must be a registered component, was 'os.system'"),
         (
-            "planner._target_=evoexp.planners.via_point_ga.planner.ViaPointGa",
-            "planner._target_: must be a registered component",
-        ),
-        (
             "+ga.x={_target_:builtins.eval}",
             "ga.x._target_: must be a registered component, was 'builtins.eval'",
         ),
         (
             "hydra.run.dir=/tmp/x",
-            "override: must be a setting of evoexp (nothing of Hydra's own), was 'hydra.run.dir",
+            "(nothing of Hydra's own; EVOEXP_OUTPUTS names the folder), was 'hydra.run.dir",
         ),
-        ("+hydra.x=1", "nothing of Hydra's own"),
-        ("~hydra", "nothing of Hydra's own"),
         ("hydra/launcher=basic", "nothing of Hydra's own"),
         (
             "conditions={}",
@@ -131,17 +102,10 @@ OPTIONS = f"(options: {EXPERIMENTS})"
             "ga.num_elites=0,2",
             "ga.num_elites: must be one value (or add -m to sweep over several), was '0,2'",
         ),
-        (
-            "ga.num_elites=range(3)",
-            "ga.num_elites: must be one value (or add -m to sweep over several)",
-        ),
         ("ga.num_elites", "override: must be key=value, was 'ga.num_elites'"),
         ("ga.num_elites==1", "ga.num_elites: must be a number, a word, a [list], a {mapping} or"),
-        ("=1", "override: must be key=value, was '=1'"),
-        ("ga.num_elites=[1", "ga.num_elites: must be a number, a word, a [list], a {mapping} or"),
         ("", "override: must be key=value, was ''"),
         (f"seed={'9' * 5000}", "seed: must be a number, a word, a [list], a {mapping} or"),
-        ("ga@planner.ga=rana_planar", "override: must be key=value"),
         (
             "ga.population_size=9",
             "ga.population_size: must be given once, was 'ga.population_size=8 "
@@ -158,7 +122,6 @@ OPTIONS = f"(options: {EXPERIMENTS})"
             "~control=random_search",
             "control: must be an option that is chosen, to be deleted, was '~control=random_",
         ),
-        ("~seed", "seed: must be given, was '~seed'"),
     ],
 )
 def test_overrides(refused: Refused, override: str, message: str) -> None:
@@ -171,15 +134,12 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
     [
         (
             ("run", "experiment=rana_planr"),
-            f"experiment: no option 'rana_planr'; did you mean 'rana_planar'? {OPTIONS}",
+            "experiment: no option 'rana_planr'; did you mean 'rana_planar'? (options: rana_",
         ),
-        (("run", "experiment="), f"experiment: no option '' {OPTIONS}"),
-        (
-            ("run",),
-            f"experiment: must be chosen: {EXPERIMENTS} (without one, every group is",
-        ),
-        (("run", "experiment=null"), f"experiment: must be chosen: {EXPERIMENTS}"),
-        (("run", "robot=two_planar_2r"), "experiment: must be chosen: "),
+        (("run", "experiment="), "experiment: no option '' (options: "),
+        (("run", "experiment=null"), f"experiment: {CHOSEN} (without one, every group is"),
+        (("run", "robot=two_planar_2r"), f"experiment: {CHOSEN}"),
+        (("run", "--cfg", "job"), "no option '--cfg': evoexp show experiment=NAME; with --all"),
         (
             ("run", "experiment=rana_planar,rana_obstacles"),
             "experiment: must be one value (or add -m",
@@ -214,7 +174,7 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         (("show",), "the following arguments are required: HASH"),
         (
             ("report", "rana_planr"),
-            f"experiment: no option 'rana_planr'; did you mean 'rana_planar'? {OPTIONS}",
+            "experiment: no option 'rana_planr'; did you mean 'rana_planar'? (options: rana_",
         ),
         (("report", "rana_planar"), "rana_planar: nothing stored in"),
         (

@@ -142,6 +142,10 @@ def test_every_damage_is_found_and_mended_by_the_command_it_names(
         assert problems.pop(0).startswith("replicates: missing: 1 of 2 replicates")
     (problem,) = problems
     assert problem.startswith(expected)
+    for words in (("list",), ("show", run.hash12), ("reproduce", run.hash12), ("view", run.hash12)):
+        said = evoexp(*words)
+        assert said.code in (0, 1, 2)
+        assert all(line.startswith("evoexp: ") for line in said.err.splitlines()), said.err
     if problem.endswith("; delete it, then run again"):
         (run.summary_path if fault.startswith("an altered") else run.log_path(1)).unlink()
     evoexp("run", *PLANAR, "--no-report")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp
 
-from evoexp.commands.stored_runs import origin_of
+from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import find_runs
 
 Refused = Callable[..., str]
@@ -116,6 +116,7 @@ def test_export_writes_trajectories(evoexp: Evoexp, stored: Path, runs: list[str
     assert {path.suffix for path in (stored / "motions").iterdir()} == {".csv", ".json"}
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize("timing", ["uniform", "optimal"])
 @pytest.mark.parametrize("form", ["csv", "json", "ros", "yaml"])
 def test_an_exported_trajectory_is_judged_as_the_motion_was(

@@ -22,7 +22,7 @@ from evoexp.configuration.overrides import Override, collect
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from matrix import examples
-from shipped_conditions import EXAMPLES, KIND_EXAMPLES, Kind, expanded, of_kind
+from shipped_conditions import EXAMPLES, expanded
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
@@ -66,11 +66,6 @@ def test_every_experiment_composes_at_every_budget(experiment: str, budget: str)
     assert len({label for label, _ in found.conditions}) == len(found.conditions) > 0
     for _, condition in found.conditions:
         assert len(condition.id) == 64
-
-
-@pytest.mark.parametrize("kind", KIND_EXAMPLES)
-def test_every_kind_of_condition_can_be_prepared(kind: Kind) -> None:
-    of_kind(kind, "paper").prepare()
 
 
 @pytest.mark.examples(2)

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 import pytest
-from mutant_trials import TRIAL_S, Trials, near_tests
+from mutant_trials import TRIAL_S, Trials
 from mutants import Mutant, drawn, entries, mutants_of, plant
 
 from matrix import EXHAUSTIVE
@@ -17,29 +17,6 @@ ROOT = Path(__file__).parents[2]
 NUM_MUTANTS = 60
 SEED = int(os.environ.get("EVOEXP_MUTATION_SEED", "39"))
 DRAWN = drawn(ROOT, SEED, NUM_MUTANTS) if EXHAUSTIVE in os.environ else []
-TOY = {
-    "pyproject.toml": "",
-    "src/evoexp/__init__.py": "",
-    "src/evoexp/paths/limits.py": "def is_above(x: float) -> bool:\n    return x > 3.0\n",
-    "tests/paths/test_limits.py": """
-from evoexp.paths.limits import is_above
-def test_limit() -> None:
-    assert is_above(3.5) and not is_above(3.0)
-""",
-    "src/evoexp/store/ends.py": "def first(x: list[int]) -> int:\n    return x[0]\n",
-    "tests/store/test_ends.py": """
-from evoexp.store.ends import first
-def test_first() -> None:
-    assert first([7]) == 7
-""",
-    "src/evoexp/batch/signs.py": "def negative(x: int) -> int:\n    return -x\n",
-    "tests/batch/test_signs.py": """
-def test_nothing() -> None:
-    assert False
-def test_something() -> None:
-    assert True
-""",
-}
 
 
 @pytest.fixture(scope="module")
@@ -75,30 +52,6 @@ def test_equivalent_mutants_are_mutants_with_a_reason() -> None:
         changes = {(mutant.before, mutant.after) for _, mutant in mutants_of(row["file"], source)}
         assert (row["before"], row["after"]) in changes, row
         assert len(row["reason"]) > 10, row
-
-
-def test_covered_mutants_are_killed_others_survive_and_broken_tests_kill_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
-    for file, text in TOY.items():
-        (tmp_path / "toy" / file).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / "toy" / file).write_text(text)
-    (tmp_path / "place").mkdir()
-    trials = Trials(tmp_path / "toy", tmp_path / "place")
-    sources = [file for file in TOY if file.startswith("src")]
-    mutants = [mutant for file in sources for _, mutant in mutants_of(file, TOY[file])]
-    outcomes = {str(mutant): trials.run(mutant) for mutant in mutants}
-    assert outcomes == {
-        "src/evoexp/paths/limits.py:2: return x > 3.0 → return x >= 3.0": (
-            True,
-            "tests/paths/test_limits.py::test_limit",
-        ),
-        "src/evoexp/store/ends.py:2: return x[0] → return x[-1]": (False, "survives 1 test files"),
-        "src/evoexp/batch/signs.py:2: return -x → return (x)": (False, "survives 1 test files"),
-    }
-    for file, text in TOY.items():
-        assert (tmp_path / "toy" / file).read_text() == (trials.tree / file).read_text() == text
 
 
 @pytest.mark.parametrize(
@@ -157,12 +110,3 @@ def test_a_seed_draws_the_same_mutants_of_all_rooms() -> None:
     assert rooms <= {Path(mutant.file).parts[2] for mutant in mutants}
     for mutant in mutants:
         compile(mutant.applied((ROOT / mutant.file).read_text()), mutant.file, "exec")
-
-
-def test_tests_that_mirror_a_module_come_before_those_that_import_it() -> None:
-    near, room = near_tests(ROOT, Path("src/evoexp/evolution/mutation.py"))
-    assert near[0] == "tests/evolution/test_mutation.py"
-    assert "tests/evolution/test_operators.py" in room + near
-    near, room = near_tests(ROOT, Path("src/evoexp/papers/rana/rules.py"))
-    assert "tests/papers/test_rana_pages.py" in near
-    assert "tests/papers/test_lavoie_pages.py" in room

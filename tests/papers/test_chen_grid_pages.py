@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from evoexp.papers.chen import path_claims
 from evoexp.papers.chen.fields_page import MISSING, SURPLUS, WRONG, compare
 from evoexp.papers.chen.path_claims import inside_points, routes, signature
-from report_samples import figure_stems, smoke_report, smoke_results
+from report_samples import smoke_results
 
 CENTRES = inside_points([(2, 2, 3, 3), (6, 2, 7, 3)])
 ABOVE = np.array([[0, 2], [1, 4], [4, 5], [9, 2]], dtype=float)
@@ -52,21 +52,6 @@ def test_rows_are_aligned_by_the_fewest_slips(printed: str, slips: list[tuple[in
     assert [(int(r.column), r.slip) for r in found.itertuples(index=False)] == slips
 
 
-@pytest.mark.matrix
-def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(
-    outputs: Path,
-) -> None:
-    directory = smoke_report(outputs, "chen_path")
-    assert figure_stems(directory) == {"fig_2_costs", "fig_2_paths", "routes", "gaps"}
-    text = (directory / "index.md").read_text()
-    assert text.count("**not judged (budget smoke)**") == 16
-    assert "(b) and (c) are nearly the same problem" in text
-    assert "only λ/ε matters: 100 and 167 cells; the best paths known share 60 of 60 and" in text
-    assert "no path costs less than 32.567: the truth is known within 0.5 %" in text
-    assert "the best path known of this weighting is 61 % longer" in text
-    assert "(a): routes taken" in text
-
-
 def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) -> None:
     results = smoke_results(outputs, "chen_path")
     groups = path_claims.group_list(results)
@@ -81,43 +66,3 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
         for c in group.conditions:
             assert (c.column("best_cost") >= group.bound - 1e-9).all()
     assert path_claims.shortest(groups) == pytest.approx(39.62741699796952)
-
-
-@pytest.mark.matrix
-def test_the_page_of_lingering_counts_repeated_nodes(outputs: Path) -> None:
-    directory = smoke_report(outputs, "chen_lingering")
-    assert figure_stems(directory) == {"paths", "lingering"}
-    text = (directory / "index.md").read_text()
-    assert "(b), revisits: lingering | 2 of 2 runs pass nodes again" in text
-    assert "100 nodes, 50 of them passed before; exact" in text
-
-
-@pytest.mark.matrix
-def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
-    directory = smoke_report(outputs, "chen_fields")
-    assert figure_stems(directory) == {"fig_1_fields", "fields_16_16", "fields_32_32", "scene"}
-    text = (directory / "index.md").read_text()
-    assert "255 of 256 nodes as printed" in text
-    assert "row 9 from the top, column 13: 17 for 13" in text
-    missing = "row 6 from the top, column 5: 9 is left out (or any equal one of columns 5 to 7)"
-    assert missing in text
-
-
-def test_the_page_of_the_mission_shows_path_posture_and_verdict(outputs: Path) -> None:
-    directory = smoke_report(outputs, "chen_mission")
-    assert figure_stems(directory) == {"mission"}
-    text = (directory / "index.md").read_text()
-    assert "2 of 2 (34–100 %) free of contact over the whole motion; 0 touch" in text
-    assert "from the last node to the docking place" in text
-
-
-@pytest.mark.matrix
-def test_the_page_of_assumptions_judges_three_claims_under_every_variation(outputs: Path) -> None:
-    directory = smoke_report(outputs, "chen_assumptions")
-    assert figure_stems(directory) == {"assumptions", "scene"}
-    text = (directory / "index.md").read_text()
-    for name in ("obstacles mirrored", "slow decay of unsafeness"):
-        assert f"| {name} | `" in text
-    claims = text.split("## Claims")[1].split("## ")[0]
-    rows = [row for row in claims.splitlines() if "— whatever number is assumed" in row]
-    assert sum(row.startswith("| (c): ") for row in rows) == 3

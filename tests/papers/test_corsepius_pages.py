@@ -19,16 +19,13 @@ from evoexp.papers.corsepius.figures import (
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
-from evoexp.report import run_measures
 from evoexp.report.pages import page_of
-from evoexp.report.results import Results, gather
-from evoexp.report.statistics import Interval, Proportion
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.statistics.inference import Interval, Proportion
 from report_samples import (
     can_be_drawn,
-    figure_stems,
     page_settings,
-    smoke_experiment,
-    smoke_report,
     smoke_results,
     store,
 )
@@ -45,36 +42,6 @@ def solved(outputs: Path, name: str) -> Results:
     experiment = compose.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
     store(outputs, experiment)
     return gather(outputs, experiment.conditions, FEW, name, experiment.budget, "")
-
-
-def test_the_page_of_a_task_has_its_figures_and_judges_nothing_below_its_budget(
-    outputs: Path,
-) -> None:
-    directory = smoke_report(outputs, "corsepius_ball")
-    assert figure_stems(directory) == {
-        "fig_2_scope",
-        "fig_3_4_models",
-        "history",
-        "stop_reasons",
-        "paths",
-    }
-    text = (directory / "index.md").read_text()
-    assert "**not judged (budget smoke)**" in text
-    assert "**not judged (another machine, another model)**" in text
-    assert "## Tasks" in text
-    assert "## Phases" not in text
-
-
-@pytest.mark.matrix
-def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
-    directory = smoke_report(outputs, "corsepius_pick_and_place")
-    stems = figure_stems(directory)
-    for stem in ("manoeuvre", "phases"):
-        assert any(each == stem or each.startswith(f"{stem}_") for each in stems)
-    text = (directory / "index.md").read_text()
-    for name in ("1  approach", "2  grasp", "3  lift", "4  carry", "5  place", "6  detach"):
-        assert f"| {name} |" in text
-    assert "greatest tilt at postures (upright)" in text
 
 
 @pytest.mark.examples(1)
@@ -106,8 +73,8 @@ def test_the_study_reads_no_log(outputs: Path, monkeypatch: pytest.MonkeyPatch) 
         raise AssertionError("a log was read")
 
     results = smoke_results(outputs, "corsepius_population")
-    monkeypatch.setattr("evoexp.report.results.read_generations", refuse)
-    monkeypatch.setattr("evoexp.report.results.read_solution", refuse)
+    monkeypatch.setattr("evoexp.report.results.stored_results.read_generations", refuse)
+    monkeypatch.setattr("evoexp.report.results.stored_results.read_solution", refuse)
     for drawing in page_of(results, page_settings("corsepius_population")).drawings:
         drawing.table()
 
@@ -249,14 +216,6 @@ def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
         expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
         assert population_effort.slope(task) == pytest.approx(expected)
     assert can_be_drawn(table, population_effort.draw_floor)
-
-
-@pytest.mark.matrix
-def test_tables_of_many_conditions_stand_upright(outputs: Path) -> None:
-    directory = smoke_report(outputs, "corsepius_population")
-    text = (directory / "index.md").read_text()
-    assert "| condition | cycles, all phases | evaluations |" in text
-    assert len(smoke_experiment("corsepius_population").conditions) == 56
 
 
 def test_a_series_without_points_is_not_in_the_legend() -> None:

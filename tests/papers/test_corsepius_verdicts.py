@@ -15,11 +15,17 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.papers.corsepius import claims as paper_claims
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.rules import RULES
-from evoexp.report import judging
-from evoexp.report.judging import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Judge
-from evoexp.report.page_parts import Claim
+from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.judging import (
+    CONTRADICTED,
+    INCONCLUSIVE,
+    NOT_JUDGED,
+    REPRODUCED,
+    Judge,
+)
 from report_samples import REPORT
 from shipped_conditions import expanded
 

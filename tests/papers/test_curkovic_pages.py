@@ -17,12 +17,12 @@ from evoexp.papers.curkovic import (
     sweep_page,
 )
 from evoexp.papers.curkovic.figures import link_intersection, motion_curves, robot_motions
-from evoexp.papers.curkovic.pareto_page import read_fronts
-from evoexp.report import judging
-from evoexp.report.comparisons import compare
-from evoexp.report.page_parts import Page
 from evoexp.report.pages import page_of
-from evoexp.report.results import ConditionResults
+from evoexp.report.pages.page_parts import Page
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.comparisons import compare
+from evoexp.store.log_reader import read_log
 from report_samples import can_be_drawn, figure_stems, page_settings, smoke_report, smoke_results
 
 
@@ -50,7 +50,7 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
         ]
         assert list(~np.array(dominated)) == list(rows["non_dominated"])
     results = smoke_results(outputs, "curkovic_pareto")
-    fronts = read_fronts(results, results.conditions[0], 1)
+    fronts = read_log(results.conditions[0].run.log_path(1)).fronts
     assert [(front.generation, front.population) for front in fronts] == [(10, 0), (10, 1)]
     text = (directory / "index.md").read_text()
     assert "individuals on the front of robot 2's population" in text

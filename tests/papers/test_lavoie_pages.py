@@ -12,11 +12,11 @@ from evoexp.papers.lavoie.figures import reaching_motions, run_distributions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report import motion_geometry, run_measures
 from evoexp.report.figures import shares
 from evoexp.report.pages import page_of
-from evoexp.report.results import ConditionResults, gather
-from evoexp.report.statistics import Proportion
+from evoexp.report.results import motion_geometry, run_measures
+from evoexp.report.results.stored_results import ConditionResults, gather
+from evoexp.report.statistics.inference import Proportion
 from report_samples import (
     can_be_drawn,
     figure_stems,
@@ -38,26 +38,6 @@ def blind(outputs: Path) -> ConditionResults:
     ).conditions[0]
 
 
-def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
-    directory = smoke_report(outputs, "lavoie")
-    assert {"fig_1_start", "fig_2_solution", "fig_3_error", "attempts"} <= figure_stems(directory)
-    text = (directory / "index.md").read_text()
-    assert text.count("**not judged (budget smoke)**") == 10
-    assert text.count("**not judged**") == 3  # those that need controls or a sweep
-    assert "(-15, -5) instead of (-5, -15): the start is not free of collision: link " in text
-    assert "tests of a link against an ellipse per second of search" in text
-    assert "convergence" not in figure_stems(directory)
-
-
-@pytest.mark.matrix
-def test_one_arm_has_a_page_of_its_own(outputs: Path) -> None:
-    directory = smoke_report(outputs, "lavoie_10dof")
-    text = (directory / "index.md").read_text()
-    assert "a position error below 1 in 99.1 % of runs" in text
-    assert "93.5 %" not in text
-    assert "does better than that of seven" not in text
-
-
 def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports of thousands of runs live on summaries and solutions."""
 
@@ -65,7 +45,7 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         raise AssertionError("generations were read")
 
     results = smoke_results(outputs, "lavoie")
-    monkeypatch.setattr("evoexp.report.results.read_generations", refuse)
+    monkeypatch.setattr("evoexp.report.results.stored_results.read_generations", refuse)
     for drawing in page_of(results, page_settings("lavoie")).drawings:
         drawing.table()
 

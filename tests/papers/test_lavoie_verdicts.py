@@ -16,7 +16,11 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.papers.lavoie import claims, measures, sweep_page
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import RULES
-from evoexp.report.judging import (
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.inference import Proportion, fisher_exact
+from evoexp.report.statistics.judging import (
     CONTRADICTED,
     INCONCLUSIVE,
     NOT_JUDGED,
@@ -24,10 +28,6 @@ from evoexp.report.judging import (
     Judge,
     judge,
 )
-from evoexp.report.page_parts import Claim
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.statistics import Proportion, fisher_exact
 from report_samples import REPORT, hearing
 
 SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]

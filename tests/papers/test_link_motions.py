@@ -9,7 +9,7 @@ import pytest
 from evoexp.condition import Prepared
 from evoexp.papers.curkovic import link_motions, motion_page
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry
+from evoexp.report.results import motion_geometry
 from report_samples import expand
 
 

@@ -8,10 +8,10 @@ import pytest
 from evoexp.papers.rana import measures, motions, operators_page, weights_page
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.records import generations
-from evoexp.report import results as report_results
-from evoexp.report import run_measures
 from evoexp.report.pages import page_of
-from evoexp.report.results import Results
+from evoexp.report.results import run_measures
+from evoexp.report.results import stored_results as report_results
+from evoexp.report.results.stored_results import Results
 from evoexp.shipped import Shipped
 from report_samples import page_settings, smoke_results
 

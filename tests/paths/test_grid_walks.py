@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
 from evoexp.paths.grid_choices import choices_of
-from evoexp.paths.grid_walks import erase_loops, walk, walk_each
+from evoexp.paths.grid_walks import erase_loops, walk
 from evoexp.paths.grids import UNREACHED
 from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of, without_loops
 
@@ -71,29 +71,6 @@ def test_numbers_that_do_not_suffice_are_said() -> None:
         draws = Block(np.full(5, 0.5), taken)
         walk(draws, world.moves, world.no_choices, world.ends, True, path, place)
         assert used_up(draws)
-
-
-@settings(max_examples=20, deadline=None)
-@given(SHAPES, st.booleans(), st.lists(st.integers(1, 300), min_size=1, max_size=9), SEEDS)
-def test_walks_one_by_one_are_those_of_a_walker_wherever_blocks_end(
-    shape: tuple[int, ...], erase: bool, blocks: list[int], seed: int
-) -> None:
-    world = World(shape, 0.3, seed, (0.5, 1.75))
-    uniforms, nodes = np.random.default_rng(seed).random(40_000), world.grid.num_nodes
-    paths, place = np.zeros((5, nodes + 1), dtype=np.int32), np.zeros(nodes, dtype=np.int32)
-    begin, end, complete, k = 0, 0, 0, 0
-    while complete < len(paths):
-        end, k = end + blocks[k % len(blocks)], k + 1
-        draws = Block(uniforms[begin:end], np.array([0]))
-        complete = walk_each(
-            draws, world.moves, world.no_choices, world.ends, erase, complete, paths, place
-        )
-        begin += int(draws[1][0])
-    numbers = iter(uniforms.tolist())
-    assert [nodes_of(path) for path in paths] == [
-        as_path(world.trail(numbers), erase, nodes) for _ in paths
-    ]
-    assert next(numbers) == uniforms[begin]
 
 
 @given(st.lists(st.integers(0, 9), min_size=1, max_size=40), st.booleans())

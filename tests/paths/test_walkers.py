@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.paths.grid_choices import choice_table
-from evoexp.paths.walkers import LANES, WORDS, Walkers
+from evoexp.paths.grid_walks import LANES, WORDS, walk_all
 from matrix import num_cases
 from paths.walked_worlds import SEEDS, SHAPES, World, as_path, nodes_of
 
@@ -53,36 +53,25 @@ def test_many_walks_are_those_of_walkers_that_take_turns(
 ) -> None:
     world = World(shape, share, seed, (1.0, 1.0 + step))
     words, paths = random_words(seed, 40_000), table(world, count)
-    walkers = Walkers(choice_table(world.moves), world.ends, erase, paths)
-    taken = walkers.go(words)
+    taken = walk_all(words, WORDS, WORDS, choice_table(world.moves), world.ends, erase, paths)
     trails, expected = plain_trails(world, words, count)
-    assert (walkers.complete, taken) == (count, expected)
+    assert taken == expected
     assert [nodes_of(path) for path in paths] == [
         as_path(trail, erase, world.grid.num_nodes) for trail in trails
     ]
 
 
 @settings(max_examples=40, deadline=None)
-@given(SHAPES, st.booleans(), st.lists(st.integers(1, 150), min_size=1, max_size=9), SEEDS)
-def test_walks_go_on_with_more_words_as_if_they_had_been_there(
-    shape: tuple[int, ...], erase: bool, blocks: list[int], seed: int
+@given(SHAPES, st.booleans(), st.integers(1, 40), st.integers(1, 40), SEEDS)
+def test_words_are_drawn_in_whole_portions_as_far_as_there_are_as_many(
+    shape: tuple[int, ...], erase: bool, first: int, more: int, seed: int
 ) -> None:
     world = World(shape, 0.3, seed, (1.0, 3.0))
     words, choices = random_words(seed, 40_000), choice_table(world.moves)
-    at_once, piecewise = table(world, 2 * LANES + 1), table(world, 2 * LANES + 1)
-    taken = Walkers(choices, world.ends, erase, at_once).go(words)
-    walkers = Walkers(choices, world.ends, erase, piecewise)
-    begin, end, k = 0, 0, 0
-    while walkers.complete < len(piecewise):
-        end, k = end + blocks[k % len(blocks)], k + 1
-        begin += walkers.go(words[begin:end])
-    assert begin == taken
-    assert np.array_equal(at_once, piecewise)
-
-
-def test_a_walk_to_where_it_begins_is_one_node() -> None:
-    world = World((4, 4), 0.0, 0, (1.0, 3.0))
-    paths = table(world, 3)
-    walkers = Walkers(choice_table(world.moves), (world.ends[1], world.ends[1]), True, paths)
-    assert (walkers.complete, walkers.go(random_words(0, 8))) == (3, 0)
-    assert [nodes_of(path) for path in paths] == [[world.ends[1]]] * 3
+    one_by_one, portioned = table(world, 2 * LANES + 1), table(world, 2 * LANES + 1)
+    taken = walk_all(words, WORDS, WORDS, choices, world.ends, erase, one_by_one)
+    counts = WORDS * first, WORDS * more
+    drawn = walk_all(words, *counts, choices, world.ends, erase, portioned)
+    assert np.array_equal(one_by_one, portioned)
+    assert drawn == counts[0] + counts[1] * max(0, -(-(taken - counts[0]) // counts[1]))
+    assert walk_all(words[: drawn - 1], *counts, choices, world.ends, erase, portioned) == -1

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.collision.models.potential_fields import PotentialFields
+from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.objectives.path_cost import PathCost

@@ -221,7 +221,7 @@ def test_a_tip_is_reached_by_both_elbows() -> None:
         goal = f"scenario.q_goal=[{{tip:[0.1,0.35],elbow:{elbow}}},{{angles:[30.0,120.0]}}]"
         _, problem = prepared(goal)
         arm = problem.collision.arms[0]
-        points = arm.points(np.ascontiguousarray(problem.goal[0].reshape(1, 2, 1)))[0, :, 0]
+        points = arm.outlines(problem.goal[0].reshape(1, 2, 1))[0, :4, 0]
         assert points[2:] == pytest.approx([0.1, 0.35], abs=1e-12)
         tips.append(points[:2])
     left = np.cross(np.append([0.1, 0.35], 0.0), np.append(tips[0], 0.0))[2]
@@ -242,7 +242,7 @@ def test_a_robot_that_stands_still_keeps_its_posture() -> None:
 
 
 def test_no_team_is_cheaper_than_the_lower_bound() -> None:
-    from evoexp.report.results import ConditionResults
+    from evoexp.report.results.stored_results import ConditionResults
 
     condition = composed("experiment=curkovic_methods", label="V")
     nothing: Any = None

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.models.potential_fields import PotentialFields
+from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.path_cost import PathCost

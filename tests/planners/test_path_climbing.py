@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.collision.models.potential_fields import PotentialFields
+from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.grid_path_ga.planner import GridPathGa

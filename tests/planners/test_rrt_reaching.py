@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.collision.models.link_ellipses import EllipseConfigurations
+from evoexp.collision.planar.link_ellipses import EllipseConfigurations
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion

@@ -9,6 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -187,3 +188,13 @@ def population(count: int) -> FloatArray:
     """
     center = np.array([0.3, 0.4, 0.9, 0.2, 0.5, 0.0])
     return np.asarray(center[:, None] + 0.1 * np.random.default_rng(0).normal(size=(6, count)))
+
+
+def shapes_of(geometry: Any) -> Shapes:
+    """Return a geometry model of coal spheres and capsules as the shapes of the kernels."""
+    rows = []
+    for item in geometry.geometryObjects:
+        half = item.geometry.halfLength if isinstance(item.geometry, coal.Capsule) else 0.0
+        center, along = item.placement.translation, half * item.placement.rotation[:, 2]
+        rows.append((item.parentJoint, center - along, center + along, item.geometry.radius))
+    return Shapes(*(np.array(column) for column in zip(*rows, strict=True)))

@@ -7,7 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.primitive_tables import Shapes
+from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import SphereObstacle
 

@@ -140,7 +140,8 @@ def from_condition(condition: Any, **changes: Any) -> Curkovic:
     planner, problem = condition.prepare()
     parts = (planner, planner.ga, planner.objective, planner.collision)
     obstacles = condition.scenario.obstacles
-    if problem.collision.enveloped or any(o.shape != "sphere" for o in obstacles):
+    enveloped = any(arm.is_enveloped for arm in problem.collision.arms)
+    if enveloped or any(o.shape != "sphere" for o in obstacles):
         raise ValueError("the reference is for links without envelopes among discs")
     names = {f.name for f in fields(Curkovic)}
     settings = {

@@ -13,7 +13,7 @@ from evoexp.batch.reproduction import difference, farthest, fingerprint, same_fi
 from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError, SettingError
-from evoexp.report.results import gather
+from evoexp.report.results.stored_results import gather
 from evoexp.store.log_reader import array_names, read_array, read_log
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.report.proven_answers import Answer, answer_table, best_lengths, first_reached
+from evoexp.report.results.proven_answers import Answer, answer_table, best_lengths, first_reached
 
 SOME = [
     Answer(0, 0, 50, 1000, 9.0, 4.0, True, False),

@@ -2,13 +2,13 @@
 
 import pytest
 
-from evoexp.report.claim_rules import Rule
-from evoexp.report.comparisons import by_column
-from evoexp.report.judging import Judge
-from evoexp.report.page_parts import Claim
 from evoexp.report.pages import assumptions
 from evoexp.report.pages.assumptions import Headline
-from evoexp.report.results import ConditionResults, Results, gather
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results.stored_results import ConditionResults, Results, gather
+from evoexp.report.statistics.claim_rules import Rule
+from evoexp.report.statistics.comparisons import by_column
+from evoexp.report.statistics.judging import Judge
 from report_samples import page_settings, smoke_experiment, store
 
 EXPERIMENT = """

@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 from evoexp.errors import SettingError
-from evoexp.report.best_known import (
+from evoexp.report.figures.effort_curves import share_table
+from evoexp.report.pages import comparison
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.best_known import (
     BestKnown,
     lowered,
     parsed,
@@ -18,11 +21,8 @@ from evoexp.report.best_known import (
     shortest,
     to_yaml,
 )
-from evoexp.report.figures.effort_curves import share_table
-from evoexp.report.pages import comparison
-from evoexp.report.planner_runs import MULTIPLES, of_results, problem_key
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.results.planner_runs import MULTIPLES, of_results, problem_key
+from evoexp.report.results.stored_results import Results
 
 ROOT = Path(__file__).parents[2]
 ONE = BestKnown('a "quoted": name', 1.0 / 3.0, "0123456789ab", 7)

@@ -15,9 +15,10 @@ from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.papers.rana import motions
 from evoexp.papers.rana import page as rana_page
-from evoexp.report import build, swept_settings
+from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.results import swept_settings
+from evoexp.report.results.stored_results import Results
 from evoexp.store.run_directory import RunDirectory
 from report_samples import REPORT, expand, store
 
@@ -160,7 +161,7 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
 
 
 def test_the_command_in_the_index_makes_this_report(
-    page: Path, stored: Path, monkeypatch: pytest.MonkeyPatch
+    page: Path, stored: Path, monkeypatch: pytest.MonkeyPatch, blank_figures: None
 ) -> None:
     from evoexp import cli
 
@@ -178,7 +179,7 @@ def test_files_of_an_earlier_report_are_named_in_order(tmp_path: Path) -> None:
     assert build.stale_files(build.ReportFiles(tmp_path / "none", {})) == []
 
 
-def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
+def test_partial_results_are_drawn_and_said(tmp_path: Path, blank_figures: None) -> None:
     experiment = expand("rana_planar", "ga.num_generations=1")
     store(tmp_path, experiment)
     runs = [RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions]
@@ -316,7 +317,9 @@ def test_three_arms_have_figures_too(stored: Path) -> None:
     assert "| length arm 3 | deg |" in text
 
 
-def test_an_experiment_without_a_page_has_results_pictures_and_parameters(stored: Path) -> None:
+def test_an_experiment_without_a_page_has_results_pictures_and_parameters(
+    stored: Path, blank_figures: None
+) -> None:
     page = draw(stored, None, "rana_three_arms", "scenario=rana_three_arms")
     kinds = ("csv", "json", "png", "svg")
     stems = ("convergence", "values", "scene", "stages", "joints", "covers")

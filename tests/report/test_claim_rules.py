@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from evoexp.papers.rana import page as rana_page
-from evoexp.report.claim_rules import KINDS, Rules, read_rules
-from evoexp.report.comparisons import compare
-from evoexp.report.judging import Judge, left_out, not_judged
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.statistics import Proportion
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.claim_rules import KINDS, Rules, read_rules
+from evoexp.report.statistics.comparisons import compare
+from evoexp.report.statistics.inference import Proportion
+from evoexp.report.statistics.judging import Judge, left_out, not_judged
 from report_samples import REPORT
 
 SETTINGS = ReportSettings(**REPORT, figures=None)  # type: ignore[arg-type]

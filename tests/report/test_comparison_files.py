@@ -5,9 +5,9 @@ import io
 
 import numpy as np
 
-from evoexp.report.comparison_files import as_csv, as_latex
 from evoexp.report.pages.comparison import Rated
-from evoexp.report.statistics import Interval, Spread
+from evoexp.report.pages.comparison_files import as_csv, as_latex
+from evoexp.report.statistics.inference import Interval, Spread
 
 ROWS = [
     Rated(

@@ -10,11 +10,12 @@ from scipy.interpolate import CubicSpline
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
 from evoexp.planners.proofs import judge_motion
-from evoexp.report import proven_answers
 from evoexp.report.figures.effort_curves import draw_shares, length_table, share_table
 from evoexp.report.pages import comparison
-from evoexp.report.planner_runs import MULTIPLES, of_results
-from evoexp.report.proven_answers import (
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import proven_answers
+from evoexp.report.results.planner_runs import MULTIPLES, of_results
+from evoexp.report.results.proven_answers import (
     answers,
     answers_of,
     best_lengths,
@@ -22,8 +23,7 @@ from evoexp.report.proven_answers import (
     motion_length,
     straight_line,
 )
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, gather
+from evoexp.report.results.stored_results import Results, gather
 from evoexp.store.log_reader import read_log
 from report_samples import expand, store
 

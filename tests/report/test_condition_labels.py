@@ -2,7 +2,7 @@
 
 import itertools
 
-from evoexp.report.index import have_two_parts, in_few_words
+from evoexp.report.pages.index import have_two_parts, in_few_words
 
 EVERY = [f"{problem} · {planner}" for problem in "abcd" for planner in ("GA", "RRT", "ES")]
 

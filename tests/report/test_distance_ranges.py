@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry
+from evoexp.report.results import motion_geometry
 
 
 def motions(lengths: list[int]) -> list[FloatArray]:

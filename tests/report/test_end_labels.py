@@ -2,7 +2,7 @@
 
 import pytest
 
-from evoexp.report import style
+from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import MANY, name_curves
 
 

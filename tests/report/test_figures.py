@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures import planar_models, planar_motion
-from evoexp.report import motion_geometry, style
-from evoexp.report.figures import convergence
-from evoexp.report.results import Results
+from evoexp.report.figures import convergence, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import Results
 
 
 def texts(figure: Figure) -> list[str]:

@@ -9,11 +9,11 @@ import pytest
 
 from evoexp.errors import SettingError
 from evoexp.report.figures.effort_curves import length_table, share_table
-from evoexp.report.given_data import COLUMNS, of_given, read_given, strange_problems
 from evoexp.report.pages import comparison
-from evoexp.report.planner_runs import MULTIPLES, of_results
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.results.given_data import COLUMNS, of_given, read_given, strange_problems
+from evoexp.report.results.planner_runs import MULTIPLES, of_results
+from evoexp.report.results.stored_results import Results
 
 HEAD, SEMICOLONS = ",".join(COLUMNS), ";".join(COLUMNS)
 

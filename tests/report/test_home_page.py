@@ -5,7 +5,7 @@ import json
 import pytest
 from test_html_page import HOSTILE
 
-from evoexp.report.home_page import Paper, ReportSummary, StoredRun, home_page, site
+from evoexp.report.pages.home_page import Paper, ReportSummary, StoredRun, home_page, site
 from html_reader import Page
 
 RANA = Paper("rana", "Rana 1995", "arms", ("rana_planar", "rana_puma", "lavoie"), {"rana_puma": 3})

@@ -8,9 +8,9 @@ from test_home_page import RANA, RUN, summary
 from test_html_page import ID, page_of
 
 from chromium import CHROMIUM, Browser
-from evoexp.report.home_page import home_page
-from evoexp.report.html_page import html_page
-from evoexp.report.page_parts import Figures, FigureText, RunText, Table
+from evoexp.report.pages.home_page import home_page
+from evoexp.report.pages.html_page import html_page
+from evoexp.report.pages.page_parts import Figures, FigureText, RunText, Table
 from report_samples import smoke_report
 
 pytestmark = [

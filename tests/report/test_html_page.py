@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from evoexp.report import markdown
-from evoexp.report.home_page import read_summary
-from evoexp.report.html_page import html_page, inline, number_columns, verdict_counts
-from evoexp.report.page_parts import (
+from evoexp.report.pages import markdown
+from evoexp.report.pages.home_page import read_summary
+from evoexp.report.pages.html_page import html_page, inline, number_columns, verdict_counts
+from evoexp.report.pages.page_parts import (
     Document,
     Figures,
     FigureText,
@@ -205,7 +205,7 @@ def test_commands_of_a_run_can_be_copied() -> None:
 
 @pytest.mark.parametrize("name", ["rana_planar", "rana_three_arms"])
 def test_a_report_in_html_says_what_it_says_in_markdown(
-    name: str, tmp_path_factory: pytest.TempPathFactory
+    name: str, tmp_path_factory: pytest.TempPathFactory, blank_figures: None
 ) -> None:
     folder = smoke_report(tmp_path_factory.mktemp("outputs"), name)
     content, text = (folder / "index.html").read_bytes(), (folder / "index.md").read_text()

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from evoexp.report.ioh_format import NO_ANSWER, ioh_files, run_rows
-from evoexp.report.planner_runs import PlannerRuns, Problem, of_results
-from evoexp.report.results import Results
+from evoexp.report.results.ioh_format import NO_ANSWER, ioh_files, run_rows
+from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results
+from evoexp.report.results.stored_results import Results
 
 
 class Run(NamedTuple):

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.report.latex_tables import SIZES, escaped, latex_tables
-from evoexp.report.page_parts import Document, RunText, Table, Verdict, provenance
+from evoexp.report.pages.latex_tables import SIZES, escaped, latex_tables
+from evoexp.report.pages.page_parts import Document, RunText, Table, Verdict, provenance
 
 LONG = "A claim that is too long for one line of a table, and so has a column that breaks lines"
 TABLE = Table(

@@ -2,7 +2,7 @@ from math import inf, nan
 
 import pytest
 
-from evoexp.report import markdown
+from evoexp.report.pages import markdown
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from evoexp.commands.console import coloured, new_table, plain_console
 from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
-from evoexp.report import markdown
-from evoexp.report.style import drawn
+from evoexp.report.figures.style import drawn
+from evoexp.report.pages import markdown
 
 SCRIPT, LINK = "<script>alert(1)</script>", "[x](javascript:alert(1))"
 

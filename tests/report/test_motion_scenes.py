@@ -6,7 +6,7 @@ from scipy.spatial import ConvexHull
 
 from evoexp.playback.shapes import Outline
 from evoexp.report.figures import motion_scenes, motion_tables, surfaces
-from evoexp.report.style import drawn
+from evoexp.report.figures.style import drawn
 from matrix import matrices_are_asked_for
 from playback_samples import SAMPLES, condition, matrix, recording
 

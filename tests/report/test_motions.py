@@ -3,8 +3,8 @@ import pytest
 
 from evoexp.condition import Prepared
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry
-from evoexp.report.results import Results
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import Results
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from evoexp.report import style
-from evoexp.report.style import Look, drawn
+from evoexp.report.figures import style
+from evoexp.report.figures.style import Look, drawn
 
 NAMES = ["the first of some conditions", "another one", "a third with a long name"]
 LONG = "share of the runs that were begun and came to their end [%]"
@@ -95,6 +95,7 @@ def words(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_text().strip() and text.get_visible()]
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize(
     ("draw", "page", "column"),
     [
@@ -112,6 +113,7 @@ def test_a_column_has_half_as_many_panels_side_by_side(
     assert (columns(at_width(draw, "page")), columns(at_width(draw, "column"))) == (page, column)
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize("draw", [lambda: row(1), lambda: row(3), lines, boxes, stack, coloured])
 def test_no_text_of_a_column_is_cut_off_or_lies_upon_another(draw: Callable[[], Figure]) -> None:
     figure = at_width(draw, "column")

@@ -5,12 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from evoexp.report import pairwise
 from evoexp.report.figures import matrix
-from evoexp.report.pages import generic
+from evoexp.report.pages import generic, pairwise
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import holm
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import holm
 
 
 def shifted(condition: ConditionResults, number: int) -> ConditionResults:

@@ -6,9 +6,9 @@ from composed import alone, composed
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
-from evoexp.report import parameters
-from evoexp.report.parameters import Parameter, option, overridden
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import parameters
+from evoexp.report.results.parameters import Parameter, option, overridden
+from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.shipped import Option
 from matrix import examples
 from report_samples import expand

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
-from evoexp.report import motion_pictures
+from evoexp.report.pages import motion_pictures
 
 
 def shown(label: str, *notes: str) -> Any:

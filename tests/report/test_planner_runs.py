@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp.report import style
+from evoexp.report.figures import style
 from evoexp.report.figures.effort_curves import (
     draw_shares_by_problem,
     problem_share_table,
     share_table,
 )
-from evoexp.report.planner_runs import PlannerRuns, of_results
-from evoexp.report.results import Results, gather
+from evoexp.report.results.planner_runs import PlannerRuns, of_results
+from evoexp.report.results.stored_results import Results, gather
 from report_samples import expand
 
 

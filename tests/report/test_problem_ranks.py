@@ -11,8 +11,9 @@ from hypothesis.extra.numpy import arrays
 
 from evoexp.report.figures.rank_diagrams import draw_critical_difference, draw_profiles
 from evoexp.report.pages import ranking
-from evoexp.report.planner_runs import PlannerRuns, Problem
-from evoexp.report.problem_ranks import (
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.planner_runs import PlannerRuns, Problem
+from evoexp.report.statistics.problem_ranks import (
     Standing,
     alike,
     critical_difference,
@@ -22,7 +23,6 @@ from evoexp.report.problem_ranks import (
     rank_table,
     standing,
 )
-from evoexp.report.report_settings import ReportSettings
 
 # Demšar 2006, Tab. 6: areas under the curve of four classifiers on fourteen data sets
 AREAS = np.array(

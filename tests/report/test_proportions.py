@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from evoexp.report.statistics import Interval, Proportion, fisher_exact, newcombe
+from evoexp.report.statistics.inference import Interval, Proportion, fisher_exact, newcombe
 
 
 def test_a_proportion_knows_share_and_interval() -> None:

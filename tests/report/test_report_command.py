@@ -7,7 +7,7 @@ from report_samples import SMALL, expand
 
 
 @pytest.fixture(autouse=True)
-def outputs(stored: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def outputs(stored: Path, monkeypatch: pytest.MonkeyPatch, blank_figures: None) -> Path:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(stored))
     return stored
 

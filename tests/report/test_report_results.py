@@ -7,12 +7,12 @@ import pytest
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import NothingStored, StoreError
-from evoexp.report import markdown
-from evoexp.report import results as results_module
-from evoexp.report.index import document
-from evoexp.report.page_parts import Page
+from evoexp.report.pages import markdown
+from evoexp.report.pages.index import document
+from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, gather
+from evoexp.report.results import stored_results as results_module
+from evoexp.report.results.stored_results import Results, gather
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory

@@ -7,8 +7,8 @@ import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.report import markdown
-from evoexp.report.statistics import (
+from evoexp.report.pages import markdown
+from evoexp.report.statistics.inference import (
     EXACT_PAIRS,
     EXACT_VALUES,
     Interval,

@@ -12,9 +12,8 @@ import pytest
 from scipy import stats
 
 from evoexp.records import FloatArray
-from evoexp.report.comparisons import Comparison, adjusted, compare
-from evoexp.report.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED
-from evoexp.report.statistics import (
+from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
+from evoexp.report.statistics.inference import (
     Proportion,
     effect,
     effort_ratio,
@@ -23,6 +22,7 @@ from evoexp.report.statistics import (
     holm,
     newcombe,
 )
+from evoexp.report.statistics.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED
 from matrix import examples, matrices_are_asked_for
 from report_samples import hearing
 

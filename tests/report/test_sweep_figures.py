@@ -6,10 +6,9 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.figures import convergence, effects, matrix, shares
+from evoexp.report.figures import convergence, effects, matrix, shares, style
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.statistics import Proportion
+from evoexp.report.statistics.inference import Proportion
 
 
 def values(*runs: tuple[str, list[float]]) -> pd.DataFrame:

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 
 from evoexp.cli import main
 from evoexp.configuration import compose
-from evoexp.report import style
-from evoexp.report.figures import end_labels, sweeps
+from evoexp.report.figures import end_labels, style, sweeps
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, gather
-from evoexp.report.swept_settings import main_effects, sweep_of
+from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.results.swept_settings import main_effects, sweep_of
 from evoexp.shipped import shipped
 from report_samples import REPORT, SMALL, store
 
@@ -192,11 +191,14 @@ def test_all_its_figures_are_drawn(swept: Results, width: Any) -> None:
 
 
 def test_the_command_draws_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    blank_figures: None,
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
     words = "experiment=rana_planar", *SMALL[1:3], "budget=smoke", "ga.num_elites=0,2"
-    assert main(["run", "-m", *words, "--only", "via-point GA", "report.dpi=40"]) == 0
+    assert main(["run", "-m", *words, "--only", "via-point GA"]) == 0
     (folder,) = (tmp_path / "reports").iterdir()
     text = (folder / "index.md").read_text()
     assert "## Effect of each setting" in text and "](motion_" in text

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.report import judging
-from evoexp.report.comparisons import Comparison, adjusted, compare
-from evoexp.report.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED, greater
-from evoexp.report.statistics import Proportion, fisher_exact
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
+from evoexp.report.statistics.inference import Proportion, fisher_exact
+from evoexp.report.statistics.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED, greater
 from report_samples import hearing
 
 LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0

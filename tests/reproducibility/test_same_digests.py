@@ -101,6 +101,7 @@ def generic_cache() -> str:
     )
 
 
+@pytest.mark.matrix
 def test_the_digests_tell_replicates_and_conditions_apart(plain: Any) -> None:
     count = 3 * (4 + len(PROVEN))
     assert len(plain["digests"]) == len(set(plain["digests"].values())) == count

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.models.touching_spheres import TouchingSpheres
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.robots.arms import Arms
 from evoexp.robots.planar_chain import PlanarChain

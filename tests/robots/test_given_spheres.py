@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from evoexp.attachments import PREFIX, keep
-from evoexp.collision.models.body_covers import given_cover
+from evoexp.collision.covers.body_covers import given_cover
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError

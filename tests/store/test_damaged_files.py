@@ -5,7 +5,6 @@ import json
 import os
 import signal
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -331,15 +330,16 @@ def test_an_interrupted_writer_leaves_no_temporary_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its threads are in the middle of their files when the signal arrives."""
-    begun = threading.Event()
+    others, begun, interrupted = set(threading.enumerate()), threading.Event(), threading.Event()
 
     def slow_sync(descriptor: int) -> None:
         begun.set()
-        time.sleep(0.3)
+        interrupted.wait()
 
     def interrupt() -> None:
         begun.wait()
         os.kill(os.getpid(), signal.SIGINT)
+        interrupted.set()
 
     monkeypatch.setattr(os, "fsync", slow_sync)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -349,5 +349,6 @@ def test_an_interrupted_writer_leaves_no_temporary_file(
             write_files({tmp_path / f"{number}.mcap": b"log" for number in range(100)})
     finally:
         signal.signal(signal.SIGINT, before)
-    time.sleep(0.4)
+    while set(threading.enumerate()) - others:  # those of its files
+        pass
     assert list(tmp_path.iterdir()) == []

@@ -376,21 +376,6 @@ def tries(content: bytes, folder: Path) -> Iterator[list[str]]:
                 assert "\n" not in str(refusal)
 
 
-def test_metadata_of_other_kinds(content: bytes, tmp_path: Path) -> None:
-    """Every value of the metadata is exchanged for every value of another kind."""
-    for part in take_apart(content):
-        if part.opcode != Opcode.METADATA:
-            continue
-        for key in parsed(Metadata, part.body).metadata:
-            for value in VALUES[:: 1 if matrices_are_asked_for() else 5]:
-                parts = take_apart(content)
-                mine = next(p for p in parts if p.body == part.body)
-                metadata = parsed(Metadata, mine.body)
-                metadata.metadata[key] = value.decode("utf-8", "replace")
-                mine.body = written(metadata)
-                attempt(put_together(parts))
-
-
 def test_checksums_of_the_sample_fit(content: bytes) -> None:
     whole = put_together(take_apart(content))
     assert attempt(whole) == []

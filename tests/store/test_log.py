@@ -1,8 +1,6 @@
 """What is written comes back as it was, and the same content gives the same digests."""
 
 import math
-import subprocess
-import sys
 from io import BytesIO
 from pathlib import Path
 
@@ -214,16 +212,6 @@ def test_misuse_is_refused() -> None:
     log.write(Block.of(generations(1)[0]))
     with pytest.raises(ValueError, match="replicate 7"):
         log.finish(summary(7))
-
-
-def test_log_imports_no_tables() -> None:
-    code = (
-        "import sys, evoexp.store.log, evoexp.store.log_reader, evoexp.store.run_directory, "
-        "evoexp.store.manifest\n"
-    )
-    code += "assert not {'pandas', 'pyarrow', 'numba', 'scipy', 'pinocchio'} & set(sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 def test_links_are_those_of_costs_one_by_one() -> None:

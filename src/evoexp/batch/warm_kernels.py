@@ -14,7 +14,7 @@ from evoexp.batch.replicate_limits import ReplicateLimits, limited
 from evoexp.condition import Condition
 from evoexp.records import generations
 
-COMPILING_S = 120.0  # [s] that a short call may take; replicates that compile would be late, too
+COMPILING_S = 600.0  # [s] that a short call may take; replicates that compile would be late, too
 _NUMBER = re.compile(rb"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 

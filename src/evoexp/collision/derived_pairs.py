@@ -86,7 +86,7 @@ def derive_pairs(assembly: Assembly) -> DerivedPairs:
                 disabled.append(pair)
             else:
                 apart.append((a, b))
-    touched, parted = _seen(assembly, apart)
+    touched, parted = contacts_seen(assembly, apart, SAMPLES)
     by_name = [frozenset((names[a], names[b])) for a, b in apart]
     return DerivedPairs(
         tuple(neighbours),
@@ -114,22 +114,24 @@ def joint_limits(assembly: Assembly) -> FloatArray:
     return np.where(np.abs(limits) < 1e6, limits, np.inf)
 
 
-def _seen(assembly: Assembly, pairs: list[Pair]) -> tuple[BoolArray, BoolArray]:
-    """Return which pairs were seen to touch, and which to be apart; a pair seen both ways is done.
+def contacts_seen(
+    assembly: Assembly, pairs: list[Pair], samples: int
+) -> tuple[BoolArray, BoolArray]:
+    """Return which pairs touch on coal's geometry, and which are apart, in any of some samples.
 
     Without limits of all joints, all pairs count as seen both ways.
     """
     touched = np.zeros(len(pairs), dtype=np.bool_)
     parted = np.zeros(len(pairs), dtype=np.bool_)
-    q = sampled_configurations(assembly, SAMPLES)
+    q = sampled_configurations(assembly, samples)
     if q is None:
         return ~touched, ~parted
     model, geometry = assembly.model, assembly.geometry
     data, placements = model.createData(), geometry.createData()
     shapes = [item.geometry for item in geometry.geometryObjects]
     request, result = coal.CollisionRequest(), coal.CollisionResult()
-    for n in range(SAMPLES):
-        left = np.flatnonzero(~(touched & parted))
+    for n in range(samples):
+        left = np.flatnonzero(~(touched & parted))  # a pair seen both ways is done
         if len(left) == 0:
             break
         posture = np.ascontiguousarray(q[:, n])

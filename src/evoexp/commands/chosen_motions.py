@@ -11,7 +11,7 @@ import numpy as np
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
-from evoexp.commands.stored_runs import origin_of, stored_or_shipped
+from evoexp.commands.stored_runs import stored_or_shipped
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import (
@@ -31,6 +31,7 @@ from evoexp.robots.assembly import Robot
 from evoexp.store.chosen_logs import CHOICES, chosen_log
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import read_log
+from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 FOLDER = "motions"  # of the outputs

@@ -10,10 +10,10 @@ from evoexp.commands.console import new_table, print_json, say
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report.claim_rules import Rule, Rules
-from evoexp.report.page_parts import Claim
 from evoexp.report.pages import page_of
-from evoexp.report.results import gather
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results.stored_results import gather
+from evoexp.report.statistics.claim_rules import Rule, Rules
 from evoexp.store.run_directory import outputs_root
 
 KEYS = (

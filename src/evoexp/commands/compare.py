@@ -16,15 +16,14 @@ from evoexp.commands.report_requests import MAX_NAMED, ReportRequest, chosen
 from evoexp.condition import Condition
 from evoexp.configuration.labels import SAME
 from evoexp.errors import SettingError
-from evoexp.report import build, markdown
-from evoexp.report.best_known import read_best_known, shipped_best_known
-from evoexp.report.comparison_files import as_csv, as_latex
-from evoexp.report.given_data import GivenData, of_given, read_given, strange_problems
-from evoexp.report.ioh_format import ioh_files
-from evoexp.report.pages import comparison
-from evoexp.report.planner_runs import PlannerRuns, of_results
+from evoexp.report.pages import build, comparison, markdown
+from evoexp.report.pages.comparison_files import as_csv, as_latex
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import gather
+from evoexp.report.results.best_known import read_best_known, shipped_best_known
+from evoexp.report.results.given_data import GivenData, of_given, read_given, strange_problems
+from evoexp.report.results.ioh_format import ioh_files
+from evoexp.report.results.planner_runs import PlannerRuns, of_results
+from evoexp.report.results.stored_results import gather
 from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root
 

@@ -43,11 +43,14 @@ KEYS = {
 """Key → its value, in the order of the screen."""
 
 
-def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
+def composed_facts(
+    experiment: Experiment, label: str, command: str, *, noted: bool = True
+) -> dict[str, Any]:
     """Return the facts about one condition of an experiment, whether or not it was run here.
 
     Args:
         command: That runs it.
+        noted: Whether the facts include notes, for which the planner prepares its problem.
 
     Raises:
         EvoexpError: If the condition cannot be built: its parts do not fit.
@@ -65,9 +68,10 @@ def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str
     planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
     around = run.manifest() if rows else None
     config_json = condition.to_json()
-    if not lacking(config_json):  # else a note says how to install it
+    is_shipped = condition.id in shipped.rows_by_condition()  # the parts of these fit
+    if (noted or not is_shipped) and not lacking(config_json):  # else a note says how to install it
         condition.notes()  # raises where the parts do not fit
-    return _facts(config_json, origin, around, rows, planned)
+    return _facts(config_json, origin, around, rows, planned, noted=noted)
 
 
 def stored_facts(run: RunDirectory) -> dict[str, Any]:
@@ -112,6 +116,8 @@ def _facts(
     around: Mapping[str, Any] | None,
     rows: Sequence[dict[str, Any]],
     planned: int | None,
+    *,
+    noted: bool = True,
 ) -> dict[str, Any]:
     """Return the facts of all keys.
 
@@ -121,6 +127,7 @@ def _facts(
         around: Environment or manifest in which the replicates were run; None: none were.
         rows: Summaries of the replicates.
         planned: How many there shall be; None: unknown.
+        noted: Whether notes are among them.
     """
     config = stored_config(config_json)
     condition_id = hashlib.sha256(config_json).hexdigest()
@@ -139,7 +146,7 @@ def _facts(
         "result": _result(rows, planned) if rows else None,
         "verdict": _verdict([row for row in rows if row["status"] == "done"]) if rows else None,
         "settings": config,
-        "notes": _notes(config_json),
+        "notes": _notes(config_json) if noted else [],
     }
 
 

@@ -8,11 +8,12 @@ from rich.table import Table
 
 from evoexp.commands.arguments import add_config_dir_argument
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
-from evoexp.commands.stored_runs import origin_of, stored_runs
+from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, printable
 from evoexp.store.files import listed
 from evoexp.store.integrity import damaged_files
+from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_rows
 

@@ -19,8 +19,8 @@ from evoexp.commands.site import home_files, write_site
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options, searched_first
 from evoexp.errors import EvoexpError, NothingStored, SettingError, StoreError
-from evoexp.report import build
-from evoexp.report.home_page import summaries
+from evoexp.report.pages import build
+from evoexp.report.pages.home_page import summaries
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
 

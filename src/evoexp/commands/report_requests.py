@@ -14,7 +14,7 @@ from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
-from evoexp.report import build
+from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import outputs_root, resolve

@@ -5,6 +5,7 @@ import contextlib
 import functools
 import hashlib
 import importlib.util
+import math
 import shlex
 import sys
 import tempfile
@@ -24,7 +25,7 @@ from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment, Labelled
-from evoexp.configuration.search_path import folders
+from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
 from evoexp.registry import COMPONENTS, registrations
@@ -33,6 +34,10 @@ from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
+USAGE = """evoexp: experiment: must be chosen, as in
+  evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
+  evoexp list                                       # all {number} experiments, and stored runs"""
+SHOWN = ("solved", "certified", "best_cost", "cpu_s")  # columns of the stored summaries
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
 
 
@@ -52,6 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
+    if not arguments.overrides:
+        print(USAGE.format(number=len(options("experiment"))), file=sys.stderr)
+        return 2
     experiments = compose.expand(
         arguments.overrides, multirun=arguments.multirun, only=arguments.only
     )
@@ -204,26 +212,31 @@ def _code() -> list[Path]:
 
 
 def summary_table(experiment: Experiment) -> Table:
-    """Return a table of the conditions: replicates done, solved, cost and time.
+    """Return a table of the conditions: replicates done, solved, certified, cost and time.
 
     As the report, it has all stored replicates, also those beyond the number that is asked for.
     """
-    numbers = right("replicates", "solved", "median\nbest cost", "CPU s\neach")
+    numbers = right("replicates", "solved /\ncertified", "median\nbest cost", "CPU s\neach")
     table = new_table(experiment.report_name, "condition", hash_column(), *numbers)
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
         rows = stored_summaries(run)
         planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
-        columns = rows.select(["status", "solved", "best_cost", "cpu_s"]).to_pylist()
+        columns = rows.select([*SHOWN, "status", "clearance"]).to_pylist()
         done = [row for row in columns if row["status"] == "done"]
+        moved = [row for row in done if not math.isnan(row["clearance"])]
+        solved = sum(row["solved"] for row in done)
+        certified = str(sum(row["certified"] is True for row in moved)) if moved else "–"
         table.add_row(
             label,
             condition.id[:12],
             f"{len(done)} of {planned}",
-            f"{sum(row['solved'] for row in done)} of {len(done)}",
+            f"{solved} / {certified}",
             _median([row["best_cost"] for row in done], ".4g"),
             _median([row["cpu_s"] for row in done], ".3f"),
         )
+        if experiment.budget_of(label) == "smoke":
+            table.caption = "budget=smoke shows that everything runs; its numbers decide nothing"
         if planned > condition.num_replicates(experiment.num_replicates):
             asked = experiment.num_replicates
             table.caption = f"of {asked} asked for: all that are stored, here and in the report"

@@ -28,9 +28,10 @@ from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.errors import SettingError, printable
 from evoexp.store.identity import TAKEN
+from evoexp.store.run_context import typed_parts
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import summary_table
-from evoexp.validation import MOST_QUERIES, TARGET
+from evoexp.validation import TARGET
 
 MAX_CHANGES = 6  # settings per row of a table of conditions
 INDENT = 13  # columns of the names on the left
@@ -67,12 +68,15 @@ def main(arguments: argparse.Namespace) -> int:
         experiments = compose.expand(words, multirun=arguments.multirun, only=arguments.only)
         swept = ["-m"] if arguments.multirun else []
         command = ["evoexp", "run", *swept, *words, *folder_words(arguments.config_dir)]
+        labelled = [(each, label) for each in experiments for label, _ in each.conditions]
+        is_table = as_table and len(labelled) > 1  # which has no notes
         found = [
-            composed_facts(experiment, label, shlex.join([*command, "--only", label]))
-            for experiment in experiments
-            for label, _ in experiment.conditions
+            composed_facts(
+                experiment, label, shlex.join([*command, "--only", label]), noted=not is_table
+            )
+            for experiment, label in labelled
         ]
-        if len(found) > 1 and as_table:
+        if is_table:
             for experiment in experiments:
                 say(_condition_table(experiment, found))
             say("one condition on a screen: --only LABEL")
@@ -354,31 +358,6 @@ def _place(verdict: Mapping[str, Any], name: str) -> str:
 
 def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.6g}"
-
-
-def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parts of a canonical form by the names under which their settings are typed.
-
-    A planner's components come out of it (`ga`, `collision`), and a planner out of its control.
-    """
-    parts: dict[str, Any] = {}
-    for name, component in settings.items():
-        if isinstance(component, Mapping) and isinstance(component.get("planner"), Mapping):
-            around = {key: value for key, value in component.items() if key != "planner"}
-            parts |= {"control": around} | typed_parts({"planner": component["planner"]})
-        elif name == "planner":
-            inner = {
-                key: value
-                for key, value in component.items()
-                if isinstance(value, Mapping) and TARGET in value
-            }
-            own = {key: value for key, value in component.items() if key not in inner}
-            parts |= {"planner": own} | inner
-        elif name == MOST_QUERIES:
-            parts["budget"] = {"collision_queries": component}
-        else:
-            parts[name] = component
-    return parts
 
 
 def compact(value: Any) -> str:

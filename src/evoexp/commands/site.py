@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import cast
 
 from evoexp.commands.console import say
-from evoexp.commands.stored_runs import origin_of, stored_runs
+from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import options
 from evoexp.errors import EvoexpError, NothingStored
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report.build import ReportFiles
-from evoexp.report.claim_rules import Rules
-from evoexp.report.home_page import Paper, StoredRun, home_page, summaries
-from evoexp.report.html_page import HTML
+from evoexp.report.pages.build import ReportFiles
+from evoexp.report.pages.home_page import Paper, StoredRun, home_page, summaries
+from evoexp.report.pages.html_page import HTML
+from evoexp.report.statistics.claim_rules import Rules
 from evoexp.store.files import write_file
+from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written

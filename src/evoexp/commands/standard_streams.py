@@ -12,8 +12,10 @@ OUTPUT = "standard output"  # the file name of its errors
 
 
 def open_streams() -> None:
-    """Open those that were closed on nothing, before a file of ours gets the number of one."""
-    # for good, in the order of their numbers
+    """Open closed standard streams on the null device, before one of our files gets their number.
+
+    They stay open, and are opened in the order of their numbers.
+    """
     sys.stdin = sys.stdin or open(os.devnull)  # noqa: SIM115
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115

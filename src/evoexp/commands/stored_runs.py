@@ -1,15 +1,12 @@
 """Stored runs as commands name them: by a prefix of a hash."""
 
 from pathlib import Path
-from typing import Any
 
 from evoexp import shipped
-from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
 from evoexp.shipped import Shipped
-from evoexp.store.run_context import origin
 from evoexp.store.run_directory import RunDirectory, open_run, outputs_root, resolve, run_names
 
 MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
@@ -59,6 +56,8 @@ def stored_or_shipped(prefix: str) -> RunDirectory | Shipped:
 
 def shipped_experiment(row: Shipped) -> Experiment:
     """Return the experiment of a shipped condition, with this condition alone."""
+    from evoexp.configuration import compose  # Hydra and Pinocchio, which `list` does not need
+
     words = [f"experiment={row.experiment}", f"budget={row.budget}"]
     return compose.expand(words, only=[row.label])[0]
 
@@ -71,12 +70,3 @@ def _with_candidates(error: UnknownHash, prefix: str) -> UnknownHash:
     more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
     stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
     return UnknownHash(f"{error}; no shipped condition either (stored: {stored}; see: evoexp list)")
-
-
-def origin_of(run: RunDirectory) -> dict[str, Any]:
-    """Return `run_context.origin` of a run; of one whose manifest is lost by its hash alone."""
-    try:
-        notes = run.manifest()
-    except EvoexpError:
-        notes = {}
-    return origin(notes, run.condition_id)

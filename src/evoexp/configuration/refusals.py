@@ -16,6 +16,8 @@ HEADER = "# @package _global_"  # first line of an experiment file
 
 def chosen(group: str) -> str:
     """Return the requirement that an option of a group is chosen, with the options."""
+    if group == EXPERIMENT:
+        return f"chosen: experiment=NAME, one of {len(options(group))}: evoexp list"
     return f"chosen: {', '.join(options(group))}"
 
 
@@ -51,8 +53,7 @@ def uncomposed(
     if missing := re.search(r"You must specify '([^']+)'", text):
         group = missing[1]
         if not choices.get(EXPERIMENT):
-            without = f"without one, every group is needed; the next is {group}"
-            must = f"{chosen(EXPERIMENT)} ({without}: {', '.join(options(group))})"
+            must = f"{chosen(EXPERIMENT)} (without one, every group is needed; the next is {group})"
             return SettingError(EXPERIMENT, must, None)
         return SettingError(group, chosen(group), None)
     if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):

@@ -5,7 +5,8 @@ then repeats the step that took them, from the same place of a longer block. So 
 not depend on where blocks end.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,23 +51,30 @@ class Draws:
 
 
 class DrawnAhead:
-    """Uniform numbers for several steps at once; what they leave is for the next steps."""
+    """Random numbers for several steps at once; what they leave is for the next steps."""
 
-    def __init__(self, rng: np.random.Generator, most: int) -> None:
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        most: int,
+        draw: Callable[[int], NDArray[Any]] | None = None,
+    ) -> None:
         """Begin where a generator is.
 
         Args:
             rng: The generator, a PCG64.
-            most: Numbers that a step takes at most.
+            most: Numbers that a step takes at most, as far as the caller knows.
+            draw: Draws so many numbers, each by one step of the generator: uniform in [0, 1) if
+                nothing else is asked for.
         """
-        self._rng, self._most, self._left = rng, most, np.empty(0)
+        self._draw, self._most, self._left = draw or rng.random, most, np.empty(0)
         self._state = state_bytes(rng.bit_generator)
 
-    def draw(self, steps: int) -> NDArray[np.float64]:
+    def draw(self, steps: int) -> NDArray[Any]:
         """Return at least as many numbers as the next steps may take."""
         missing = steps * self._most - len(self._left)
         if missing > 0:
-            fresh = self._rng.random(missing)
+            fresh = self._draw(missing)
             self._left = np.concatenate([self._left, fresh]) if len(self._left) else fresh
         return self._left
 

@@ -10,15 +10,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evoexp.numeric.compilation import inlined, kernel
 from evoexp.paths.grids import Moves, NodeArray, StepArray
-from evoexp.records import BoolArray, FloatArray
+from evoexp.records import FloatArray, IntArray
 
 MOST_SLOTS = 256  # of a node
 MOST_NODES = 2**15  # whose differences are 16 bits
 TOTAL_BITS = 9  # of an entry: the number of slots
 TOTAL = np.uint32(2**TOTAL_BITS - 1)
 SHIFT = np.uint32(TOTAL_BITS)
-BYTES = 8  # of a word
+# the hash of Fowler, Noll and Vo, by whole weights instead of bytes
+FNV_BASIS, FNV_PRIME = np.uint64(0xCBF29CE484222325), np.uint64(0x100000001B3)
+ONE, HALF = np.uint64(1), np.uint64(32)
 
 
 class Choices(NamedTuple):
@@ -48,38 +51,86 @@ def choices_of(
         most_patterns: Most combinations of the weights of a node's moves.
     """
     nodes, moves = neighbours.shape
-    none = Choices(np.empty((0, nodes), dtype=np.uint32), np.zeros(1, dtype=np.int16))
-    if nodes > MOST_NODES or not len(fronts):
-        return none
-    # a byte for the weight of each move, words of them for each node
-    weights = np.zeros((*fronts.shape, BYTES * -(-moves // BYTES)), dtype=np.uint8)
-    permitted = neighbours >= 0
-    for target, steps in enumerate(fronts):
-        whole = _weights(neighbours, permitted, potentials[steps])
-        if whole is None:
-            return none
-        weights[target, :, :moves] = whole
-    # each combination of weights once, and which of them a node has
-    words = weights.reshape(-1, weights.shape[2]).view(np.uint64)
-    _, pattern = np.unique(words[:, 0], return_inverse=True)
-    for word in words.T[1:]:
-        _, column = np.unique(word, return_inverse=True)
-        _, pattern = np.unique(pattern * (column.max() + 1) + column, return_inverse=True)
-    count = int(pattern.max()) + 1
-    if count >= most_patterns:
-        return none
-    example = np.empty(count, dtype=np.int64)
-    example[pattern] = np.arange(len(pattern))
-    repeats = weights.reshape(len(words), -1)[example, :moves].astype(np.int64)
+    entries = np.empty((len(fronts), nodes), dtype=np.uint32)
+    patterns = np.empty((most_patterns, moves), dtype=np.int64)
+    slots = np.empty(most_patterns * MOST_SLOTS, dtype=np.int16)
+    places = np.full(1 << (2 * most_patterns).bit_length(), -1)
     # a move leads to the same difference of indices from every node that has it
-    differences = np.where(permitted, neighbours - np.arange(nodes, dtype=np.int32)[:, None], 0)
+    differences = np.where(neighbours >= 0, neighbours - np.arange(nodes)[:, None], 0)
     shifts = differences[np.abs(differences).argmax(axis=0), np.arange(moves)]
-    stays = (~repeats.any(axis=1)).astype(np.int64)  # without a neighbour a walk stays
-    counts = np.column_stack([repeats, stays])
-    first, totals = np.cumsum(counts.sum(axis=1)) - counts.sum(axis=1), repeats.sum(axis=1)
-    entries = (first << TOTAL_BITS | totals).astype(np.uint32)[pattern].reshape(fronts.shape)
-    slots = np.repeat(np.tile([*shifts, 0], count), counts.ravel()).astype(np.int16)
-    return Choices(entries, slots)
+    count = 0
+    if nodes <= MOST_NODES:
+        count = _tabulate(neighbours, potentials, fronts, shifts, places, patterns, entries, slots)
+    return Choices(entries if count else entries[:0], slots[: max(1, count)].copy())
+
+
+@kernel
+def _tabulate(
+    neighbours: NodeArray,  # see `choices_of`, as for `potentials` and `fronts`
+    potentials: FloatArray,
+    fronts: StepArray,
+    shifts: IntArray,  # (moves,) difference of indices that each move makes
+    places: IntArray,  # (a power of two,) −1; written: numbers of patterns by their hashes
+    patterns: IntArray,  # (most patterns, moves) written: weights
+    entries: NDArray[np.uint32],  # (targets, nodes) written
+    slots: NDArray[np.int16],  # (any,) written
+) -> int:
+    """Write the choices at every node; return the number of slots, 0 if they do not fit.
+
+    Patterns are found by open addressing: `places` holds the number of each pattern, by which its
+    weights stand in `patterns` and the place of its first slot in `firsts`.
+    """
+    nodes, moves = neighbours.shape
+    weights, firsts = np.zeros(moves, dtype=np.int64), np.empty(len(patterns), dtype=np.int64)
+    mask, num_patterns, num_slots = np.uint64(len(places) - 1), 0, 0
+    for target in range(len(fronts)):
+        steps = fronts[target]
+        for node in range(nodes):
+            # the weights of all moves, and their hash
+            greatest, total, key = 0.0, 0, FNV_BASIS
+            for move in range(moves):
+                other = neighbours[node, move]
+                if other >= 0:
+                    greatest = max(greatest, potentials[steps[other]])
+            for move in range(moves):
+                other, weight = neighbours[node, move], 0.0
+                if other >= 0:
+                    weight = greatest - potentials[steps[other]] + 1.0
+                weights[move] = int(weight)
+                if weights[move] != weight or weight > MOST_SLOTS:
+                    return 0
+                total += weights[move]
+                key = (key ^ np.uint64(weights[move])) * FNV_PRIME
+            if total > MOST_SLOTS:
+                return 0
+            # the pattern of these weights
+            at = (key ^ key >> HALF) & mask
+            while places[at] >= 0 and not _are_equal(patterns[places[at]], weights):
+                at = (at + ONE) & mask
+            # a new pattern, its slots; without a neighbour a walk stays
+            if places[at] < 0:
+                if num_patterns + 1 >= len(patterns):
+                    return 0
+                places[at], firsts[num_patterns] = num_patterns, num_slots
+                patterns[num_patterns] = weights
+                for move in range(moves):
+                    slots[num_slots : num_slots + weights[move]] = shifts[move]
+                    num_slots += weights[move]
+                if total == 0:
+                    slots[num_slots] = 0
+                    num_slots += 1
+                num_patterns += 1
+            entries[target, node] = firsts[places[at]] << TOTAL_BITS | total
+    return num_slots
+
+
+@inlined
+def _are_equal(one: IntArray, two: IntArray) -> bool:
+    """Return whether two rows of weights are the same."""
+    num_equal = 0
+    for k in range(len(one)):
+        num_equal += one[k] == two[k]
+    return num_equal == len(one)
 
 
 def choice_table(moves: Moves) -> Choices:
@@ -90,22 +141,3 @@ def choice_table(moves: Moves) -> Choices:
     """
     fronts = moves.steps[None, :]
     return choices_of(moves.neighbours, moves.potentials, fronts, len(moves.neighbours))
-
-
-def _weights(
-    neighbours: NodeArray, permitted: BoolArray, potential: FloatArray
-) -> FloatArray | None:
-    """Return the weights of the moves from every node (nodes, moves), see `grid_walks.walk`.
-
-    There are none if a node has more than `MOST_SLOTS`, or if a weight is no whole number.
-
-    Args:
-        neighbours: See `choices_of`.
-        permitted: (nodes, moves) whether there is a neighbour.
-        potential: (nodes,) toward the target.
-    """
-    around = np.where(permitted, potential[neighbours], 0.0)
-    greatest = around.max(axis=1, keepdims=True)
-    weights = np.where(permitted, greatest - around + 1.0, 0.0)
-    fit = weights.sum(axis=1).max() <= MOST_SLOTS and (weights == np.floor(weights)).all()
-    return weights if fit else None

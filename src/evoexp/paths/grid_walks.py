@@ -6,11 +6,16 @@ the path has that node at its place; so nothing needs to be cleared between path
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.random_stream import Block, used_up
+from evoexp.numeric.random_stream import Block
 from evoexp.paths.grid_choices import SHIFT, TOTAL, Choices
 from evoexp.paths.grids import Moves, NodeArray
+
+LANES = 4  # walkers of `walk_all`
+WORDS = LANES // 2  # of 64 random bits for a step of each
+HALF, LOW = np.uint64(32), np.uint64(2**32 - 1)
 
 
 @kernel
@@ -91,40 +96,74 @@ def follow_exits(exits: NodeArray, ends: tuple[int, int], path: NodeArray) -> No
 
 
 @kernel
-def walk_each(
-    draws: Block,
-    moves: Moves,
-    choices: Choices,
-    ends: tuple[int, int],
-    erase: bool,
-    first: int,
-    paths: NodeArray,
-    place: NodeArray,
+def walk_all(
+    words: NDArray[np.uint64],  # (any,) random
+    num_words: int,  # words that are drawn at first, for a step of every walker each `WORDS`
+    more_words: int,  # words that are drawn whenever these do not suffice
+    choices: Choices,  # of one target, see `grid_choices.choice_table`
+    ends: tuple[int, int],  # indices of two nodes, start and target
+    erase: bool,  # whether loops are erased
+    paths: NodeArray,  # (paths, nodes + 1) written
 ) -> int:
-    """Write random paths between the same nodes, one after the other, each as `walk` does.
+    """Write random paths between the same two nodes, each as `walk` does, by half words.
 
-    Args:
-        draws: Uniform numbers.
-        moves: The moves and their weights.
-        choices: The same as a table, or without rows.
-        ends: Indices of the first node and of the target.
-        erase: Whether loops are erased.
-        first: The path to begin with.
-        paths: (paths, nodes + 1) written.
-        place: (nodes,) scratch.
+    A step must wait for the step before it, which names the row to read; so `LANES` walkers take
+    their steps in turns. The lower half of word i is that of walker 2 i, the upper half that of
+    walker 2 i + 1, and so on. A walker that arrives begins the next path.
 
     Returns:
-        How many paths are complete, those before `first` included: fewer than all if the draws did
-        not suffice.
+        The number of words drawn, a rest included that nobody took; −1 if there are not as many.
     """
-    draws, moves, choices, paths = borrowed((draws, moves, choices, paths))
-    for k in range(first, len(paths)):
-        before = draws.taken[0]
-        walk(draws, moves, choices, ends, erase, paths[k], place)
-        if used_up(draws):
-            draws.taken[0] = before
-            return k
-    return len(paths)
+    words, choices, paths = borrowed((words, choices, paths))
+    nodes, target = choices.entries.shape[1], np.uint64(ends[1])
+    here, rows = np.full(LANES, np.uint64(ends[0])), np.arange(LANES)
+    # of each walker its last exit from each node; where loops are kept its nodes, from index 1 on
+    trails, counts = np.empty((LANES, nodes + 1), dtype=np.int32), np.ones(LANES, dtype=np.int64)
+    trails[:, 1] = ends[0]
+    place = np.empty(nodes, dtype=np.int32)
+    begun, complete, taken, drawn = LANES, 0, 0, num_words
+    while complete < len(paths):
+        if taken == drawn:
+            drawn += more_words
+        if drawn > len(words):
+            return -1
+        # a step of every walker
+        has_arrived = False
+        for walker in range(LANES):
+            word, node = words[taken + (walker >> 1)], here[walker]
+            following = _node_of_bits(choices, node, word >> HALF if walker & 1 else word & LOW)
+            if erase:
+                trails[walker, node] = following
+            else:
+                counts[walker] += 1
+                trails[walker, counts[walker]] = following
+            here[walker] = following
+            has_arrived |= following == target
+        taken += WORDS
+        # who has arrived begins the next path
+        for walker in range(LANES if has_arrived or not erase else 0):
+            trail, count = trails[walker], counts[walker]
+            if here[walker] == target:
+                row = rows[walker]
+                if row < len(paths) and erase:
+                    follow_exits(trail, ends, paths[row])
+                elif row < len(paths):
+                    paths[row, 0], paths[row, 1 : count + 1] = count, trail[1 : count + 1]
+                complete += row < len(paths)
+                rows[walker], here[walker], counts[walker] = begun, np.uint64(ends[0]), 1
+                begun += 1
+            elif not erase and count == nodes:  # full: a path without loops always fits
+                erase_loops(trail, count, trail, place)
+                counts[walker] = trail[0]
+    return drawn
+
+
+@inlined
+def _node_of_bits(choices: Choices, node: np.uint64, bits: np.uint64) -> np.uint64:
+    """Return where 32 random bits lead by a table of choices; a node is an index, unsigned."""
+    entry = choices.entries[0, node]
+    part = bits * np.uint64(entry & TOTAL) >> HALF
+    return np.uint64(np.int64(node) + choices.slots[np.uint64(entry >> SHIFT) + part])
 
 
 @kernel

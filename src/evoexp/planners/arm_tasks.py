@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.bodies.body_collision import Clearances
+from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
+from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.collision.box_support import coal
-from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
-from evoexp.collision.models.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.collision.scene import Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
@@ -114,7 +115,7 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         return _floor_motion(task)
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
-    from evoexp.collision.models.link_collision import two_link_arms  # and its kernels
+    from evoexp.collision.planar.link_collision import two_link_arms  # and its kernels
 
     if task.stationary:
         must = "empty: this planner moves all robots"
@@ -272,7 +273,7 @@ def covered_collision(
     return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored)
 
 
-def check_spheres(clearance: Clearance, field: str, given: Any, unit: str) -> None:
+def check_spheres(clearance: Clearances, field: str, given: Any, unit: str) -> None:
     """Refuse a configuration at which the paper's spheres overlap.
 
     Raises:

@@ -371,3 +371,12 @@ class Keeper:
             stop_reason,
             arrays,
         )
+
+
+def judged_samples(planner: Planner, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+    """Yield generations of samples, each drawn as the planner draws its initial population."""
+    keeper = Keeper()
+    for index in range(planner.num_generations + 1):
+        population = planner.sample(problem, rng, planner.num_evaluations(index))
+        judged = planner.cost(problem, population)
+        yield keeper.record_judged(planner, problem, population, judged)

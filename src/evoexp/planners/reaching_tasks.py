@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_ellipses import EllipseCollision, LinkEllipses
+from evoexp.collision.planar.link_ellipses import EllipseCollision, LinkEllipses
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray

@@ -59,8 +59,9 @@ class WrappedPlanner(PlannerDefaults, Component):
 
     def bounds(self, problem: Any) -> tuple[FloatArray, FloatArray]:
         """Return the bounds of the wrapped planner, a real-coded one."""
-        found: tuple[FloatArray, FloatArray] = self.planner.bounds(problem)  # type: ignore[attr-defined]
-        return found
+        real_coded: Any = self.planner
+        low, high = real_coded.bounds(problem)
+        return low, high
 
     def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
         """Return an individual as the wrapped planner does."""
@@ -99,7 +100,7 @@ class WrappedPlanner(PlannerDefaults, Component):
         return self.planner.memory(problem)
 
     def prior_queries(self, problem: Any) -> int:
-        """Return those that the wrapped planner's problem holds."""
+        """Return how many configurations the wrapped planner's task answers by itself."""
         return self.planner.prior_queries(problem)
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:

@@ -71,9 +71,10 @@ def outline(shape: Any) -> tuple[Outline, Any]:
         return Outline("sphere", (float(shape.radius),)), here
     if isinstance(shape, coal.Ellipsoid):
         return Outline("ellipsoid", tuple(float(axis) for axis in shape.radii)), here
-    for kind, name in ((coal.Capsule, "capsule"), (coal.Cylinder, "cylinder"), (coal.Cone, "cone")):
-        if isinstance(shape, kind):
-            return Outline(name, (float(shape.radius), 2.0 * float(shape.halfLength))), here  # type: ignore[arg-type]
+    names: dict[Any, Kind] = {coal.Capsule: "capsule", coal.Cylinder: "cylinder", coal.Cone: "cone"}
+    if type(shape) in names:
+        sizes = float(shape.radius), 2.0 * float(shape.halfLength)
+        return Outline(names[type(shape)], sizes), here
     if isinstance(shape, coal.Halfspace):
         normal = np.array(shape.n)
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()

@@ -5,12 +5,11 @@ straight from point to point, with velocities on the cubics that they determine.
 executed is certified again where it is another curve than the stored one.
 """
 
-import csv
-import io
 import json
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from evoexp.collision.certifier.certificate import Certificate, certificate
 from evoexp.paths.motion import Motion
@@ -153,18 +152,9 @@ def as_json(recording: Recording, found: Trajectory) -> bytes:
 
 def as_csv(found: Trajectory) -> bytes:
     """Return a trajectory as CSV: time, positions, and velocities if there are any."""
-    columns = [found.times[:, None], found.positions]
-    names = [
-        "time_s",
-        *(f"{joint}_{unit}" for joint, unit in zip(found.joints, found.units, strict=True)),
-    ]
+    names = [f"{joint}_{unit}" for joint, unit in zip(found.joints, found.units, strict=True)]
+    table = pd.DataFrame(found.positions, columns=names)
+    table.insert(0, "time_s", found.times)
     if found.velocities is not None:
-        columns.append(found.velocities)
-        names += [
-            f"{joint}_{unit}_per_s" for joint, unit in zip(found.joints, found.units, strict=True)
-        ]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([repr(value) for value in row] for row in np.hstack(columns).tolist())
-    return text.getvalue().encode()
+        table[[f"{name}_per_s" for name in names]] = found.velocities
+    return table.to_csv(index=False, lineterminator="\n").encode()

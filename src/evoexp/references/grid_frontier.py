@@ -59,7 +59,7 @@ class GridFrontier(Reference):
     """The best path known, and the bound below all paths."""
 
     component: ClassVar[str] = "grid_frontier"
-    revision: ClassVar[int] = 2
+    revision: ClassVar[int] = 3
 
     planner: GridPathGa  # the path search whose grid and cost it shares
     # values of μ, from `least_weight` to `greatest_weight` by equal ratios, after the very
@@ -141,7 +141,7 @@ class GridFrontier(Reference):
 
     def weights(self) -> FloatArray:
         """Return the values of μ (weights,) [cell] of the frontier."""
-        ratios = np.geomspace(self.least_weight, self.greatest_weight, self.num_weights)
+        ratios = geometric_series(self.least_weight, self.greatest_weight, self.num_weights)
         return np.array([SAFEST_OF_SHORTEST, *ratios])
 
     def key(self, problem: Any) -> str:
@@ -206,6 +206,27 @@ class GridFrontier(Reference):
 
     def _solution(self, problem: Any, path: np.ndarray) -> FloatArray:
         return np.asarray(problem.fields.grid.coordinates[path], dtype=np.float64).ravel()
+
+
+def geometric_series(first: float, last: float, count: int) -> list[float]:
+    """Return numbers of equal ratios, the same bits on every machine.
+
+    `numpy.geomspace` takes powers, whose last bits depend on the processor, and these decide
+    between paths that cost the same.
+    """
+    if count == 1:
+        return [first]
+    # the ratio by bisection, to neighbouring numbers
+    low, high = sorted((1.0, last / first))
+    while low < (middle := 0.5 * (low + high)) < high:
+        product = first
+        for _ in range(count - 1):
+            product *= middle
+        low, high = (middle, high) if product < last else (low, middle)
+    series = [first]
+    for _ in range(count - 2):
+        series.append(series[-1] * low)
+    return [*series, last]
 
 
 def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndarray]]:

@@ -19,8 +19,6 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-import pyarrow.parquet as pq
-
 from evoexp.attachments import PREFIX
 from evoexp.errors import CorruptLog, EvoexpError, OtherVersion, StoreError
 from evoexp.records import ReplicateSummary
@@ -44,12 +42,10 @@ from evoexp.store.identity import (
     read,
 )
 from evoexp.store.log_reader import LogContents, checked_summary, read_log, read_summary
-from evoexp.store.messages import TERM
-from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory, is_stored, open_run
 from evoexp.store.summaries import (
-    BASE,
     altered_rows,
+    altered_settings,
     damaged_logs,
     replicate_of,
     table_damage,
@@ -184,35 +180,11 @@ def check_rows(run: RunDirectory, logs: list[LogCheck]) -> dict[str, str]:
     whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
     names = altered_rows(run, whole)
     if not names:
-        columns = _altered_settings(run)
+        columns = altered_settings(run)
         told = f"altered: {columns[0]} is not the setting{DELETE}" if columns else ""
         return {"summary.parquet": told} if told else {}
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     return {"summary.parquet": f"altered: it does not repeat {names[0]}{more}{DELETE}"}
-
-
-def _altered_settings(run: RunDirectory) -> list[str]:
-    """Return the columns of `summary.parquet` that do not repeat a setting of the run.
-
-    What the manifest says of the origin may have changed since, and is not looked at.
-    """
-    try:
-        run.check()
-    except StoreError:  # whose settings nothing tells
-        return []
-    if not run.summary_path.exists() or table_damage(run):
-        return []
-    with pq.ParquetFile(run.summary_path) as file:
-        table = file.read(use_threads=False)
-    known = {field.name for field in BASE}
-    measured = [name for name in table.column_names if name in known or name.startswith(TERM)]
-    return [
-        name
-        for name, value in run_context(run.path, run.condition_id, measured).items()
-        if name in table.column_names
-        and name not in ORIGIN
-        and set(table[name].to_pylist()) - {value}
-    ]
 
 
 def _contradictions(log: LogContents, condition_id: str, replicate: int) -> Iterator[str]:

@@ -8,6 +8,7 @@ needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an el
 
 from collections.abc import Mapping
 from functools import cache
+from inspect import signature
 from math import isfinite
 from sys import intern
 from typing import Any, get_type_hints
@@ -45,6 +46,13 @@ _TRUTHS = (bool, bool | None)
 def field_types(record: type) -> dict[str, Any]:
     """Return a record's fields and their types in order; `terms` become a field each."""
     return {name: kind for name, kind in get_type_hints(record).items() if name != "terms"}
+
+
+@cache
+def _field_defaults(record: type) -> dict[str, Any]:
+    """Return the defaults of a record's fields that have one."""
+    fields = signature(record).parameters.values()
+    return {field.name: field.default for field in fields if field.default is not field.empty}
 
 
 @cache
@@ -192,7 +200,7 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
         restore(row)
     fields: dict[str, Any] = {}
     for name, kind in field_types(record).items():
-        value = row[name] if name in row else record._field_defaults[name]  # type: ignore[attr-defined]
+        value = row[name] if name in row else _field_defaults(record)[name]
         if not isinstance(value, _TAKEN[kind]) or (value is True or value is False) is not (
             kind in _TRUTHS and value is not None
         ):

@@ -13,9 +13,11 @@ from typing import Any
 
 import pyarrow as pa
 
-from evoexp.errors import StoreError
+from evoexp.errors import EvoexpError, StoreError
 from evoexp.shipped import labels_by_experiment, rows_by_condition
 from evoexp.store.identity import CONFIG, MANIFEST, read_object
+from evoexp.store.run_directory import RunDirectory
+from evoexp.validation import MOST_QUERIES, TARGET
 
 ORIGIN = ("experiment", "label", "budget")
 LONGEST = 200  # characters of a list
@@ -50,12 +52,21 @@ def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
     return {**notes, "budget": budget, "changed": bool(labels)}
 
 
+def origin_of(run: RunDirectory) -> dict[str, Any]:
+    """Return the `origin` of a stored run; of one whose manifest is lost by its hash alone."""
+    try:
+        notes = run.manifest()
+    except EvoexpError:
+        notes = {}
+    return origin(notes, run.condition_id)
+
+
 def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[str, Any]:
     """Collect the origin and the settings of a run.
 
     A setting has the last part of its name where no other setting and no column has it, else its
-    whole dotted name: `population_size`, `planner.collision.revision`. Components are called by
-    their group: `planner`, `robot`. Lists of plain values are JSON; other lists are left out.
+    name as it is typed: `population_size`, `collision.num_samples`. Components are called by their
+    group: `planner`, `control`, `robot`. Lists of plain values are JSON; other lists are left out.
 
     Args:
         path: The run's directory.
@@ -68,7 +79,7 @@ def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[s
     manifest, config = (_read(path / name) for name in (MANIFEST, CONFIG))
     known = origin(manifest, condition_id)
     found = {name: str(known[name]) for name in ORIGIN if known[name]}
-    settings = dict(_settings(config))
+    settings = dict(_settings(typed_parts(config)))
     counts = Counter(name.rpartition(".")[2] for name in settings)
     for name, value in settings.items():
         short = name.rpartition(".")[2]
@@ -77,6 +88,31 @@ def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[s
         if column not in taken:
             found[column] = value
     return found
+
+
+def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a canonical form by the names under which their settings are typed.
+
+    A planner's components come out of it (`ga`, `collision`), and a planner out of its control.
+    """
+    parts: dict[str, Any] = {}
+    for name, component in settings.items():
+        if isinstance(component, Mapping) and isinstance(component.get("planner"), Mapping):
+            around = {key: value for key, value in component.items() if key != "planner"}
+            parts |= {"control": around} | typed_parts({"planner": component["planner"]})
+        elif name == "planner" and isinstance(component, Mapping):
+            inner = {
+                key: value
+                for key, value in component.items()
+                if isinstance(value, Mapping) and TARGET in value
+            }
+            own = {key: value for key, value in component.items() if key not in inner}
+            parts |= {"planner": own} | inner
+        elif name == MOST_QUERIES:
+            parts["budget"] = {"collision_queries": component}
+        else:
+            parts[name] = component
+    return parts
 
 
 def with_context(table: pa.Table, context: Mapping[str, Any]) -> pa.Table:

@@ -21,7 +21,7 @@ from evoexp.store.files import listed, reason, set_aside, warn, write_file
 from evoexp.store.log_bounds import check_sums
 from evoexp.store.log_reader import checked_summary
 from evoexp.store.messages import field_types
-from evoexp.store.run_context import run_context, with_context
+from evoexp.store.run_context import ORIGIN, run_context, with_context
 from evoexp.store.run_directory import RunDirectory
 
 Runs = RunDirectory | Iterable[RunDirectory]
@@ -35,6 +35,7 @@ class _Summary(NamedTuple):
     files: Stamps  # stamps of all files, in the order of the replicates
     # name → what is wrong with it; a damaged log has no row, a damaged failure has one
     damaged: dict[str, str]
+    settings: pa.Table | None = None  # the columns that `with_context` added, if read from a file
 
     @property
     def row_names(self) -> list[str]:
@@ -42,7 +43,7 @@ class _Summary(NamedTuple):
         return [name for name in self.files if not (name in self.damaged and _is_log(name))]
 
 
-_VERSION = 6  # of the table's columns and notes; another one is rebuilt
+_VERSION = 7  # of the table's columns and notes; another one is rebuilt
 _KEY = b"evoexp"
 _PLAIN = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 _ARROW: dict[Any, pa.DataType] = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
@@ -165,6 +166,28 @@ def table_damage(run: RunDirectory) -> str:
         return "damaged: it is derived from the logs and cannot be read"
 
 
+def altered_settings(run: RunDirectory) -> list[str]:
+    """Return the columns of `summary.parquet` that do not repeat a setting of the run.
+
+    What the manifest says of the origin may have changed since, and is not looked at.
+    """
+    stored = _stored(run)
+    try:
+        run.check()
+    except StoreError:  # whose settings nothing tells
+        return []
+    if stored is None:  # or one with columns of another version
+        return []
+    assert stored.settings is not None, "it was read from a file"
+    columns = stored.settings.to_pydict()
+    context = run_context(run.path, run.condition_id, stored.table.column_names)
+    return [
+        name
+        for name, value in context.items()
+        if name in columns and name not in ORIGIN and set(columns[name]) - {value}
+    ]
+
+
 def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> list[str]:
     """Return the logs whose row in `summary.parquet` does not repeat the summary they hold.
 
@@ -271,12 +294,12 @@ def _stored(run: RunDirectory) -> _Summary | None:
     try:
         _refuse_no_file(run.summary_path)
         with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
-            table = file.read(use_threads=False)  # starting them takes longer than most tables
-        notes = json.loads(table.schema.metadata[_KEY])
-        table = table.select(notes["columns"])
+            whole = file.read(use_threads=False)  # starting them takes longer than most tables
+        notes = json.loads(whole.schema.metadata[_KEY])
+        table, settings = whole.select(notes["columns"]), whole.drop_columns(notes["columns"])
         valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id
         valid = valid and all(table.schema.field(field.name).equals(field) for field in BASE)
-        summary = _Summary(table, notes["files"], notes["damaged"])
+        summary = _Summary(table, notes["files"], notes["damaged"], settings)
         valid = valid and len(summary.row_names) == table.num_rows
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
         return None

@@ -1,7 +1,7 @@
 """Offspring of a population by the operators of a configuration, compiled."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from evoexp.evolution.operators.operator import Context, Crossover, Genome, Muta
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.records import FloatArray, IntArray
 
-Select = Cross = Mutate = Any
-"""Kernels of operators, by their addresses; see `Selection`, `Crossover`, `Mutation`."""
+# kernels of operators, by their addresses: see `Selection`, `Crossover`, `Mutation`
+Select: TypeAlias = Any
+Cross: TypeAlias = Any
+Mutate: TypeAlias = Any
 
 
 class Operators(NamedTuple):

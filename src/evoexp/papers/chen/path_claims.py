@@ -199,31 +199,23 @@ def nearly_shortest(
     judge: kit.Judge, condition: kit.ConditionResults, shortest: float
 ) -> kit.Claim:
     """Judge that paths are nearly shortest without safety."""
-    excess, limit = excess_of(condition, shortest), RULES["nearly_shortest"].limits["near_percent"]
-    near = int(np.count_nonzero(excess <= limit))
-    return judge.on("nearly_shortest", condition=condition.label).majority(
-        f"median length {markdown.number(float(np.median(condition.column(DISTANCE))))}, "
-        f"{np.median(excess):.1f} % above the shortest {markdown.number(shortest)} (Dijkstra); "
-        f"{markdown.share(near, condition.done)} runs",
-        near,
-        condition.done,
+    hearing, excess = (
+        judge.on("nearly_shortest", condition=condition.label),
+        excess_of(condition, shortest),
     )
+    near = kit.counted(excess <= hearing.rule.limits["near_percent"])
+    told = {"length": np.median(condition.column(DISTANCE)), "excess": np.median(excess)}
+    return hearing.majority(told | {"shortest": shortest, "near": near}, *near)
 
 
 def nearly_best(
     judge: kit.Judge, condition: kit.ConditionResults, known: float, bound: float
 ) -> kit.Claim:
     """Judge that costs are near that of the best path known."""
-    above, limit = gaps(condition, known), RULES["nearly_best"].limits["near_percent"]
-    near = int(np.count_nonzero(above <= limit))
-    return judge.on("nearly_best", condition=condition.label).majority(
-        f"median {markdown.number(float(np.median(condition.column(COST))))}, "
-        f"{np.median(above):.1f} % above the best path known "
-        f"({markdown.number(known)}; no path costs less than {markdown.number(bound)}); "
-        f"{markdown.share(near, condition.done)} runs",
-        near,
-        condition.done,
-    )
+    hearing, above = judge.on("nearly_best", condition=condition.label), gaps(condition, known)
+    near = kit.counted(above <= hearing.rule.limits["near_percent"])
+    told = {"cost": np.median(condition.column(COST)), "above": np.median(above)}
+    return hearing.majority(told | {"known": known, "bound": bound, "near": near}, *near)
 
 
 def much_longer(
@@ -233,13 +225,16 @@ def much_longer(
     truth: kit.ConditionResults | None,
 ) -> kit.Claim:
     """Judge that the safe path is much longer, and tell how long the best path known is."""
-    excess, limit = excess_of(condition, shortest), RULES["much_longer"].limits["much_percent"]
-    longer = int(np.count_nonzero(excess > limit))
-    told = f"median {np.median(excess):.0f} % longer, {markdown.share(longer, condition.done)} runs"
+    hearing, excess = (
+        judge.on("much_longer", condition=condition.label),
+        excess_of(condition, shortest),
+    )
+    longer = kit.counted(excess > hearing.rule.limits["much_percent"])
+    told = f"median {np.median(excess):.0f} % longer, {longer} runs"
     if truth is not None:
         known = float(excess_of(truth, shortest)[0])
         told += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
-    return judge.on("much_longer", condition=condition.label).majority(told, longer, condition.done)
+    return hearing.majority(told, *longer)
 
 
 def _compromise(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim, ...]:
@@ -270,14 +265,12 @@ def _converges(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     rows = condition.generations.sort_values("index").groupby("replicate")
     first, last = rows.first(), rows.last()
     lower = last["best_cost"] < first["best_cost"]
-    most = 1.0 + RULES["converges"].limits["spread_percent"] / 100.0
-    holds = int((lower & (last["mean_cost"] <= most * last["best_cost_in_generation"])).sum())
+    hearing = judge.on("converges", condition=condition.label)
+    most = 1.0 + hearing.rule.limits["spread_percent"] / 100.0
+    runs = kit.counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
     complete = 0 < condition.planned <= condition.done
-    return judge.on("converges", condition=condition.label).own(
-        f"{markdown.share(holds, condition.done)} runs",
-        condition.done,
-        False if holds < condition.done else True if complete else None,
-    )
+    holds = False if runs.having < condition.done else True if complete else None
+    return hearing.own({"runs": runs}, condition.done, holds)
 
 
 def _evolution_of(judge: kit.Judge, group: Group) -> Iterator[kit.Claim]:
@@ -304,14 +297,13 @@ def evolution(
         for row in rows
         if row.quantity == c.label
     )
-    verb = "saves" if gain >= 0.0 else "loses"
-    return judge.on(
-        "path_evolution", condition=own.label, controls=" and ".join(medians)
-    ).better_than_all(
-        f"median {markdown.number(median)}: beside the best control, {best}, evolution {verb} "
-        f"{abs(gain):.3g} ({100.0 * abs(gain) / medians[best]:.0f} %); {told}",
-        rows,
-    )
+    words: dict[str, object] = {"median": median, "best": best, "told": told, "gain": abs(gain)}
+    words |= {
+        "verb": "saves" if gain >= 0.0 else "loses",
+        "share": 100.0 * abs(gain) / medians[best],
+    }
+    hearing = judge.on("path_evolution", condition=own.label, controls=" and ".join(medians))
+    return hearing.better_than_all(words, rows)
 
 
 def control_name(condition: kit.ConditionResults) -> str:

@@ -31,18 +31,19 @@ def judge_value(judge: Judge, case: Case) -> Claim:
     """Judge the printed number by that of the exact optimum."""
     printed, exact = case.printed, case.measured(case.optimal_angles)
     best, name = exact[printed.term], printed.term.replace("_", " ")
+    words = {"case": case.name, "term": name, "value": f"{printed.value:g}"}
+    hearing = judge.on("printed_value", figure=printed.figure, **words)
     told = f"at the exact optimum {markdown.number(best)}"
     if case.conditions[0].planner.objective.avoidances:
         told += (
             f" (E = {markdown.number(case.least)}, of which the obstacle "
             f"{markdown.number(exact['obstacle'])})"
         )
-    agrees: bool | None = abs(best - printed.value) <= RULES["printed_value"].limits["rounded"]
+    agrees: bool | None = abs(best - printed.value) <= hearing.rule.limits["rounded"]
     if case.name == "obstacle and platform":
         told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
         agrees = agrees or None
-    words = {"case": case.name, "term": name, "value": f"{printed.value:g}"}
-    return judge.on("printed_value", figure=printed.figure, **words).own(told, 1, agrees)
+    return hearing.own(told, 1, agrees)
 
 
 def _angles(judge: Judge, case: Case, angles: tuple[float, float]) -> Claim:
@@ -50,26 +51,22 @@ def _angles(judge: Judge, case: Case, angles: tuple[float, float]) -> Claim:
     cost = case.measured(angles)["cost"]
     gap = 100.0 * float(case.gaps(np.array([cost]))[0])
     words = {"case": case.name, "angles": _degrees(angles), "figure": case.printed.figure}
-    return judge.on("printed_angles", **words).own(
-        f"E = {cost:.6g} there, {case.least:.6g} at the optimum: {gap:.2g} % above it",
-        1,
-        gap <= RULES["printed_angles"].limits["near_percent"],
-    )
+    hearing = judge.on("printed_angles", **words)
+    told = {"cost": cost, "least": case.least, "gap": gap}
+    return hearing.own(told, 1, gap <= hearing.rule.limits["near_percent"])
 
 
 def _torques(judge: Judge, case: Case, torques: FloatArray) -> Claim:
     """Judge the printed torques by those of the exact optimum, of its mirror images the nearest."""
-    exact, limits = _nearest(case, torques), RULES["printed_torques"].limits
+    exact = _nearest(case, torques)
     by_norm = case.conditions[0].planner.objective.torque_norm_weight > 0.0
     cost = float((torques**2).sum() if by_norm else np.abs(torques).max())
     gap, off = 100.0 * (cost / case.least - 1.0), float(np.abs(exact - torques).max())
     words = {"case": case.name, "torques": triple(torques, 2), "figure": case.printed.figure}
-    return judge.on("printed_torques", **words).own(
-        f"{triple(exact, 4)} at the exact optimum, at most {off:.2g} off; E = {cost:.4g} of the "
-        f"printed torques, {gap:.2g} % above the optimum's {case.least:.4g}",
-        1,
-        gap <= limits["near_percent"] and off <= limits["rounded"],
-    )
+    hearing = judge.on("printed_torques", **words)
+    limits = hearing.rule.limits
+    told = {"exact": triple(exact, 4), "off": off, "cost": cost, "gap": gap, "least": case.least}
+    return hearing.own(told, 1, gap <= limits["near_percent"] and off <= limits["rounded"])
 
 
 def _torques_at_angles(
@@ -79,29 +76,25 @@ def _torques_at_angles(
     own = case.torques(angles)
     off = float(np.abs(own - torques).max())
     words = {"torques": triple(torques, 2), "angles": _degrees(angles)}
-    return judge.on("torques_at_angles", case=case.name, figure=case.printed.figure, **words).own(
-        f"{triple(own, 4)} in our model, at most {off:.2g} off",
-        1,
-        off <= RULES["torques_at_angles"].limits["rounded"],
-    )
+    hearing = judge.on("torques_at_angles", case=case.name, figure=case.printed.figure, **words)
+    told = {"own": triple(own, 4), "off": off}
+    return hearing.own(told, 1, off <= hearing.rule.limits["rounded"])
 
 
 def _ratio(judge: Judge, case: Case, torques: FloatArray) -> Claim:
     """Judge the printed ratio of torques by the printed torques, and by the exact optimum."""
-    printed, limits = case.printed, RULES["torque_ratio"].limits
-    sizes, rounded = np.abs(torques), limits["rounded"]
-    least = (sizes.max() - rounded) / (sizes.min() + rounded)
+    printed, sizes = case.printed, np.abs(torques)
+    words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
+    hearing = judge.on("torque_ratio", **words)
+    rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
+    lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
     greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
     exact = np.abs(_nearest(case, torques))
     own = float(exact.max() / exact.min())
     off = 100.0 * (own / printed.ratio - 1.0)
-    words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
-    return judge.on("torque_ratio", **words).own(
-        f"{sizes.max() / sizes.min():.3g} of the printed torques as they stand, {least:.3g} to "
-        f"{greatest:.3g} before they were rounded; {own:.4g} at the exact optimum ({off:+.1f} %)",
-        1,
-        least <= printed.ratio <= greatest and abs(off) <= limits["near_percent"],
-    )
+    told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
+    holds = bool(lowest <= printed.ratio <= greatest and abs(off) <= near)
+    return hearing.own(told | {"own": own, "off": off}, 1, holds)
 
 
 def _nearest(case: Case, torques: FloatArray) -> FloatArray:
@@ -160,16 +153,12 @@ def _against_search(judge: Judge, cases: list[Case]) -> list[Claim]:
 
 def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge that conventional methods get stuck, and that the genetic algorithm does better."""
-    close = RULES["gets_stuck"].limits["near_percent"] / 100.0
     for method, ends in case.ends().items():
-        at_best = case.within(ends[:, 2], close)
+        hearing = judge.on("gets_stuck", case=case.name, method=method)
+        at_best = case.within(ends[:, 2], hearing.rule.limits["near_percent"] / 100.0)
         stuck = kit.Proportion(at_best.total - at_best.having, at_best.total)
-        yield judge.on("gets_stuck", case=case.name, method=method).own(
-            f"{stuck.having} of {stuck.total} starts "
-            f"({markdown.percent(stuck.interval(judge.level))})",
-            stuck.total,
-            stuck.having > 0,
-        )
+        told = {"stuck": stuck, "interval": markdown.percent(stuck.interval(judge.level))}
+        yield hearing.own(told, stuck.total, stuck.having > 0)
         if case.elitist is not None:
             yield from _better(judge, case, case.elitist, method, at_best)
 
@@ -183,34 +172,26 @@ def _better(
 ) -> Iterator[Claim]:
     """Judge a run of the genetic algorithm against one start of a method, and their efforts."""
     assert case.conventional is not None
-    close = RULES["per_success"].limits["near_percent"] / 100.0
-    own = case.within(elitist.column("best_cost"), close)
+    efforts = judge.on("per_success", case=case.name, method=method)
+    close = efforts.rule.limits["near_percent"]
+    own = case.within(elitist.column("best_cost"), close / 100.0)
     of_start = float(case.conventional.column(f"term_{METHODS[method]}_evaluations")[0])
     of_run = float(elitist.column("evaluations").mean())
-    yield judge.on("better_than_a_start", case=case.name, method=method).greater(
-        f"within {100 * close:g} % of the optimum: {100 * own.share:.0f} % of runs with "
-        f"elitism, {100 * at_best.share:.0f} % of starts, p = "
-        f"{markdown.p_value(kit.fisher_exact(own, at_best))}; a run takes {of_run:.0f} "
-        f"evaluations, a start {of_start:.0f}",
-        own,
-        at_best,
-    )
+    told = {"close": close, "runs": 100 * own.share, "starts": 100 * at_best.share}
+    told |= {"p": kit.fisher_exact(own, at_best), "of_run": of_run, "of_start": of_start}
+    runs = judge.on("better_than_a_start", case=case.name, method=method)
+    yield runs.greater(told, own, at_best)
     run, start = (
         effort / share if share else np.inf
         for effort, share in ((of_run, own.share), (of_start, at_best.share))
     )
-    yield judge.on("per_success", case=case.name, method=method).own(
-        f"{run:.0f} against {start:.0f}".replace("inf", "∞"),
-        f"{own.total} and {at_best.total}",
-        run < start if min(run, start) < np.inf else None,
-    )
+    text = f"{run:.0f} against {start:.0f}".replace("inf", "∞")
+    holds = run < start if min(run, start) < np.inf else None
+    yield efforts.own(text, f"{own.total} and {at_best.total}", holds)
 
 
 def _seconds(judge: Judge, name: str, condition: kit.ConditionResults) -> Claim:
     """Judge that the minimax problem takes seconds."""
-    seconds = float(np.median(condition.column("cpu_s")))
-    return judge.on("seconds", case=name).own(
-        f"{1000 * seconds:.1f} ms of this machine per run (median), verdict and log included",
-        condition.done,
-        seconds <= RULES["seconds"].limits["most_s"],
-    )
+    seconds, hearing = float(np.median(condition.column("cpu_s"))), judge.on("seconds", case=name)
+    told = {"milliseconds": 1000 * seconds}
+    return hearing.own(told, condition.done, seconds <= hearing.rule.limits["most_s"])

@@ -36,7 +36,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
 def quantities(results: kit.Results) -> tuple[kit.Quantity, ...]:
     """Return the rows of the table of results."""
     tilts = (
-        generic.quantity(
+        kit.quantity(
             results,
             f"greatest tilt {where} postures ({term.replace('_', ' ')})",
             "deg",
@@ -175,7 +175,7 @@ def drawings(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Dr
         PAPER.drawing("history", posture_history.HISTORY, main, results._replace(conditions=main)),
         PAPER.drawing(
             "stop_reasons",
-            (shares.shares_table, shares.draw_shares),
+            shares.SHARES,
             every,
             reasons,
             {},

@@ -1,5 +1,5 @@
 """Corsépius 2001: its claims with their rules, and the words of its pages."""
 
-from evoexp.papers.paper import read_paper
+from evoexp.report.kit import read_paper
 
 PAPER, RULES = read_paper(__file__)

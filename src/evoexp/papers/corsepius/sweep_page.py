@@ -14,10 +14,7 @@ from evoexp.report import kit
 from evoexp.report.kit import judging, markdown, sweep_figures
 
 PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
-EFFECTS = (
-    f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
-    "one; dashed: no difference."
-)
+EFFECTS = "the first condition takes fewer evaluations to the goal than the other one"
 SETTING = "num_offspring"
 SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # evaluations to the goal, and steps of the path to it, (done,); inf without it
@@ -194,8 +191,8 @@ def _size_table(found: tuple[Task, ...], settings: kit.ReportSettings) -> kit.Ta
         for value, c in task.by_value.items()
     )
     runs = sum(c.done for c in _conditions(found))
-    words = {"level": 100 * level, "resamples": settings.num_resamples, "runs": runs}
-    return PAPER.table("sizes", rows, **words)
+    resamples = settings.num_resamples
+    return PAPER.table("sizes", rows, level=100 * level, resamples=resamples, runs=runs)
 
 
 def _expected(condition: kit.ConditionResults, metric: str, settings: kit.ReportSettings) -> str:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_crossings import Arm
+from evoexp.collision.planar.planar_arms import Arm
 from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds

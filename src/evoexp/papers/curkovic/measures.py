@@ -31,7 +31,7 @@ def lower_bound(condition: kit.ConditionResults) -> float:
     problem, objective = condition.problem(Problem), condition.planner.objective
     arms, total = link_motions.arms(condition.prepared), 0.0
     for arm, start, goal in zip(arms, problem.start, problem.goal, strict=True):
-        first, last = (arm.points(q.reshape(1, 2, 1).copy())[0, 2:, 0] for q in (start, goal))
+        first, last = (arm.outlines(q.reshape(1, 2, 1))[0, 2:4, 0] for q in (start, goal))
         path = float(np.sqrt(np.sum((last - first) ** 2)))
         turns = float(np.sum(np.abs(goal - start)))
         total += objective.path_weight * path + objective.rotation_weight * turns

@@ -55,7 +55,7 @@ def tool_distance(condition: kit.ConditionResults) -> FloatArray:
         links = np.radians(link_motions.sampled(motion, SAMPLES).links)
         chains = []  # of each robot: base, elbows, tips
         for r, arm in enumerate(arms):
-            points = arm.points(np.ascontiguousarray(links[:, r, :, None]))[:, :, 0]
+            points = arm.outlines(links[:, r, :, None])[:, :4, 0]
             base = np.broadcast_to(arm.base, (len(links), 2))
             chains.append((base, points[:, :2], points[:, 2:]))
         distances = (

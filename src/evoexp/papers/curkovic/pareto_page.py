@@ -14,7 +14,6 @@ from evoexp.records import FloatArray, FrontRow
 from evoexp.report import kit
 from evoexp.report.kit import generic, groups, markdown, marks, rounded, style
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import RunDirectory
 
 CRITERIA = ("c1", "c2", "c3", "c4")
 MARKERS = ("o", "^", "s", "D")  # of populations
@@ -84,7 +83,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     if not measures.fits(results):
         return generic.page(results, settings)
     fronts = {
-        c.label: {int(k): read_fronts(results, c, int(k)) for k in c.summaries.index}
+        c.label: {int(k): read_log(c.run.log_path(int(k))).fronts for k in c.summaries.index}
         for c in results.with_data
     }
     drawn = [c for c in results.with_data if fronts[c.label].get(c.best_replicate)]
@@ -92,31 +91,25 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         return generic.page(results, settings)
     base = generic.basis(results, settings)
     populations = range(max(len(rows) for c in drawn for rows in fronts[c.label].values()))
-    sizes = [(p, {c.label: _sizes(fronts[c.label], p) for c in drawn}) for p in populations]
+    sizes = (
+        kit.Quantity(
+            f"individuals on the front of robot {population + 1}'s population",
+            "–",
+            {c.label: kit.spread(_sizes(fronts[c.label], population)) for c in results.with_data},
+        )
+        for population in populations
+    )
     return PAPER.page(
         results,
         "fronts",
         base,
-        quantities=(*(_quantity(results, p, of) for p, of in sizes), *base.quantities),
+        quantities=(*sizes, *base.quantities),
         checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
         drawings=(
             *(_drawing(results, c, fronts[c.label]) for c in drawn),
             generic.best_drawing(results),
         ),
     )
-
-
-def read_fronts(
-    results: kit.Results, condition: kit.ConditionResults, replicate: int
-) -> list[FrontRow]:
-    """Return the criteria of a finished replicate's populations, one record per population.
-
-    Raises:
-        CorruptLog: If the log cannot be trusted.
-    """
-    return read_log(
-        RunDirectory(results.outputs, condition.condition.id).log_path(replicate)
-    ).fronts
 
 
 def _size(front: FrontRow) -> int:
@@ -128,13 +121,6 @@ def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
     return np.array(
         [_size(rows[population]) for rows in fronts.values() if population < len(rows)],
         dtype=np.float64,
-    )
-
-
-def _quantity(results: kit.Results, population: int, sizes: dict[str, FloatArray]) -> kit.Quantity:
-    spreads = {c.label: kit.spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
-    return kit.Quantity(
-        f"individuals on the front of robot {population + 1}'s population", "–", spreads
     )
 
 

@@ -23,7 +23,7 @@ SHORT = {
     measures.LEAVES: "leave [0, π]",
     measures.TOO_FAST: "too fast (Eq. 2)",
 }
-EFFECTS = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
+EFFECTS = "the first one is better than the other one"
 
 
 def families(results: kit.Results) -> tuple[kit.Family, ...]:

@@ -25,20 +25,18 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         others = [c for joints, c in shipped.items() if joints != kit.num_joints(condition)]
         return claims.percentages(judge, [condition, *others])[0]
 
+    def no_start(judge: kit.Judge, condition: kit.ConditionResults, _: Controls) -> kit.Claim:
+        claim = claims.no_start_needed(judge, condition)
+        assert claim is not None, "the paper prints percentages for arms of seven and of ten joints"
+        return claim
+
+    def free(judge: kit.Judge, condition: kit.ConditionResults, _: Controls) -> kit.Claim:
+        refuted = kit.counted(measures.touches(condition)[kit.solved(condition)])
+        return claims.free_of_collision(judge, condition, refuted)
+
     headlines = (
         kit.Headline("share_below", f"position error [{unit}]", measures.errors, share_below),
-        kit.Headline("no_start", "evaluations to a solution", measures.effort, _no_start),
-        kit.Headline("free_of_collision", f"clearance [{unit}]", kit.by_column("clearance"), _free),
+        kit.Headline("no_start", "evaluations to a solution", measures.effort, no_start),
+        kit.Headline("free_of_collision", f"clearance [{unit}]", kit.by_column("clearance"), free),
     )
     return assumptions.page(results, settings, RULES, PAPER.name, headlines)
-
-
-def _no_start(judge: kit.Judge, condition: kit.ConditionResults, _: Controls) -> kit.Claim:
-    claim = claims.no_start_needed(judge, condition)
-    assert claim is not None, "the paper prints percentages for arms of seven and of ten joints"
-    return claim
-
-
-def _free(judge: kit.Judge, condition: kit.ConditionResults, _: Controls) -> kit.Claim:
-    refuted = kit.counted(measures.touches(condition)[kit.solved(condition)])
-    return claims.free_of_collision(judge, condition, refuted)

@@ -279,13 +279,13 @@ def _drawings(
     references = {f"error below {p.bound:g}": p.proportion.share for p in printed}
     shares = _share_rows(results, refuted)
     values = {f"{one.name} [{one.unit}]": one.values for one in quantities(results)}
-    a12 = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
+    better = "the first one is better than the other one"
     return (
         *([stopping_values] if differ else []),
         sweep_figures.shares_drawing(results, settings, shares, caption, references),
         sweep_figures.values_drawing(results, values),
         *sweep_figures.effects_drawings(
-            results, settings, kit.rows_by_name(found), "the first condition of an arm", a12
+            results, settings, kit.rows_by_name(found), "the first condition of an arm", better
         ),
     )
 

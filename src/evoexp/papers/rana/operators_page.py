@@ -123,7 +123,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
     shown = [one for one in COMPARED if one.name in DRAWN and tables[one.name]]
     units = {one.name: unit if one.unit == "length" else one.unit for one in COMPARED}
     cost, _, *effort = base.quantities
-    own = [generic.quantity(results, one.name, units[one.name], one.values) for one in COMPARED[1:]]
+    own = [kit.quantity(results, one.name, units[one.name], one.values) for one in COMPARED[1:]]
     return PAPER.page(
         results,
         "operators",

@@ -104,7 +104,7 @@ def fitness(results: kit.Results, drawn: Sequence[MeasuredMotions]) -> Iterator[
         suffix = first.suffix if len(scenes) > 1 else ""
         drawing = PAPER.drawing(
             "fitness",
-            (convergence.fitness_table, convergence.draw_fitness),
+            convergence.FITNESS,
             within.with_data,
             within,
             stem=stem,

@@ -23,9 +23,7 @@ def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
         drawings += _drawings(condition, suffix, settings.samples_per_segment)
         claims += _claims(judge, condition)
     cost, _, *effort = base.quantities
-    first = generic.quantity(
-        results, measures.FIRST_FREE, "generation", run_measures.first_feasible
-    )
+    first = kit.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible)
     return PAPER.page(
         results,
         "planar",

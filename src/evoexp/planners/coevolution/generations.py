@@ -207,9 +207,9 @@ class TeamSearch(TableSearch):
             taken[0] = self._follow(uniforms, float(rates[0]), first)
             self._judge(last % self.num_places)
         else:
-            task = self._planner.task(self._problem)
+            task, (select, cross, mutate) = self._planner.task(self._problem), self._operators
             given = task, *arguments, self.summaries, taken
-            if not evolve(*self._operators, uniforms, rates, first, *given):
+            if not evolve(select, cross, mutate, uniforms, rates, first, *given):
                 raise ValueError(NOT_FINITE)
         self.states = self._ahead.take(taken.tolist())
         return last
@@ -220,7 +220,8 @@ class TeamSearch(TableSearch):
         patience = self._planner.ga.restart_after
         if patience is None or self._waiting < patience:
             rules = self._heredity, self._table, self._num_teams
-            return int(follow(*self._operators, uniforms, index, rate, *rules))
+            select, cross, mutate = self._operators
+            return int(follow(select, cross, mutate, uniforms, index, rate, *rules))
         # "If no convergence has occurred, …, the algorithm generates new populations" (section 3)
         populations = self._table.populations[(index + 1) % self.num_places]
         own = uniforms[: populations.size].reshape(populations.shape)

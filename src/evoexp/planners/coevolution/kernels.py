@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_crossing_kernels import crossings, link_points, tolerance_of
+from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
+from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
 from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
@@ -217,8 +218,14 @@ def measure(
             for k in range(1, last):
                 path[k, link] = genes[2 * (k - 1) + link]
         # where the links are (Eq. 11), then Eqs. 6–8
-        link_points(path, arms[r, 0], arms[r, 1], arms[r, 2], arms[r, 3], points[r])
+        write_outlines(path, line_arm(arms, r), points[r])
         measure_motions(path, points[r], weights, criteria[r, 1:], own[r])
+
+
+@kernel
+def line_arm(arms: FloatArray, robot: int) -> Arm:
+    """Return a robot's arm without an envelope; arms as of `measure`."""
+    return Arm((arms[robot, 0], arms[robot, 1]), (arms[robot, 2], arms[robot, 3]), 0.0, 0.0)
 
 
 @kernel
@@ -246,23 +253,21 @@ def evaluate_lines(
     # C2 … C4 (Eqs. 6–8)
     measure(populations, starts, goals, arms, weights, paths, points, criteria, own)
     # C1 (Eqs. 4, 5) at the configurations between start and goal
-    everyone, nobody = np.arange(count), np.arange(0)
     rows, columns = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     sums, pair = np.zeros((robots, count), dtype=np.int64), 0
     for a in range(robots):
         for b in range(a + 1, robots):
-            one, two = (arms[a, 0], arms[a, 1]), (arms[b, 0], arms[b, 1])
-            tolerance = tolerance_of(one, (arms[a, 2], arms[a, 3]), two, (arms[b, 2], arms[b, 3]))
-            first, second = points[a][1:last], points[b][1:last]
-            fixed = one, first, everyone, nobody, two, second, nobody, tolerance
-            if not crossings(*fixed, collisions[pair], rows, columns):
-                return False
+            one, two = line_arm(arms, a), line_arm(arms, b)
+            first, second, near = points[a][1:last], points[b][1:last], tolerance_of(one, two)
+            count_pairs(one, first, two, second, near, None, collisions[pair], rows, columns)
             for k in range(count):
                 sums[a, k] += rows[k]
                 sums[b, k] += columns[k]
             pair += 1
     for r in range(robots):
         for k in range(count):
+            if not abs(own[r, k]) < LARGEST:
+                return False
             criteria[r, 0, k] = sums[r, k]
             costs[r, k] = collision_weight * sums[r, k] + own[r, k]
     return True

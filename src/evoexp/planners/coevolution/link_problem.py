@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_collision import LinkCollision
+from evoexp.collision.planar.link_collision import LinkCollision
 from evoexp.collision.scene import Scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE

@@ -17,7 +17,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from evoexp.collision.models.link_collision import LinkCrossings
+from evoexp.collision.planar.link_collision import LinkCrossings
 from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
@@ -142,11 +142,11 @@ class Coevolution(PlannerDefaults, Component):
         points = np.empty((robots, self.num_configurations + 2, 4, count))
         measure(populations, *self.task(problem)[:4], paths, points, criteria, own)
         # C1 (Eqs. 4, 5): an obstacle is in the way whoever the collaborator is
-        lines = [collision.outlines(r, paths[r], points[r]) for r in range(robots)]
-        blocked = np.array([collision.with_obstacles(r, lines[r]) for r in range(robots)])
+        outlines = [collision.outlines(r, paths[r]) for r in range(robots)]
+        blocked = np.array([collision.with_obstacles(r, outlines[r]) for r in range(robots)])
         hits, sums = [], blocked * count
         for a, b in combinations(range(robots), 2):
-            crossings = collision.between(a, lines[a], b, lines[b])
+            crossings = collision.between(a, outlines[a], b, outlines[b])
             hits.append(crossings.counts)
             sums[a] += crossings.sums_1
             sums[b] += crossings.sums_2

@@ -6,12 +6,15 @@ A path is a row of a table, see `paths.grid_walks`.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
+from evoexp.paths.grid_choices import Choices
 from evoexp.paths.grid_measures import measure_by_tolls, measure_path
+from evoexp.paths.grid_walks import walk_all
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,
@@ -22,7 +25,8 @@ from evoexp.planners.grid_path_ga.path_operators import (
     mutate,
 )
 from evoexp.planners.planner import Candidate
-from evoexp.records import FloatArray
+from evoexp.planners.table_search import TableSearch
+from evoexp.records import FloatArray, IntArray
 
 RESULTS = 3
 DISTANCE, UNSAFENESS, COST = range(RESULTS)
@@ -46,9 +50,29 @@ def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
     return named | {"num_nodes": float(num_nodes)}
 
 
-def candidate_of(path: NodeArray, world: World, results: FloatArray) -> Candidate:
-    """Return a path, which is valid, and its terms of its results (3,)."""
-    return Candidate(solution_of(path, world), named_terms(results, path[0]), True)
+class PathTable(TableSearch):
+    """A search whose tables keep the best path of each generation, and the results of all.
+
+    Attributes:
+        recorded: With a first axis of places; see `note`.
+    """
+
+    recorded: Population
+
+    def make_table(self, world: World, individuals: int) -> None:
+        """Make the tables for generations of so many individuals."""
+        self._world, places = world, self.num_places
+        self.recorded = Population(
+            np.empty((places, len(world.coordinates) + 1), dtype=np.int32),
+            np.empty((places, RESULTS, individuals)),
+        )
+        self.costs = self.recorded.results[:, COST]
+
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return the best path of a generation, which is valid, and its terms."""
+        path = self.recorded.paths[place]
+        terms = named_terms(self.recorded.results[place, :, individual], path[0])
+        return Candidate(solution_of(path, self._world), terms, True)
 
 
 @inlined
@@ -176,35 +200,78 @@ def advance(
 @kernel
 def climb(
     draws: Block,  # uniform numbers
-    first: int,  # number of the first trial: trial k changes path k modulo the number of paths
-    last: int,  # number behind the last trial
+    trial: int,  # number of the first trial: trial k changes path k modulo the number of paths
+    first: int,  # the present generation
+    last: int,  # the generation to reach
+    num_trials: int,  # of each generation
     world: World,  # grid and fields
     weights: tuple[float, float],  # ε and λ of Eq. 1.
     erase: bool,  # whether loops are erased
     population: Population,  # paths and their results, changed
     candidate: Population,  # scratch of one path
     scratch: Scratch,  # of the operators
+    found: Population,  # see `evolve`, as for `summaries`
+    summaries: FloatArray,
 ) -> int:
     """Regenerate a piece of one path after the other as mutation does; keep what costs no more.
 
     Returns:
-        The number of the next trial: less than `last` if the draws did not suffice.
+        The number of the next trial: one of an earlier generation if the draws did not suffice.
     """
     draws, world, population, candidate, scratch = borrowed(
         (draws, world, population, candidate, scratch)
     )
+    found, summaries = borrowed((found, summaries))
     paths, results = population
     path, values = candidate.paths[0], candidate.results
-    for trial in range(first, last):
-        before, k = draws.taken[0], trial % len(paths)
-        copy_path(paths[k], path)
-        mutate(draws, world, erase, path, scratch)
-        if used_up(draws):
-            draws.taken[0] = before
-            return trial
-        measure(path, world, weights, values, 0)
-        if values[COST, 0] <= results[COST, k]:
-            copy_path(path, paths[k])
-            for row in range(RESULTS):
-                results[row, k] = values[row, 0]
+    for generation in range(first + 1, last + 1):
+        for own in range(trial, generation * num_trials):
+            before, k = draws.taken[0], own % len(paths)
+            copy_path(paths[k], path)
+            mutate(draws, world, erase, path, scratch)
+            if used_up(draws):
+                draws.taken[0] = before
+                return own
+            measure(path, world, weights, values, 0)
+            if values[COST, 0] <= results[COST, k]:
+                copy_path(path, paths[k])
+                for row in range(RESULTS):
+                    results[row, k] = values[row, 0]
+        trial = generation * num_trials
+        note(population, generation % len(summaries), found, summaries)
+    return trial
+
+
+@kernel
+def draw_generations(
+    words: NDArray[np.uint64],  # random
+    first: int,  # the generation drawn last
+    last: int,  # the generation to reach
+    num_words: int,  # see `walk_all`, as for `more_words`
+    more_words: int,
+    choices: Choices,  # of the goal
+    ends: tuple[int, int],  # indices of start and goal
+    erase: bool,  # whether loops are erased
+    world: World,  # grid and fields
+    weights: tuple[float, float],  # ε and λ of Eq. 1.
+    population: Population,  # written: the generation drawn last
+    counts: IntArray,  # (≥ last − first,) written: words of each generation
+    found: Population,  # see `evolve`, as for `summaries`
+    summaries: FloatArray,
+) -> int:
+    """Draw and measure generations of random paths, each independent of the others.
+
+    Returns:
+        The generation reached: an earlier one if the words did not suffice.
+    """
+    words, choices, world, population = borrowed((words, choices, world, population))
+    found, summaries, at = *borrowed((found, summaries)), 0
+    for generation in range(first + 1, last + 1):
+        count = walk_all(words[at:], num_words, more_words, choices, ends, erase, population.paths)
+        if count < 0:
+            return generation - 1
+        at += count
+        counts[generation - first - 1] = count
+        measure_all(population.paths, world, weights, population.results)
+        note(population, generation % len(summaries), found, summaries)
     return last

@@ -11,14 +11,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from evoexp.errors import SettingError
+from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.random_stream import Draws
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga import kernels
-from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population, candidate_of
+from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, PathTable, Population
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import BLOCK, GridPathGa, Problem, trimmed
-from evoexp.planners.planner import Candidate
-from evoexp.planners.table_search import TableSearch
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Block
 from evoexp.validation import Count
@@ -61,23 +60,19 @@ class PathClimbing(WrappedPlanner):
         return _Climbing(self.planner, problem, self.num_paths).blocks(rng)
 
 
-class _Climbing(TableSearch):
+class _Climbing(PathTable):
     """One run, and memory for its kernels.
 
-    A block ends with the last generation for which the numbers drawn before it suffice: each
-    generation is recorded with the generator as it is behind that generation.
+    Numbers are drawn when the last ones are used up. Each generation is recorded with the generator
+    as it is behind that generation.
     """
 
     def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int) -> None:
         super().__init__(planner.ga, PER_CALL)
-        self._draws, self._is_used_up = Draws(BLOCK), True
+        self.make_table(problem.world, num_paths)
+        self._draws, self._trial, self._is_used_up = Draws(BLOCK), 0, True
         self._planner, self._problem, self._num_paths = planner, problem, num_paths
-        width, self._trial = problem.fields.grid.num_nodes + 1, 0
-        self._found = Population(
-            np.empty((self.num_places, width), dtype=np.int32),
-            np.empty((self.num_places, RESULTS, num_paths)),
-        )
-        self.costs = self._found.results[:, COST]
+        width = problem.fields.grid.num_nodes + 1
         candidate = Population(np.empty((1, width), dtype=np.int32), np.empty((RESULTS, 1)))
         self._scratch = candidate, Scratch.of(width - 1)
 
@@ -90,41 +85,36 @@ class _Climbing(TableSearch):
         paths = np.zeros((len(best), problem.fields.grid.num_nodes + 1), dtype=np.int32)
         paths[:, : drawn.shape[1]] = drawn[best]
         self._paths = Population(paths, np.ascontiguousarray(results[:, best]))
-        self._note(0)
+        kernels.note(self._paths, 0, self.recorded, self.summaries)
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Make the trials of generations, of one at least; draw more numbers only for that one."""
-        while True:
+        """Make the trials of generations; draw more numbers whenever they do not suffice."""
+        self.states, num_trials = [], self._ga.num_offspring
+        task = self._problem.world, self._planner.objective.weights, not self._planner.revisits
+        candidate, scratch = self._scratch
+        while first < last:
             if self._is_used_up:
                 self._draws.extend(rng)
-            reached = self._climb(first, last)
-            self._is_used_up = reached < last
-            if reached > first:
-                return reached
-
-    def _climb(self, first: int, last: int) -> int:
-        """Make trials as far as the numbers suffice; return the last generation that is done."""
-        task = self._problem.world, self._planner.objective.weights, not self._planner.revisits
-        arguments = *task, self._paths, *self._scratch
-        for generation in range(first + 1, last + 1):
-            until = generation * self._ga.num_offspring
-            self._trial = kernels.climb(self._draws.block, self._trial, until, *arguments)
-            if self._trial < until:
-                return generation - 1
-            self._note(generation % self.num_places)
+            self._trial = kernels.climb(
+                self._draws.block,
+                self._trial,
+                first,
+                last,
+                num_trials,
+                *task,
+                self._paths,
+                candidate,
+                scratch,
+                self.recorded,
+                self.summaries,
+            )
+            is_complete = self._trial == last * num_trials
+            reached = last if is_complete else self._trial // num_trials
+            self.states += [state_bytes(rng.bit_generator)] * (reached - first)
+            first, self._is_used_up = reached, not is_complete
         return last
-
-    def _note(self, place: int) -> None:
-        """Write to a place how the paths are now."""
-        kernels.note(self._paths, place, self._found, self.summaries)
-
-    def candidate(self, place: int, individual: int) -> Candidate:
-        """Return the best path of a generation, and its terms."""
-        results = self._found.results[place, :, individual]
-        return candidate_of(self._found.paths[place], self._problem.world, results)
 
     def population(self, index: int) -> NodeArray:
         """Return the paths of the generation computed last without rests of rows."""
         paths = self._paths.paths
-        is_there = index == self.reached and self._trial == index * self._ga.num_offspring
-        return trimmed(paths) if is_there else paths[:0]
+        return trimmed(paths) if index == self.reached else paths[:0]

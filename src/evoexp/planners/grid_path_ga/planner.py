@@ -16,32 +16,31 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.potential_fields import Fields, PotentialFields
+from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.random_stream import Draws
+from evoexp.numeric.random_stream import DrawnAhead, Draws, used_up
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choice_table, choices_of
 from evoexp.paths.grid_measures import Tolls
-from evoexp.paths.grid_walks import walk_each
+from evoexp.paths.grid_walks import LANES, WORDS, walk, walk_all
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
-from evoexp.paths.walkers import LANES, WORDS, Walkers
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
     DISTANCE,
     RESULTS,
     UNSAFENESS,
+    PathTable,
     Population,
-    candidate_of,
     named_terms,
     solution_of,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
-from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
+from evoexp.planners.planner import JudgementArrays, PlannerDefaults, judged_samples
 from evoexp.planners.proofs import Acceptance
 from evoexp.planners.table_search import ScaledSearch
 from evoexp.records import Block, FloatArray
@@ -56,7 +55,8 @@ FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path c
 KEPT = 2  # generations whose paths are in memory
 PER_CALL = 8  # generations; see `ScaledSearch`: another number needs another revision
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
-FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
+MORE_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
+DRAWN_PER_CALL = 16  # generations of random search, whose words take less than a megabyte
 BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
@@ -70,6 +70,11 @@ class Problem(NamedTuple):
     world: World  # grid and fields, as the kernels take them
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
     security_margin: float  # clearance that the task requires [length unit]
+
+    def num_words(self, count: int) -> int:
+        """Return how many random words are drawn at first for so many paths."""
+        fewest = int(self.moves.steps[self.ends[0]])
+        return WORDS * (int(STEPS_PER_WALK * count * fewest / LANES) + 1)
 
 
 class GridPathGa(PlannerDefaults, Component):
@@ -106,6 +111,12 @@ class GridPathGa(PlannerDefaults, Component):
         """Yield the population of random paths, then every generation."""
         return _Search(self, problem).blocks(rng)
 
+    def random_blocks(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
+        """Yield generations of random paths as `random_search` does, many per call of a kernel."""
+        if len(problem.choices.entries) and self.ga.num_offspring:
+            return _RandomPaths(self, problem).blocks(rng)
+        return judged_samples(self, problem, rng)
+
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
@@ -116,23 +127,26 @@ class GridPathGa(PlannerDefaults, Component):
         return trimmed(paths)
 
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
-        """Let walkers fill a table of paths."""
-        walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
-        fewest = int(problem.moves.steps[problem.ends[0]])
-        num_words = WORDS * (int(STEPS_PER_WALK * len(paths) * fewest / LANES) + 1)
-        while walkers.complete < len(paths):
-            walkers.go(rng.bit_generator.random_raw(num_words))
-            num_words = FEW_WORDS
+        """Let walkers fill a table of paths, from the start with more words if some lack."""
+        counts = problem.num_words(len(paths)), MORE_WORDS
+        ends, erases = problem.ends, not self.revisits
+        words = rng.bit_generator.random_raw(counts[0])
+        while walk_all(words, *counts, problem.choices, ends, erases, paths) < 0:
+            words = np.concatenate([words, rng.bit_generator.random_raw(MORE_WORDS)])
 
     def _fill_one_by_one(
         self, problem: Problem, rng: np.random.Generator, paths: NodeArray
     ) -> None:
         """Fill a table of paths where the weights of moves allow no table of choices."""
-        draws, complete = Draws(BLOCK), 0
-        place = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
-        arguments = problem.moves, problem.choices, problem.ends, not self.revisits
-        while (complete := walk_each(draws.block, *arguments, complete, paths, place)) < len(paths):
-            draws.extend(rng)
+        draws, place = Draws(BLOCK), np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
+        task = problem.moves, problem.choices, problem.ends, not self.revisits
+        for path in paths:
+            before = draws.block.taken.item(0)
+            walk(draws.block, *task, path, place)
+            while used_up(draws.block):
+                draws.block.taken[0], before = before, 0
+                draws.extend(rng)
+                walk(draws.block, *task, path, place)
 
     def cost(self, problem: Problem, population: np.ndarray) -> JudgementArrays:
         """Judge paths (individuals, longest + 1), which are valid by construction.
@@ -217,18 +231,14 @@ class GridPathGa(PlannerDefaults, Component):
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
 
 
-class _Search(ScaledSearch):
+class _Search(PathTable, ScaledSearch):
     """One run, and memory for its kernels."""
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
-        super().__init__(ga, kernels.evolve, PER_CALL, BLOCK)
+        ScaledSearch.__init__(self, ga, kernels.evolve, PER_CALL, BLOCK)
+        self.make_table(problem.world, size)
         self._planner, self._problem = planner, problem
-        self._found = Population(
-            np.empty((self.num_places, nodes + 1), dtype=np.int32),
-            np.empty((self.num_places, RESULTS, size)),
-        )
-        self.costs = self._found.results[:, COST]
         self._table = Population(
             np.empty((KEPT, size, nodes + 1), dtype=np.int32), np.empty((KEPT, RESULTS, size))
         )
@@ -239,8 +249,8 @@ class _Search(ScaledSearch):
             planner.crossover_reach,
             ga.mutation_rate,
         )
-        world, found = (problem.world, planner.objective.weights), (self._found, self.summaries)
-        self.arguments = *world, breeding, self._table, self.chosen, Scratch.of(nodes), *found
+        world, records = (problem.world, planner.objective.weights), (self.recorded, self.summaries)
+        self.arguments = *world, breeding, self._table, self.chosen, Scratch.of(nodes), *records
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
@@ -248,18 +258,60 @@ class _Search(ScaledSearch):
         drawn = self._planner.sample(self._problem, rng, len(paths))
         paths[:, : drawn.shape[1]] = drawn
         results[:] = self._planner.measured(self._problem, paths)
-        kernels.note(Population(paths, results), 0, self._found, self.summaries)
-
-    def candidate(self, place: int, individual: int) -> Candidate:
-        """Return the best path of a generation, and its terms."""
-        results = self._found.results[place, :, individual]
-        return candidate_of(self._found.paths[place], self._problem.world, results)
+        kernels.note(Population(paths, results), 0, self.recorded, self.summaries)
 
     def population(self, index: int) -> NodeArray:
         """Return the paths of one of the generations computed last, without rests of rows."""
         kept = len(self._table.paths)
         paths: NodeArray = self._table.paths[index % kept]
         return trimmed(paths) if index > self.reached - kept else paths[:0]
+
+
+class _RandomPaths(PathTable):
+    """One run of random search: generations of paths that have nothing to do with each other."""
+
+    def __init__(self, planner: GridPathGa, problem: Problem) -> None:
+        super().__init__(planner.ga, DRAWN_PER_CALL)
+        self._planner, self._problem = planner, problem
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and measure as many paths as the planner draws at first."""
+        drawn = self._planner.sample(self._problem, rng, self._ga.population_size)
+        self._paths = Population(drawn, self._planner.measured(self._problem, drawn))
+        self.make_table(self._problem.world, len(drawn))
+        kernels.note(self._paths, 0, self.recorded, self.summaries)
+
+    def _make_room(self, rng: np.random.Generator) -> None:
+        """Make the tables of all generations but the first, and draw words ahead for them."""
+        problem, size = self._problem, self._ga.num_offspring
+        self.make_table(problem.world, size)
+        self._paths = Population(
+            np.empty((size, problem.fields.grid.num_nodes + 1), dtype=np.int32),
+            np.empty((RESULTS, size)),
+        )
+        self._counts = np.empty(self.num_places, dtype=np.int64)
+        counts = problem.num_words(size), MORE_WORDS
+        self._words = DrawnAhead(rng, counts[0], rng.bit_generator.random_raw)
+        walks = *counts, problem.choices, problem.ends, not self._planner.revisits
+        judging = problem.world, self._planner.objective.weights, self._paths
+        self._arguments = *walks, *judging, self._counts, self.recorded, self.summaries
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Draw generations as far as the words suffice, one at least."""
+        if first == 0:
+            self._make_room(rng)
+        reached, steps = first, last - first
+        while reached == first:
+            words = self._words.draw(steps)
+            reached = kernels.draw_generations(words, first, last, *self._arguments)
+            steps += 1
+        self.states = self._words.take(self._counts[: reached - first].tolist())
+        return reached
+
+    def population(self, index: int) -> NodeArray:
+        """Return the paths of the generation drawn last, without rests of rows."""
+        paths = self._paths.paths
+        return trimmed(paths) if index == self.reached else paths[:0]
 
 
 def trimmed(paths: NodeArray) -> NodeArray:

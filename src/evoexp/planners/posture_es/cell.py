@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.body_covers import Cover
-from evoexp.collision.models.body_models import BodyModel, Carried
-from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_models import BodyModel, Carried
+from evoexp.collision.covers.body_covers import Cover
 from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
 from evoexp.numeric.rotations import rotation_matrix
 from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim
@@ -122,7 +122,7 @@ class Cell:
 
     def collisions(
         self, phase: Phase, situation: Situation
-    ) -> tuple[PrimitiveCollision, PrimitiveCollision | None]:
+    ) -> tuple[BodyCollision, BodyCollision | None]:
         """Return the collision models of pairs that must not touch, and of those that may."""
         obstacles, allowed, carried = self.surroundings(phase, situation)
         depth = self.allowed_penetration

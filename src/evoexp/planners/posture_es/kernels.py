@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.primitive_kernels import primitive_clearances
+from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.numeric.compilation import kernel
 from evoexp.objectives.posture_cost import (
     ANGLE,
@@ -118,7 +118,7 @@ def judge(
     rows[COLLISION], rows[FREE_SPACE] = 0.0, 0.0
     if weights[COLLISION] > 0.0:
         rated = weights[FREE_SPACE] > 0.0
-        primitive_clearances(tables, reach if rated else 0.0, not rated, q, clearance)
+        least_clearances(tables, reach if rated else 0.0, not rated, q, clearance)
         for n in range(count):
             least = min(clearance[0, n], min(clearance[1, n], clearance[2, n]))
             rows[COLLISION, n] = 0.0 if least >= 0.0 else 1.0
@@ -126,7 +126,7 @@ def judge(
                 rows[FREE_SPACE, n] = min(max(1.0 - least / reach, 0.0), 1.0)
     if weights[COLLISION] > 0.0 and judging.may_touch:
         overlap = np.empty((3, count))
-        primitive_clearances(judging.touching, 0.0, True, q, overlap)
+        least_clearances(judging.touching, 0.0, True, q, overlap)
         for n in range(count):
             if overlap[0, n] < 0.0:
                 rows[COLLISION, n] = 1.0

@@ -23,8 +23,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from evoexp.collision.bodies.body_models import CollisionModel
 from evoexp.collision.certifier.certificate import certificate
-from evoexp.collision.models.body_models import CollisionModel
 from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE

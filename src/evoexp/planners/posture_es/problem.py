@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.body_covers import Cover
-from evoexp.collision.models.body_models import BodyModel, CollisionModel
-from evoexp.collision.models.fitted_covers import fitted_covers, fitting_notes
-from evoexp.collision.models.inner_balls import inner_balls
+from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
+from evoexp.collision.covers.body_covers import Cover
+from evoexp.collision.covers.inner_balls import inner_balls
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
@@ -116,7 +115,7 @@ def _fitted(problem: Problem, ends: list[FloatArray]) -> Problem:
     if not free:
         return problem
     table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
-    bodies = fitted_covers(problem.bodies, table, ignored, np.column_stack(free))
+    bodies = problem.bodies.fitted(table, ignored, np.column_stack(free))
     return replace(problem, bodies=bodies, memory={})
 
 
@@ -162,7 +161,7 @@ def notes(problem: Problem) -> tuple[str, ...]:
     ):
         if pairs:
             lines.append(f"{what}: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs))
-    return (*lines, *fitting_notes(bodies, "the start or the goal", unit))
+    return (*lines, *bodies.fitting_notes("the start or the goal", unit))
 
 
 def _limits(assembly: Assembly) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import PathChecks, prepare_checks
+from evoexp.collision.planar.ellipse_kernels import PathChecks, prepare_checks
 from evoexp.evolution.bit_coding import decode_bits
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import (
+from evoexp.collision.planar.ellipse_kernels import (
     Ellipses,
     PathChecks,
     TestedPath,

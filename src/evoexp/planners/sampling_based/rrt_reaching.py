@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.link_ellipses import EllipseConfigurations
+from evoexp.collision.planar.link_ellipses import EllipseConfigurations
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.answers import joint_names, of_limits, of_place

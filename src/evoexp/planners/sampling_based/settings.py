@@ -4,9 +4,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from evoexp.collision.models.covered_bodies import CoveredBodies
-from evoexp.collision.models.link_ellipses import LinkEllipses
-from evoexp.collision.models.touching_spheres import TouchingSpheres
+from evoexp.collision.bodies.covered_bodies import CoveredBodies
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
+from evoexp.collision.planar.link_ellipses import LinkEllipses
 from evoexp.planners.proofs import Acceptance
 from evoexp.validation import (
     Component,

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredCollision
-from evoexp.collision.models.link_ellipses import EllipseConfigurations
-from evoexp.collision.models.touching_spheres import SphereCollision
+from evoexp.collision.bodies.covered_bodies import CoveredCollision
+from evoexp.collision.bodies.touching_spheres import SphereCollision
+from evoexp.collision.planar.link_ellipses import EllipseConfigurations
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import nearest_node, step_toward, tested_configurations
 from evoexp.records import FloatArray, IntArray

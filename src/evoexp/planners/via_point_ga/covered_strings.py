@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredCollision
+from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.evolution.operators.breeding import breed
 from evoexp.evolution.succession import choose_elites
 from evoexp.objectives.string_fitness import count_collisions, weigh
@@ -55,6 +55,7 @@ class CoveredStrings(Strings):
         """Go on from a generation to those behind it; see `Strings`."""
         (offspring, terms, elites, parents), places = run.scratch, len(run.summaries)
         judged, rate = Judgement(terms.cost, terms, 0), run.breeding.mutation_rate
+        select, cross, mutate = run.operators
         for index, numbers in enumerate(uniforms, start=first):
             before, after = (
                 kernels.Population(*(array[g % places] for array in run.table))
@@ -62,18 +63,8 @@ class CoveredStrings(Strings):
             )
             choose_elites(before.costs, elites)
             genomes, children = kernels.by_gene(before.strings), kernels.by_gene(offspring)
-            breed(
-                *run.operators,
-                numbers,
-                normals,
-                index,
-                rate,
-                run.breeding,
-                before.costs,
-                genomes,
-                parents,
-                children,
-            )
+            given = index, rate, run.breeding, before.costs, genomes, parents, children
+            breed(select, cross, mutate, numbers, normals, *given)
             self.smooth(offspring, len(parents))
             self._judge(offspring, judged)
             kernels.follow(before, run.scratch, after)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.planar_contacts import contacts
+from evoexp.collision.bodies.planar_contacts import contacts
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.succession import choose_elites, follow_rows

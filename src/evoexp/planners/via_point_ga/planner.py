@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredCollision
-from evoexp.collision.models.touching_spheres import Clearance
+from evoexp.collision.bodies.body_collision import Clearances
+from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
@@ -195,7 +195,7 @@ def sampled(strings: FloatArray, samples: int) -> FloatArray:
     return np.hstack([strings[:, :1], inside.reshape(len(strings), -1)])
 
 
-def _least_distances(problem: Problem, at: Clearance, between: Clearance) -> dict[str, float]:
+def _least_distances(problem: Problem, at: Clearances, between: Clearances) -> dict[str, float]:
     """Return least distances as in the paper's Fig. 7.
 
     They are of circle centres, to those of another arm and to an obstacle's surface; of covered

@@ -4,8 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from evoexp.collision.models.covered_bodies import CoveredBodies
-from evoexp.collision.models.touching_spheres import TouchingSpheres
+from evoexp.collision.bodies.covered_bodies import CoveredBodies
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.evolution.operators.breeding import Operators

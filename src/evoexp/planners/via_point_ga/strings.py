@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.models.touching_spheres import SphereCollision
+from evoexp.collision.bodies.touching_spheres import SphereCollision
 from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
@@ -190,17 +190,9 @@ class Strings:
             first: The present generation.
         """
         settings = kernels.Settings(run.breeding, self.smoothing, self.judging)
-        kernels.evolve(
-            *run.operators,
-            uniforms,
-            normals,
-            first,
-            self.problem.arm_slices,
-            settings,
-            run.table,
-            run.scratch,
-            run.summaries,
-        )
+        arguments = self.problem.arm_slices, settings, run.table, run.scratch, run.summaries
+        select, cross, mutate = run.operators
+        kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
 
     def unjudged(self, strings: FloatArray, count: int) -> Judgement:
         """Return memory for a judgement."""

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from evoexp.records import FloatArray
-from evoexp.report.statistics import quantile
+from evoexp.report.statistics.inference import quantile
 
 JITTER = 0.16  # [rows] half the width over which points are spread
 POINTS = 50  # up to so many finite values every one is shown

@@ -8,10 +8,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.figures import groups
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import quantiles
+from evoexp.report.figures import groups, style
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import quantiles
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
@@ -205,3 +204,8 @@ def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
     above = axes.secondary_xaxis("top", functions=(forward, backward))
     above.set_xlabel("evaluations")
     above.xaxis.set_major_locator(style.few_ticks())
+
+
+BEST = cost_table, draw_best
+COST = cost_table, draw_cost
+FITNESS = fitness_table, draw_fitness

@@ -1,7 +1,7 @@
 """Sweeps: quantities of all conditions side by side, and effect sizes of the first condition."""
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray, IntArray
-from evoexp.report import style
-from evoexp.report.comparisons import Comparison
-from evoexp.report.figures import groups
+from evoexp.report.figures import groups, marks, style
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import quantile
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import Comparison, Values
+from evoexp.report.statistics.inference import quantile
 
 WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn
@@ -28,7 +27,6 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"fillstyle": "left", "markerfacecoloralt": "white"},
     {"markerfacecolor": style.ARM_COLOURS[0]},
 )  # looks of differences that are significant by none, one and both of the tests
-Values = Callable[[ConditionResults], FloatArray]
 
 
 def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
@@ -75,10 +73,10 @@ def draw_values(table: pd.DataFrame) -> Figure:
             values, colour = own["value"].to_numpy(), style.row_colour(position, len(labels))
             draw_box(axes, position, values, colour, never=never)
             if never is not None:
-                _annotate_counts(axes, position, values)
+                marks.beside(axes, position, f"{np.isfinite(values).sum()} of {len(values)}")
         middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
         if np.isfinite(middle):
-            axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+            marks.dashed(axes, middle)
         axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
         axes.margins(x=0.06)
         axes.xaxis.set_major_locator(style.few_ticks())
@@ -122,17 +120,6 @@ def _name_never(axes: Axes, never: float) -> None:
     axes.set_xlim(low, high)
 
 
-def _annotate_counts(axes: Axes, position: int, values: FloatArray) -> None:
-    """Write beside a box how many runs of all got there."""
-    axes.annotate(
-        f"{np.isfinite(values).sum()} of {len(values)}",
-        (1.01, position),
-        xycoords=axes.get_yaxis_transform(),
-        fontsize=6.5,
-        va="center",
-    )
-
-
 def effects_table(
     comparisons: Mapping[str, Sequence[Comparison]], significance: float
 ) -> pd.DataFrame:
@@ -166,7 +153,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         rows = table[table["quantity"] == quantity]
         y = np.array([labels.index(label) for label in rows["condition"]])
         a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
-        axes.axvline(0.5, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        marks.dashed(axes, 0.5)
         axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
         clear = _clear(rows)
         for count, look in enumerate(LOOKS):
@@ -195,3 +182,7 @@ def _clear(rows: pd.DataFrame) -> IntArray:
     below = rows[list(TESTS)].to_numpy(np.float64) < rows[["significance"]].to_numpy(np.float64)
     below[:, 0] &= (rows["direction"] * (rows["a12"] - 0.5)).to_numpy(np.float64) > 0.0
     return np.asarray(below.sum(axis=1), dtype=np.int64)
+
+
+EFFECTS = effects_table, draw_effects
+VALUES = values_table, draw_values

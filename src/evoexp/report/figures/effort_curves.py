@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
-from evoexp.report import style
+from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
-from evoexp.report.planner_runs import PlannerRuns
-from evoexp.report.statistics import quantiles
+from evoexp.report.results.planner_runs import PlannerRuns
+from evoexp.report.statistics.inference import quantiles
 
 POINTS = 200  # along the axis of effort
 MAX_PANELS = 24  # problems that have a panel of their own
@@ -175,3 +175,8 @@ def _ends(table: pd.DataFrame) -> tuple[float, float]:
     """Return the ends of the axis of effort, also where no run has a proven answer."""
     first, last = float(table["collision_queries"].min()), float(table["collision_queries"].max())
     return first, max(last, 1.01 * first)
+
+
+LENGTHS = length_table, draw_lengths
+SHARES = share_table, draw_shares
+SHARES_BY_PROBLEM = problem_share_table, draw_shares_by_problem

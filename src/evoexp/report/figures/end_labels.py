@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
-from evoexp.report import style
+from evoexp.report.figures import style
 
 MANY = 5  # curves, from which on each is named at its end
 LONGEST = 40  # signs of a name

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from evoexp.report import style
+from evoexp.report.figures import style
 
 HALO = [withStroke(linewidth=2.0, foreground="white")]  # around a text on lines
 
@@ -34,6 +34,17 @@ def contact(axes: Axes, x: Any, y: Any, size: float, **look: Any) -> None:
 def band(axes: Axes, x: Any, low: Any, high: Any, colour: str, **look: Any) -> None:
     """Draw the range between two curves."""
     axes.fill_between(x, low, high, color=colour, linewidth=0, **{"alpha": 0.18} | look)
+
+
+def beside(axes: Axes, y: Any, text: str, at: float = 1.01, **look: Any) -> None:
+    """Write a text to the right of a row, `at` a share of the width of the panel."""
+    place: dict[str, Any] = {"xycoords": axes.get_yaxis_transform(), "fontsize": 6.5}
+    axes.annotate(text, (at, y), **place | {"va": "center"} | look)
+
+
+def dashed(axes: Axes, x: float) -> None:
+    """Draw a faint vertical line below everything, of a value to compare with."""
+    axes.axvline(x, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
 
 
 def point_key(label: str, marker: str, size: float, **look: Any) -> Line2D:

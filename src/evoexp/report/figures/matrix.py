@@ -7,9 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.comparisons import Comparison
-from evoexp.report.figures import records
+from evoexp.report.figures import records, style
+from evoexp.report.statistics.comparisons import Comparison
 
 SIZE = 0.44  # [inch] of a cell
 LONGEST = 28  # characters of a name beside the matrix
@@ -77,3 +76,6 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
     bar: dict[str, Any] = {"fraction": BAR / width, "aspect": SIZE * count / BAR}
     figure.colorbar(image, ax=axes, label="A12: the row is better", ticks=[0.0, 0.5, 1.0], **bar)
     return figure
+
+
+MATRIX = matrix_table, draw_matrix

@@ -4,9 +4,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report import style
+from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
-from evoexp.report.problem_ranks import alike
+from evoexp.report.statistics.problem_ranks import alike, profile_table, rank_table
 
 LINE = 0.24  # [inch] between names of planners
 BAR = 0.09  # [inch] between bars that join planners
@@ -70,3 +70,7 @@ def _scale(axes: Axes, count: int, difference: float, *, is_narrow: bool) -> Non
         axes.plot([end, end], [0.36, 0.44], color=style.NEUTRAL, linewidth=1.0)
     text = f"critical difference {difference:.2f}"
     axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", fontsize=size)
+
+
+CRITICAL_DIFFERENCE = rank_table, draw_critical_difference
+PROFILES = profile_table, draw_profiles

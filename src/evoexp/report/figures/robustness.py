@@ -7,26 +7,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.figures import groups, records
-from evoexp.report.judging import CONTRADICTED, REPRODUCED
+from evoexp.report.figures import groups, records, style
+from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED
 
-COLUMNS = [
-    "quantity",
-    "position",
-    "condition",
-    "median",
-    "lower",
-    "upper",
-    "verdict",
-    "shipped",
-    "family",
-]
 WRAPPED = 30  # characters of a quantity's name, per line
+OTHERWISE = "inconclusive or not judged"
 MARKS: dict[str, dict[str, Any]] = {
     REPRODUCED: {"marker": "o", "mfc": style.ARM_COLOURS[0]},
     CONTRADICTED: {"marker": "X", "mfc": style.ARM_COLOURS[1], "mec": style.ARM_COLOURS[1]},
-    "inconclusive or not judged": {"marker": "o", "mfc": "white"},
+    OTHERWISE: {"marker": "o", "mfc": "white"},
 }
 
 
@@ -34,7 +23,7 @@ def draw_robustness(table: pd.DataFrame) -> Figure:
     """Draw one panel per quantity, one row per condition, families one below the other.
 
     Args:
-        table: With `COLUMNS`; infinite values stand at the right edge, as "never".
+        table: Of the page of assumptions; infinite values stand at the right edge, as "never".
     """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
@@ -55,7 +44,8 @@ def draw_robustness(table: pd.DataFrame) -> Figure:
         for row in records(rows):
             ends = [min(end, edge) for end in (row.lower, row.upper)]
             axes.hlines(row.position, *ends, color=style.ARM_COLOURS[0], linewidth=1.4)
-            look = {"mec": style.ARM_COLOURS[0], "ms": 5, **_mark(row.verdict)}
+            mark = MARKS.get(row.verdict, MARKS[OTHERWISE])
+            look = {"mec": style.ARM_COLOURS[0], "ms": 5, **mark}
             axes.plot(min(row.median, edge), row.position, zorder=3, **look)
             if not np.isfinite(row.median):
                 beside: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points"}
@@ -72,8 +62,3 @@ def draw_robustness(table: pd.DataFrame) -> Figure:
     ]
     style.keys_below(figure, entries)
     return figure
-
-
-def _mark(verdict: str) -> dict[str, Any]:
-    """Return the look of a verdict's marker."""
-    return MARKS.get(verdict, MARKS["inconclusive or not judged"])

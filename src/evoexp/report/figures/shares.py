@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.figures import groups
-from evoexp.report.statistics import Proportion
+from evoexp.report.figures import groups, marks, style
+from evoexp.report.statistics.inference import Proportion
 
 MARGIN = 0.08  # [-] of the panels' span, beyond the intervals
 NEARLY_ALL = 60.0  # [%] a span from which on the panels show all percentages, 0 to 100
@@ -58,19 +57,11 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
                     y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
                 )
                 axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
-            axes.annotate(
-                f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}",
-                (1.0, y),
-                xycoords=axes.get_yaxis_transform(),
-                fontsize=6.5,
-                va="center",
-                ha="left",
-            )
+            counts = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
+            marks.beside(axes, y, counts, 1.0)
         if len(own):
             for printed in own["printed"].dropna().unique():
-                axes.axvline(
-                    100 * printed, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1
-                )
+                marks.dashed(axes, 100 * printed)
             axes.set_xlim(*ranges[quantity])
         whole = len(own) and np.ptp(ranges[quantity]) > 100.0
         axes.xaxis.set_major_locator(MultipleLocator(25.0) if whole else style.few_ticks())
@@ -97,3 +88,6 @@ def _ranges(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
         first = min(max(0.5 * (low + high - span), 0.0), 100.0 - span)
         ranges[quantity] = first - beyond, first + span + beyond
     return ranges
+
+
+SHARES = shares_table, draw_shares

@@ -9,14 +9,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.figures import groups, records
+from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
-from evoexp.report.results import Results
-from evoexp.report.statistics import quantile
-from evoexp.report.swept_settings import MainEffect, Sweep, Values
+from evoexp.report.results.stored_results import Results
+from evoexp.report.results.swept_settings import MainEffect, Sweep, Values
+from evoexp.report.statistics.inference import quantile
 
 PER_LINE = 3  # panels side by side
 MOST_PANELS = 18
@@ -143,7 +142,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         errors = [finite["difference"] - finite["low"], finite["high"] - finite["difference"]]
         look: dict[str, Any] = {"fmt": "o", "ms": 4, "capsize": 2.0, "color": style.NEUTRAL}
         axes.errorbar(finite["difference"], finite.index, xerr=errors, **look)
-        axes.axvline(0.0, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        marks.dashed(axes, 0.0)
         names = [f"{r.setting}: {r.first} → {r.other}" for r in records(own)]
         axes.set_yticks(range(len(own)), names if style.begins_line(axes) else [])
         axes.set(title=base, xlabel="change of the cost", ylim=(len(own) - 0.5, -0.5))
@@ -224,3 +223,7 @@ def _limits(curves: pd.DataFrame) -> tuple[float, float]:
     low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
     room = 0.05 * (high - low) or 1.0
     return low - room, high + room
+
+
+CONVERGENCE = convergence_table, draw_convergence
+EFFECTS = effect_table, draw_effects

@@ -11,8 +11,8 @@ from evoexp.registry import PAGES, Registration, names, registered
 from evoexp.report.report_settings import ReportSettings
 
 if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before anything else
-    from evoexp.report.page_parts import Page
-    from evoexp.report.results import Results
+    from evoexp.report.pages.page_parts import Page
+    from evoexp.report.results.stored_results import Results
 
 GENERIC = "generic"  # page of an experiment that names none
 
@@ -41,10 +41,10 @@ def page_of(results: "Results", settings: ReportSettings) -> "Page":
         UnknownOption: If there is none of this name.
         RegistrationError: If its package registered it wrongly.
     """
-    from evoexp.report.judging import left_out
-    from evoexp.report.motion_pictures import best_motions, scene_drawing
     from evoexp.report.pages import swept
-    from evoexp.report.swept_settings import sweep_of
+    from evoexp.report.pages.motion_pictures import best_motions, scene_drawing
+    from evoexp.report.results.swept_settings import sweep_of
+    from evoexp.report.statistics.judging import left_out
 
     chosen = page_registration(settings)
     if sweep := sweep_of(results):

@@ -26,31 +26,26 @@ paper's `claims.yaml`, a quantity that is drawn, and a function that judges it o
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import pandas as pd
 
-from evoexp.report import judging, markdown
-from evoexp.report.claim_rules import OWN, Rule, Rules
-from evoexp.report.comparisons import Values, beside
 from evoexp.report.figures import robustness
-from evoexp.report.judging import Hearing, Judge
-from evoexp.report.page_parts import Claim, Drawing, Page, Table
-from evoexp.report.pages import generic
-from evoexp.report.parameters import OVERRIDE, Parameter, parameters
+from evoexp.report.pages import generic, markdown
+from evoexp.report.pages.page_parts import Claim, Page, Table
+from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.results.parameters import OVERRIDE, Parameter, parameters
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.claim_rules import OWN, Rule, Rules
+from evoexp.report.statistics.comparisons import Values, beside
+from evoexp.report.statistics.inference import spread
+from evoexp.report.statistics.judging import Hearing, Judge
 
 ASSUMED = "assumed"
 SHOWN = 4  # values of a list that are written out
 _INDEX = re.compile(r"\[\d+\]")
-INTRODUCTION = (
-    "The paper does not print every number that its experiments need. Each number that this "
-    "project chose is listed here with its reason. Some are replaced by others, one at a time; the "
-    "headline claims of the paper are judged again under each of them."
-)
 SURVIVES = Rule(
     name="survives",
     claim="{claim} — whatever number is assumed",
@@ -117,18 +112,12 @@ def page(
         for headline in headlines
         for one in _heard(results, judge, family, headline)
     ]
-    drawing = Drawing(
-        "assumptions",
-        "The headline claims under other numbers",
-        "Median and quartiles of every condition's runs; filled: the claim is reproduced, cross: "
-        "contradicted, open: inconclusive or not judged; dashed: the median as assumed.",
-        partial(_drawn, judged),
-        robustness.draw_robustness,
-        results.with_data,
+    drawing = WORDS.drawing(
+        "assumptions", (_drawn, robustness.draw_robustness), results.with_data, judged
     )
     return Page(
         f"{paper}: assumed numbers, and which claims survive others",
-        INTRODUCTION,
+        WORDS.introduction("assumptions"),
         generic.quantities(results),
         claims=tuple(_claims(judge, judged)),
         tables=(_effects(judged), _assumed(results, found)),
@@ -213,13 +202,8 @@ def _effects(judged: Sequence[Judged]) -> Table:
         )
         names = ", ".join(f"`{name}`" for name in changed) or "as assumed"
         rows.append((condition.label, names, condition.done, *cells))
-    return Table(
-        "Headline claims under other numbers",
-        ("condition", "changed", "n", *(f"{h.name}: {h.quantity}" for h in headlines)),
-        tuple(rows),
-        "Median [first quartile, third quartile] of the runs and the verdict; bold where it is not "
-        "the verdict under the assumed numbers.",
-    )
+    quantities = [f"{h.name}: {h.quantity}" for h in headlines]
+    return WORDS.table("headlines", rows, behind=quantities)
 
 
 def _assumed(results: Results, found: Sequence[Family]) -> Table:
@@ -243,8 +227,7 @@ def _assumed(results: Results, found: Sequence[Family]) -> Table:
         reason = "; ".join(filter(None, reasons)) or "–"
         by_label = "; ".join(varied) or "not varied"
         rows.append((f"`{name}`", shown, ", ".join(filter(None, units)) or "–", reason, by_label))
-    headers = ("setting", "value", "unit", "why", "varied by")
-    return Table("Every assumed number", headers, tuple(rows))
+    return WORDS.table("assumed", rows)
 
 
 def _drawn(judged: Sequence[Judged]) -> pd.DataFrame:
@@ -255,16 +238,14 @@ def _drawn(judged: Sequence[Judged]) -> pd.DataFrame:
         found = spread(one.headline.values(one.condition))
         shipped = spread(one.headline.values(one.family.shipped)).median
         rows.append(
-            (
-                one.headline.quantity,
-                positions[one.condition],
-                one.condition.label,
-                found.median,
-                found.lower,
-                found.upper,
-                one.claim.verdict,
-                shipped,
-                one.family.shipped.label,
-            )
+            {
+                "quantity": one.headline.quantity,
+                "position": positions[one.condition],
+                "condition": one.condition.label,
+                **{name: getattr(found, name) for name in ("median", "lower", "upper")},
+                "verdict": one.claim.verdict,
+                "shipped": shipped,
+                "family": one.family.shipped.label,
+            }
         )
-    return pd.DataFrame(rows, columns=robustness.COLUMNS)
+    return pd.DataFrame(rows)

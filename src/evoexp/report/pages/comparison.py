@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -10,21 +9,20 @@ import numpy as np
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
-from evoexp.report import markdown
-from evoexp.report.best_known import shipped_best_known
-from evoexp.report.comparisons import Comparison, compared
 from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
-from evoexp.report.given_data import MARK, GivenData
-from evoexp.report.page_parts import Drawing, Page, Table
-from evoexp.report.pages import ranking
-from evoexp.report.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
-from evoexp.report.problem_ranks import standing
-from evoexp.report.proven_answers import first_reached
+from evoexp.report.pages import markdown, ranking
+from evoexp.report.pages.page_parts import Drawing, Page, Table
+from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import search_seconds
-from evoexp.report.statistics import (
+from evoexp.report.results.best_known import shipped_best_known
+from evoexp.report.results.given_data import MARK, GivenData
+from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
+from evoexp.report.results.proven_answers import first_reached
+from evoexp.report.results.run_measures import search_seconds
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison, compared
+from evoexp.report.statistics.inference import (
     Interval,
     Proportion,
     Spread,
@@ -33,39 +31,7 @@ from evoexp.report.statistics import (
     quantile,
     spread,
 )
-
-INTRODUCTION = (
-    "An answer counts if the exact certifier proves the whole motion free of contact and it is a "
-    "solution of the task, whatever the planner's own model says. It is rated by the length of its "
-    "path in joint space; a path as long as the straight line from start to goal would be the "
-    "shortest of all. Effort is counted in configurations that a planner asked to be judged for "
-    "collision; a map that the task comes with counts as one of each of its nodes, before the "
-    "search."
-)
-TARGETS = (
-    "any at all, or one at most 4, 3, 2, 1.5, 1.2, 1.1, 1.05 times as long as the unit of the "
-    "problem (table of problems)."
-)
-UNITS = (
-    "Targets are multiples of a length that these runs do not change: of the shortest proven "
-    "answer known before, stored with evoexp or in the file of `--best-known`; where none is "
-    "stored, of the straight line from start to goal. The key is that of robot and scenario."
-)
-EFFORT = (
-    "Effort: expected running time (Hansen et al. 2009), the collision queries of all runs, failed "
-    "ones included, per run with a proven answer; in brackets the bootstrap interval. Lengths: "
-    "median and quartiles over runs, ∞: no proven answer. Refuted: last solutions that the "
-    "planner's own model accepts and the certifier refutes."
-)
-
-
-COINS = (
-    "Pairs of shapes: what a planner's own collision model compares in one configuration, if it "
-    "skips nothing. Evaluations and CPU time per proven answer: counted as the queries are, up to "
-    "each run's first one, else of the whole run; –: logged by code that did not record it. Own "
-    "cost: of the last solutions, median and quartiles over runs, ∞: infeasible; planners with "
-    "different costs cannot be compared by it."
-)
+from evoexp.report.statistics.problem_ranks import standing
 
 
 class Rated(NamedTuple):
@@ -127,7 +93,7 @@ def page_of_runs(
     found, rows = standing(runs), rated(runs, settings)
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
-        introduction=INTRODUCTION + (_of_file(given) if given else ""),
+        introduction=WORDS.introduction("comparison", given=_of_file(given) if given else ""),
         tables=(
             _problem_table(runs, ranking.too_few(found)),
             _table(rows, settings),
@@ -150,37 +116,14 @@ def _of_file(given: GivenData) -> str:
 
 def _drawings(runs: Sequence[PlannerRuns]) -> Iterator[Drawing]:
     """Yield the figures: curves of all problems and of each, or of one with its lengths."""
-    conditions, problems = stored_conditions(runs), problem_order(runs)
-    yield Drawing(
-        stem="targets_reached",
-        title="Targets reached",
-        caption=f"Share of (problem, target, run) with a proven answer: {TARGETS} Left and high is "
-        f"good.{_unequal(runs)}",
-        table=partial(effort_curves.share_table, runs),
-        draw=effort_curves.draw_shares,
-        conditions=conditions,
-    )
+    given, problems = (stored_conditions(runs), runs), problem_order(runs)
+    yield WORDS.drawing("targets_reached", effort_curves.SHARES, *given, unequal=_unequal(runs))
     if len(problems) == 1:
-        yield Drawing(
-            stem="proven_lengths",
-            title="Best proven length so far",
-            caption="Median and quartiles over runs; a curve begins where half of the runs "
-            "have a proven answer, its band where three quarters have one.",
-            table=partial(effort_curves.length_table, runs),
-            draw=effort_curves.draw_lengths,
-            conditions=conditions,
-        )
+        yield WORDS.drawing("proven_lengths", effort_curves.LENGTHS, *given)
         return
     first = f" The first {MAX_PANELS} of {len(problems)}; the CSV has all."
-    yield Drawing(
-        stem="targets_by_problem",
-        title="Targets reached, problem by problem",
-        caption="The same of each problem by itself: share of (target, run). A planner that was "
-        f"not run on a problem has no curve there.{first * (len(problems) > MAX_PANELS)}",
-        table=partial(effort_curves.problem_share_table, runs),
-        draw=effort_curves.draw_shares_by_problem,
-        conditions=conditions,
-    )
+    more = first * (len(problems) > MAX_PANELS)
+    yield WORDS.drawing("targets_by_problem", effort_curves.SHARES_BY_PROBLEM, *given, more=more)
 
 
 def _unequal(runs: Sequence[PlannerRuns]) -> str:
@@ -267,53 +210,27 @@ def _problem_table(runs: Sequence[PlannerRuns], remark: str) -> Table:
         )
         for name, (problem, best) in found.items()
     )
-    headers = (
-        "problem",
-        "key",
-        "straight line [rad, m]",
-        "best known",
-        "shortest here",
-        "unit of the targets",
-    )
-    return Table("Problems", headers, rows, f"{UNITS} {remark}".strip())
+    return WORDS.table("problems", rows, remark=f" {remark}".rstrip())
 
 
 def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
-    headers = (
-        "condition",
-        "runs",
-        "with a proven answer",
-        "queries to the first answer of its own model, median",
-        "queries per proven answer",
-        "best proven length [rad, m]",
-        "the same in units of the targets",
-        "refuted",
-    )
     cells = tuple(
         (
             row.condition,
             row.runs,
             Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
             markdown.number(row.first_own),
-            f"{effort_text(row.queries)} ({_between(row.interval)})",
+            f"{effort_text(row.queries)} ({' to '.join(map(effort_text, row.interval))})",
             markdown.spread(row.lengths),
             markdown.spread(row.in_units) if row.unit > 0.0 else "–",
             f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
         for row in rows
     )
-    return Table("Answers", headers, cells, EFFORT)
+    return WORDS.table("answers", cells)
 
 
 def _coin_table(rows: Sequence[Rated]) -> Table:
-    headers = (
-        "condition",
-        "pairs of shapes per query",
-        "body queries per proven answer",
-        "evaluations per proven answer",
-        "CPU time per proven answer [s]",
-        "the planner's own cost",
-    )
     cells = tuple(
         (
             row.condition,
@@ -326,11 +243,7 @@ def _coin_table(rows: Sequence[Rated]) -> Table:
         for row in rows
         if row.own_cost.num_values
     )
-    return Table("The same in other coins", headers, cells, COINS)
-
-
-def _between(interval: tuple[float, float]) -> str:
-    return " to ".join(effort_text(value) for value in interval)
+    return WORDS.table("coins", cells)
 
 
 def effort_text(queries: float) -> str:

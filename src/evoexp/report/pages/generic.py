@@ -1,15 +1,13 @@
 """The page of any experiment: results, convergence, all conditions compared with each other."""
 
-from functools import partial
-
-from evoexp.report import motion_pictures, pairwise, sweep_figures
-from evoexp.report.comparisons import Values, by_column, compared_with_controls
 from evoexp.report.figures import convergence
-from evoexp.report.page_parts import Drawing, Page, Quantity
+from evoexp.report.pages import motion_pictures, pairwise, sweep_figures
+from evoexp.report.pages.page_parts import Drawing, Page, Quantity
+from evoexp.report.pages.page_words import WORDS, quantity
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.run_measures import first_feasible, search_seconds
-from evoexp.report.statistics import spread
+from evoexp.report.results.run_measures import first_feasible, search_seconds
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.comparisons import by_column, compared_with_controls
 from evoexp.store.messages import TERM
 
 FEW = 4  # conditions whose average costs can be drawn beside the best ones
@@ -64,11 +62,6 @@ def basis(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity:
-    """Return a row of the table of results."""
-    return Quantity(name, unit, {c.label: spread(values(c)) for c in results.with_data})
-
-
 def quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows of the quantities that every planner records."""
     first = "first generation with a feasible individual (∞: none in the whole run)"
@@ -97,26 +90,9 @@ def term_quantities(results: Results) -> tuple[Quantity, ...]:
 
 def cost_drawing(results: Results) -> Drawing:
     """Return the figure of convergence."""
-    return Drawing(
-        stem="convergence",
-        title="Convergence",
-        caption="Best cost so far (full) and average cost of the finite individuals of a "
-        "generation "
-        "(dashed): median and quartiles over replicates; dash-dotted: references. Lower is "
-        "better.",
-        table=partial(convergence.cost_table, results),
-        draw=convergence.draw_cost,
-        conditions=results.with_data,
-    )
+    return WORDS.drawing("convergence", convergence.COST, results.with_data, results)
 
 
-def best_drawing(results: Results, more: str = "") -> Drawing:
+def best_drawing(results: Results) -> Drawing:
     """Return the figure of the best costs only, where averages would hide them."""
-    return Drawing(
-        "convergence",
-        "Convergence",
-        f"Median of the best cost so far over replicates. Lower is better.{more}",
-        partial(convergence.cost_table, results),
-        convergence.draw_best,
-        results.with_data,
-    )
+    return WORDS.drawing("best", convergence.BEST, results.with_data, results)

@@ -1,29 +1,21 @@
 """The part of `evoexp compare`'s page that ranks planners over problems."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 
 import numpy as np
 
-from evoexp.report import markdown
 from evoexp.report.figures import rank_diagrams
-from evoexp.report.page_parts import Drawing, Table
-from evoexp.report.planner_runs import PlannerRuns, stored_conditions
-from evoexp.report.problem_ranks import (
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Drawing, Table
+from evoexp.report.pages.page_words import WORDS
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.planner_runs import PlannerRuns, stored_conditions
+from evoexp.report.statistics.problem_ranks import (
     MIN_PLANNERS,
     MIN_PROBLEMS,
     Standing,
     critical_difference,
     friedman,
-    profile_table,
-    rank_table,
-)
-from evoexp.report.report_settings import ReportSettings
-
-RULE = (
-    "The problem is the unit of a ranking, seeds are its repetitions: each problem counts once, by "
-    "the median over its runs of the best proven length (without a proven answer: ∞, the worst; "
-    "equal medians share the mean of their ranks)."
 )
 
 
@@ -45,15 +37,8 @@ def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:
             enumerate(found.planners), key=lambda each: found.mean_ranks[each[0]]
         )
     ]
-    headers = (
-        "planner",
-        "mean rank",
-        "shortest on",
-        "median run proven on",
-        "any run proven on",
-    )
-    note = " ".join([RULE, _left_out(found), _tested(found, settings)]).replace("  ", " ")
-    return (Table("Ranks over problems", headers, tuple(rows), note),)
+    more = f" {_left_out(found)} {_tested(found, settings)}".replace("  ", " ")
+    return (WORDS.table("ranks", rows, more=more),)
 
 
 def too_few(found: Standing) -> str:
@@ -108,25 +93,9 @@ def drawings(
     if found.can_be_profiled:
         unsolved = int(np.isinf(found.efforts).all(axis=1).sum())
         never = f" No planner has a proven answer on {unsolved} of them." if unsolved else ""
-        yield Drawing(
-            stem="performance_profiles",
-            title="Performance profiles",
-            caption="Share of problems on which a planner's expected running time to a proven "
-            "answer is at most so many times that of the best planner on the problem (Dolan and "
-            "Moré 2002). At 1: problems on which it is the best; at the right end: problems that "
-            f"it solves at all. {len(found.problems)} problems.{never}",
-            table=partial(profile_table, found),
-            draw=rank_diagrams.draw_profiles,
-            conditions=conditions,
-        )
+        profiled, problems = (rank_diagrams.PROFILES, conditions, found), len(found.problems)
+        yield WORDS.drawing("performance_profiles", *profiled, problems=problems, never=never)
     if found.can_be_tested:
-        yield Drawing(
-            stem="critical_difference",
-            title="Mean ranks and their critical difference",
-            caption="Mean rank over problems of the median proven length. A bar joins planners "
-            "whose mean ranks differ by less than Nemenyi's critical difference (Demšar 2006): "
-            f"these data do not tell them apart. {_tested(found, settings)}",
-            table=partial(rank_table, found, settings.significance),
-            draw=rank_diagrams.draw_critical_difference,
-            conditions=conditions,
-        )
+        ranks, tested = rank_diagrams.CRITICAL_DIFFERENCE, _tested(found, settings)
+        given = ranks, conditions, found, settings.significance
+        yield WORDS.drawing("critical_difference", *given, tested=tested)

@@ -5,30 +5,20 @@ What does not depend on the sweep, the scene and the motion, is shown once, of t
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from evoexp.report import markdown, motion_pictures
 from evoexp.report.figures import sweeps
-from evoexp.report.page_parts import Drawing, Page, Table
-from evoexp.report.pages import generic
+from evoexp.report.pages import generic, markdown, motion_pictures
+from evoexp.report.pages.page_parts import Drawing, Page, Table
+from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Proportion, spread
-from evoexp.report.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
+from evoexp.report.statistics.inference import Proportion, spread
 
 MOST_CURVES = 60  # curves of convergence on a page
-INTRODUCTION = (
-    "A sweep: {conditions} conditions, {combinations} combinations of {settings}{bases}. Costs, "
-    "lower is better. Claims of papers are about their own settings and not judged here; the "
-    "page of a single condition is drawn by `evoexp report HASH`."
-)
-EFFECTS = (
-    "One value of a setting against its first one, all other settings and the seed being the same: "
-    "median difference of the best cost (below 0: the other value is better), its interval at "
-    "{level:g} % by resampling seeds, and the share of pairs in which the other value is better, "
-    "ties counting half. Effects of values that depend on other settings hide in it: see the grid."
-)
 
 
 def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
@@ -37,7 +27,8 @@ def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
     effects = tuple(main_effects(sweep, cost, settings.confidence, settings.num_resamples))
     done = [each.results for each in sweep.conditions if each.results.done]
     bases = [base for base in sweep.bases if base]
-    words = INTRODUCTION.format(
+    words = WORDS.introduction(
+        "sweep",
         conditions=len(sweep.conditions),
         combinations=len({each.values for each in sweep.conditions}),
         settings=" and ".join(f"`{name}`" for name in sweep.settings),
@@ -45,7 +36,9 @@ def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
     )
     if len({(c.condition.robot, c.condition.scenario) for c in done}) > 1:
         words += f" {generic.SCENES}"
-    shown = motion_pictures.best_motions(_best_only(results, done)) if done else []
+    # scene and motion of the condition with the lowest median cost alone
+    best = sorted(done, key=lambda c: spread(c.column("best_cost")).median)[:1]
+    shown = motion_pictures.best_motions(results._replace(conditions=tuple(best)))
     return Page(
         title=f"{results.experiment or 'stored runs'}: a sweep",
         introduction=words,
@@ -53,19 +46,9 @@ def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
         tables=(_combinations(sweep, settings), *_effect_tables(effects, settings)),
         drawings=(
             *_drawings(results, sweep, effects),
-            *(motion_pictures.drawings(shown) if shown else ()),
+            *motion_pictures.drawings(shown),
         ),
     )
-
-
-def _best_only(results: Results, done: list[ConditionResults]) -> Results:
-    """Return the results of the condition with the lowest median cost alone."""
-    best = min(done, key=_median_cost)
-    return results._replace(conditions=(best,))
-
-
-def _median_cost(condition: ConditionResults) -> float:
-    return spread(condition.column("best_cost")).median
 
 
 def _combinations(sweep: Sweep, settings: ReportSettings) -> Table:
@@ -84,8 +67,7 @@ def _combinations(sweep: Sweep, settings: ReportSettings) -> Table:
     first = ("condition",) if any(sweep.bases) else ()
     shares = ("solved", "solved and proven free of contact")
     headers = (*first, *sweep.settings, "hash", "n", *shares, *values)
-    note = "Medians with first and third quartile; shares with Wilson's interval."
-    return Table("Every combination", headers, rows, note)
+    return WORDS.table("combinations", rows, headers)
 
 
 def _shares(condition: ConditionResults, settings: ReportSettings) -> tuple[str, str]:
@@ -114,9 +96,7 @@ def _effect_tables(effects: tuple[MainEffect, ...], settings: ReportSettings) ->
         for each in effects
     )
     first = ("condition",) if any(each.base for each in effects) else ()
-    headers = (*first, "setting", "value", "pairs", "change of the best cost", "better in")
-    note = EFFECTS.format(level=100.0 * settings.confidence)
-    yield Table("Effect of each setting", headers, rows, note)
+    yield WORDS.table("main_effects", rows, first, level=100.0 * settings.confidence)
 
 
 def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -> Iterator[Drawing]:
@@ -125,41 +105,22 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
         return
     where = labelled(sweep, ["…"] * len(sweep.settings)).replace(" = …", "")
     for stem, name in (("grid_cost", "best cost"), ("grid_cpu", "CPU time of the search [s]")):
-        of = measures()[name]
-        yield Drawing(
-            stem,
-            f"{name[0].upper()}{name[1:]} over {where}",
-            "Medians over runs; all panels share one scale of colours. ∞: at least half of the "
-            f"runs have no feasible solution.{_more(_num_maps(sweep))}",
-            partial(sweeps.grid_table, sweep, of),
-            partial(sweeps.draw_grid, name=name),
-            conditions,
-        )
+        functions = sweeps.grid_table, partial(sweeps.draw_grid, name=name)
+        words: dict[str, Any] = {
+            "stem": stem,
+            "quantity": f"{name[0].upper()}{name[1:]}",
+            "where": where,
+        }
+        words["more"] = _more(len({(each.base, *each.values[:-2]) for each in sweep.conditions}))
+        yield WORDS.drawing("grid", functions, conditions, sweep, measures()[name], **words)
     if effects:
-        yield Drawing(
-            "main_effects",
-            "Effect of each setting on the best cost",
-            "Median difference of pairs of runs with the same seed and the same other settings, "
-            "and its interval; left of the dashed line the second value is better.",
-            partial(sweeps.effect_table, effects),
-            sweeps.draw_effects,
-            conditions,
-        )
+        yield WORDS.drawing("main_effects", sweeps.EFFECTS, conditions, effects)
     if len(conditions) <= MOST_CURVES:
-        yield Drawing(
-            "convergence",
-            "Convergence",
-            "Median of the best cost so far; panels of one condition share one scale; at the end "
-            f"of each curve its {sweep.settings[-1]}. Costs of the first twentieth of a run may "
-            f"lie above the panel.{_more(len(sweeps.facets(sweep)))}",
-            partial(sweeps.convergence_table, results, sweep),
-            sweeps.draw_convergence,
-            conditions,
+        more, given = _more(len(sweeps.facets(sweep))), (conditions, results, sweep)
+        setting = sweep.settings[-1]
+        yield WORDS.drawing(
+            "sweep_convergence", sweeps.CONVERGENCE, *given, setting=setting, more=more
         )
-
-
-def _num_maps(sweep: Sweep) -> int:
-    return len({(each.base, *each.values[:-2]) for each in sweep.conditions})
 
 
 def _more(count: int) -> str:

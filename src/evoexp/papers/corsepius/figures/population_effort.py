@@ -14,7 +14,7 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.report import kit
 from evoexp.report.figures.boxes import JITTER
-from evoexp.report.kit import style
+from evoexp.report.kit import marks, style
 
 SHARE, EFFORT, RATIO = "share", "effort", "ratio"
 NUMBERS = "abcdef"
@@ -120,7 +120,7 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
 
 def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> None:
     """Draw one line with intervals per task, side by side."""
-    axes.axvline(marked, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+    marks.dashed(axes, marked)
     share = table["kind"].iloc[0] == SHARE
     scale = 100.0 if share else 1.0
     known = table.replace(np.inf, np.nan).dropna(subset="expected").sort_values("value")

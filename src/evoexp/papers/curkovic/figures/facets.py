@@ -14,6 +14,8 @@ from evoexp.report.kit import ConditionResults, Results, grouped, groups, quanti
 
 Trait = Callable[[ConditionResults], str]
 MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own
+LEGEND: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (-0.02, -0.2), "ncols": 2}
+LEGEND |= {"fontsize": 6.5}
 DIRECTIONS = {"one_sided": "Eq. 9 one-sided", "symmetric": "Eq. 9 symmetric"}
 
 
@@ -66,11 +68,11 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
     finite = table["median"].replace([np.inf], np.nan)
     figure, panels = _panels(table)
     for axes, (_, rows) in zip(panels, groups(table.assign(median=finite), "panel"), strict=True):
-        _lines(axes, rows, "median", "default", lambda own: str(own["name"].iloc[0]))
+        _lines(axes, rows, "median", "default", "{name}")
         threshold = float(rows["threshold"].iloc[0])
         axes.axhline(threshold, color=style.NEUTRAL, lw=1.0, ls=(0, (4, 2)), label="threshold")
         axes.set_ylabel("best cost so far (median)")
-        _legend(axes)
+        axes.legend(**LEGEND)
     return figure
 
 
@@ -78,15 +80,10 @@ def draw_effort(table: pd.DataFrame) -> Figure:
     """Draw the share of all runs that have reached the cost, as steps."""
     figure, panels = _panels(table)
     for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
-        _lines(axes, rows, "reached", "steps-post", _counted)
+        _lines(axes, rows, "reached", "steps-post", "{name} ({reaching} of {runs})")
         axes.set(ylim=(-0.02, 1.02), ylabel="share of runs")
-        _legend(axes)
+        axes.legend(**LEGEND)
     return figure
-
-
-def _counted(rows: pd.DataFrame) -> str:
-    first = rows.iloc[0]
-    return f"{first['name']} ({first['reaching']} of {first['runs']})"
 
 
 def _panels(table: pd.DataFrame) -> tuple[Figure, list[Axes]]:
@@ -99,19 +96,15 @@ def _panels(table: pd.DataFrame) -> tuple[Figure, list[Axes]]:
     return figure, panels
 
 
-def _lines(
-    axes: Axes, rows: pd.DataFrame, column: str, steps: Any, label: Callable[[pd.DataFrame], str]
-) -> None:
+def _lines(axes: Axes, rows: pd.DataFrame, column: str, steps: Any, label: str) -> None:
+    """Draw a line per condition; `label` is filled in by its columns."""
     several = rows.groupby("generation")["evaluations"].nunique().max() > 1
     across = "evaluations" if several else "generation"
     for position, own in groups(rows, "position"):
         colour = style.condition_colour(int(position))
-        axes.plot(own[across], own[column], color=colour, drawstyle=steps, label=label(own))
+        name = label.format_map(own.iloc[0])
+        axes.plot(own[across], own[column], color=colour, drawstyle=steps, label=name)
     axes.set(xlabel=across, xlim=(0, float(rows[across].max())), title=rows["title"].iloc[0])
-
-
-def _legend(axes: Axes) -> None:
-    axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.2), ncols=2, fontsize=6.5)
 
 
 def _medians(rows: Any, column: str) -> FloatArray:

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
-from evoexp.collision.models.link_crossings import closed_form
+from evoexp.collision.planar.closed_form import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
@@ -30,7 +30,7 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
     k = int(np.argmin(off))
     rows: list[tuple[Any, ...]] = []
     for robot, arm in enumerate((one, two)):
-        elbow_x, elbow_y, tip_x, tip_y = arm.points(links[k, robot].reshape(1, 2, 1))[0, :, 0]
+        elbow_x, elbow_y, tip_x, tip_y = arm.outlines(links[k, robot].reshape(1, 2, 1))[0, :4, 0]
         angles = links[k, robot] / DEGREE
         rows += [
             (VECTORS[2 * robot], *arm.base, elbow_x, elbow_y, angles[0]),

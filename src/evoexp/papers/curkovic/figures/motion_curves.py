@@ -88,12 +88,9 @@ def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
         angles.plot(at["instant"], at["angle_deg"], "o", color=colour, **style.DOTS)
         limit = float(rows["limit_deg"].iloc[0])
         turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
-        turns.annotate(
-            f"link {int(link) + 1}: {limit:.1f}°",
-            (1.01, limit),
-            xycoords=turns.get_yaxis_transform(),
-            fontsize=6.5,
-            va="bottom" if link else "top",  # the limits may be close
+        # the limits may be close
+        marks.beside(
+            turns, limit, f"link {int(link) + 1}: {limit:.1f}°", va="bottom" if link else "top"
         )
     turns.set_ylim(bottom=0.0)
 

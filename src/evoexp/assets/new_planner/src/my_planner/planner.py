@@ -13,8 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredBodies
-from evoexp.collision.models.touching_spheres import TouchingSpheres
+from evoexp.collision.bodies.covered_bodies import CoveredBodies
+from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion

@@ -1,0 +1,1 @@
+"""Bodies of robots as spheres, capsules and circles, and the kernels that test them."""

@@ -1,0 +1,278 @@
+"""A robot's bodies as the fast kernels test them, and the pairs of bodies worth testing.
+
+There are two models: sphere sets, generated from the bodies' coal geometry (Corsépius 2001, section
+5), and one capsule per body. Both cover the bodies, so a posture that is free by the model is free
+on coal's geometry.
+"""
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_pairs import BodyPairs, body_pairs
+from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.box_support import coal
+from evoexp.collision.covers.body_covers import (
+    Cover,
+    around_cylinder,
+    capsule_cover,
+    given_cover,
+)
+from evoexp.collision.covers.inner_balls import inner_balls
+from evoexp.collision.covers.kept_covers import kept_sphere_cover
+from evoexp.collision.derived_pairs import Pair
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+from evoexp.scenarios.obstacles import ObstacleTable
+from evoexp.validation import Component, NonNegative, Positive
+
+SLACK = 1e-6  # [length unit] by which covers are made smaller than it takes
+SMALLEST = 1e-6  # [length unit] radius of a cover
+
+
+class CollisionModel(Component):
+    """Base of the collision models that cover bodies: sphere sets and capsules."""
+
+    @property
+    def asked(self) -> float:
+        """How far covers are asked to reach beyond bodies at most [length unit]; inf: no matter."""
+        return np.inf
+
+    def cover(self, item: Any) -> Cover:
+        """Return the cover that stands for a geometry object."""
+        raise NotImplementedError
+
+    def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
+        """Return the cover of a robot's body, for which spheres may be given."""
+        return self.cover(item)
+
+    def bind(self, assembly: Assembly) -> "BodyModel":
+        """Return the model of a robot.
+
+        Raises:
+            UnsupportedShape: If a body cannot be covered.
+        """
+        items, given = list(assembly.geometry.geometryObjects), assembly.spheres or {}
+        covers = tuple(self.cover_of(item, given.get(item.name)) for item in items)
+        bodies = zip(covers, (item.parentJoint for item in items), strict=True)
+        shapes = Shapes.joined(_shapes(*body, number) for number, body in enumerate(bodies))
+        return BodyModel(assembly, covers, shapes, body_pairs(assembly, shapes), self.asked)
+
+
+class SphereSets(CollisionModel):
+    """Bodies as sets of spheres that cover them."""
+
+    component: ClassVar[str] = "sphere_sets"
+
+    # how far spheres may reach beyond a body; less takes more spheres [length unit]
+    inflation: Positive
+
+    @property
+    def asked(self) -> float:
+        """The inflation."""
+        return self.inflation
+
+    def cover(self, item: Any) -> Cover:
+        """Return spheres around a geometry object."""
+        return kept_sphere_cover(item, self.inflation)
+
+    def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
+        """Return the given spheres; spheres around a body for which there are none."""
+        return self.cover(item) if given is None or len(given) == 0 else given_cover(item, given)
+
+
+class BodyCapsules(CollisionModel):
+    """Bodies as one capsule each that covers them; balls and capsules as they are."""
+
+    component: ClassVar[str] = "body_capsules"
+
+    padding: NonNegative  # by how much every capsule is thicker than it must be [length unit]
+    # whether the capsule of a cylinder is as thick as the cylinder and reaches beyond its
+    # faces, or lies along its longest edge and is thicker: what moves upright over a floor is
+    # covered best by the first
+    around_cylinders: bool = False
+
+    def cover(self, item: Any) -> Cover:
+        """Return the capsule around a geometry object."""
+        is_around = self.around_cylinders and isinstance(item.geometry, coal.Cylinder)
+        found = around_cylinder(item) if is_around else capsule_cover(item)
+        return found._replace(
+            radius=found.radius + self.padding, inflation=found.inflation + self.padding
+        )
+
+
+class BodyModel(NamedTuple):
+    """A robot's bodies, covered."""
+
+    assembly: Assembly  # the robot
+    covers: tuple[Cover, ...]  # one per body
+    shapes: Shapes  # all of them; a shape's body is its index among the geometry objects
+    sorted_pairs: BodyPairs  # pairs of bodies, by who judges them
+    asked: float = np.inf  # how far covers are asked to reach beyond bodies at most [length unit]
+    # bodies whose covers were made smaller (`fitted`), and by how much
+    shrunk: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def uncovered(self) -> tuple[tuple[str, float], ...]:
+        """Names of bodies that stand out of their covers, and how far [length unit]."""
+        named = zip(self.names, self.covers, strict=True)
+        return tuple((name, cover.uncovered) for name, cover in named if cover.uncovered > 0.0)
+
+    @property
+    def wider(self) -> tuple[tuple[str, float], ...]:
+        """Names of bodies whose covers reach farther than asked, and how far [length unit]."""
+        named = zip(self.names, self.covers, strict=True)
+        most = self.asked * (1.0 + 1e-6)
+        return tuple((name, cover.inflation) for name, cover in named if cover.inflation > most)
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Pairs of bodies that a search tests."""
+        return self.sorted_pairs.tested
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the bodies."""
+        return tuple(item.name for item in self.assembly.geometry.geometryObjects)
+
+    @property
+    def inflation(self) -> float:
+        """How far a cover reaches beyond its body, or a mesh's convex hull, at most."""
+        return max(cover.inflation for cover in self.covers)
+
+    def described(self, unit: str) -> str:
+        """Return a line on the covers: how many, and how far they reach [length unit]."""
+        items = self.assembly.geometry.geometryObjects
+        meshes = any(isinstance(item.geometry, coal.BVHModelBase) for item in items)
+        beyond = "them, or the convex hulls of meshes" if meshes else "them"
+        return (
+            f"{len(self.names)} bodies covered by {self.num_shapes} spheres and capsules, which "
+            f"reach at most {self.inflation:.3g} {unit} beyond {beyond}"
+        )
+
+    @property
+    def num_shapes(self) -> int:
+        """Spheres and capsules of all bodies."""
+        return len(self.shapes.joint)
+
+    def collision(
+        self,
+        obstacles: ObstacleTable,
+        ignored: tuple[Pair, ...] = (),
+        carried: "Carried | None" = None,
+    ) -> BodyCollision:
+        """Return the collision model among obstacles.
+
+        Args:
+            ignored: Pairs (body, obstacle) that may touch.
+            carried: An object that is part of the robot now; its number is one past the bodies'.
+        """
+        shapes, pairs, arms = self.shapes, self.pairs, self.assembly.body_arms
+        model = self.assembly.model
+        of_joint = [-1] * model.njoints
+        for arm, item in zip(arms, self.assembly.geometry.geometryObjects, strict=True):
+            of_joint[item.parentJoint] = arm if item.parentJoint else -1
+        if carried is not None:
+            own = len(self.covers)
+            shapes = Shapes.joined([shapes, _shapes(carried.cover, carried.joint, own)])
+            pairs = (*pairs, *((body, own) for body in carried.watched))
+        table = self.assembly.table
+        return BodyCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
+
+    def touching(
+        self,
+        obstacles: ObstacleTable,
+        allowed: tuple[Pair, ...],
+        depth: float,
+        carried: "Carried | None" = None,
+    ) -> BodyCollision | None:
+        """Return the model of the pairs that may touch: what is inside of bodies must stay free.
+
+        Args:
+            allowed: Pairs (body, obstacle) that may touch.
+            depth: How deep they may overlap [length unit].
+            carried: See `collision`.
+
+        Returns:
+            A model whose clearances to obstacles are negative where a pair overlaps too deep; None
+            without such pairs.
+        """
+        items, own = list(self.assembly.geometry.geometryObjects), len(self.covers)
+        inner: dict[int, Shapes] = {}
+        for body in sorted({body for body, _ in allowed}):
+            if body == own and carried is not None:
+                inner[body] = _shapes(carried.inner, carried.joint, body)
+            elif (cover := inner_balls(items[body], depth)) is not None:
+                inner[body] = _shapes(cover, items[body].parentJoint, body)
+        if not inner:
+            return None
+        shapes = Shapes.joined(inner.values())
+        every = ((body, k) for body in inner for k in range(len(obstacles.kind)))
+        ignored = tuple(pair for pair in every if pair not in allowed)
+        model, table = self.assembly.model, self.assembly.table
+        arms = [0] * model.njoints
+        return BodyCollision.build(model, shapes, obstacles, (), ignored, arms, table)
+
+    def fitted(
+        self, obstacles: ObstacleTable, ignored: tuple[Pair, ...], q: FloatArray
+    ) -> "BodyModel":
+        """Return bodies whose covers do not touch at configurations where the bodies do not.
+
+        Covers that touch an obstacle are made smaller; pairs of bodies whose covers touch are no
+        longer tested. What a search does not see any more is left to the certifier.
+
+        Args:
+            obstacles: What does not move.
+            ignored: Pairs (body, obstacle) that may touch.
+            q: (nq, configurations) [rad] at which nothing touches.
+        """
+        model, radius, shrunk = self.assembly.model, self.shapes.radius.copy(), []
+        for body in range(len(self.covers)):
+            own = self.shapes.labels == body
+            if not self.shapes.joint[own].all():  # what stands still is not tested
+                continue
+            alone = self._replace(shapes=self.shapes.of(own), sorted_pairs=BodyPairs((), ()))
+            skipped = tuple(pair for pair in ignored if pair[0] == body)
+            least = float(alone.collision(obstacles, skipped).clearance(q).to_obstacles.min())
+            if least < 0.0:
+                radius[own] = np.maximum(radius[own] - (SLACK - least), SMALLEST)
+                shrunk.append((body, SLACK - least))
+        shapes = self.shapes._replace(radius=radius)
+        touching = tuple(
+            pair
+            for pair in self.pairs
+            if BodyCollision.of_pair(model, shapes, pair).collides(q).any()
+        )
+        tested = tuple(pair for pair in self.pairs if pair not in touching)
+        pairs = self.sorted_pairs._replace(tested=tested, fitted=touching)
+        return self._replace(shapes=shapes, sorted_pairs=pairs, shrunk=tuple(shrunk))
+
+    def fitting_notes(self, where: str, unit: str) -> list[str]:
+        """Describe the covers made smaller, and the pairs left to the certifier, by `fitted`."""
+        lines, names = [], self.names
+        if self.shrunk:
+            sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
+            lines.append(
+                f"covers made smaller, since they touch an obstacle at {where} where the bodies do "
+                f"not: {sizes}"
+            )
+        if pairs := self.sorted_pairs.fitted:
+            named = ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
+            lines.append(f"covers touch at {where}, left to the certifier: {named}")
+        return lines
+
+
+class Carried(NamedTuple):
+    """An object that became part of a robot's geometry."""
+
+    joint: int  # that moves it
+    cover: Cover  # in the joint's frame
+    inner: Cover  # shapes inside it, in the joint's frame, see `inner_balls`
+    watched: tuple[int, ...]  # bodies of the robot that it must not touch
+
+
+def _shapes(cover: Cover, joint: int, body: int) -> Shapes:
+    """Return a cover as shapes of one body."""
+    joints, bodies = (np.full(len(cover.radius), number) for number in (joint, body))
+    return Shapes(joints, cover.start, cover.end, cover.radius, bodies)

@@ -1,0 +1,164 @@
+"""Which pairs of a robot's bodies a search tests, by covers, and which the certifier alone judges.
+
+A robot whose pairs were derived when its files were read (`derived_pairs`) brings them along. Of
+other robots, pairs that never touch are proven to, and so nobody judges them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.body_table import body_table
+from evoexp.collision.box_support import coal
+from evoexp.collision.derived_pairs import (
+    DerivedPairs,
+    Pair,
+    are_neighbours,
+    contacts_seen,
+    joint_limits,
+    sampled_configurations,
+)
+from evoexp.collision.motion_bounds import pair_reaches, reaches
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+
+SAMPLES = 1000  # random postures by which pairs that always touch are found
+GRID, COARSE_GRID = 128, 48  # values per joint by which pairs that never touch are proven
+
+
+class BodyPairs(NamedTuple):
+    """All pairs of a robot's bodies, sorted."""
+
+    tested: tuple[Pair, ...]  # pairs that a search tests and the certifier judges
+    # pairs on one joint or on neighbouring ones, or disabled: nobody judges them
+    adjacent: tuple[Pair, ...]
+    always: tuple[Pair, ...] = ()  # pairs that touch in every posture sampled: nobody judges them
+    never: tuple[Pair, ...] = ()  # pairs that are proven never to touch: nobody judges them
+    # pairs that touch in no posture sampled: only the certifier judges them
+    unseen: tuple[Pair, ...] = ()
+    # pairs whose covers touch in every posture sampled although the bodies do not: only the
+    # certifier judges them
+    overlapping: tuple[Pair, ...] = ()
+    # pairs whose covers touch at the start or the goal although the bodies do not: only the
+    # certifier judges them
+    fitted: tuple[Pair, ...] = ()
+
+    @property
+    def judged(self) -> tuple[Pair, ...]:
+        """Pairs that the certifier judges."""
+        return (*self.tested, *self.unseen, *self.overlapping, *self.fitted)
+
+
+def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
+    """Sort the pairs of a robot's bodies.
+
+    Args:
+        shapes: The covers of its bodies.
+    """
+    items = list(assembly.geometry.geometryObjects)
+    names = {
+        (a, b): frozenset((one.name, two.name))
+        for a, one in enumerate(items)
+        for b, two in enumerate(items[a + 1 :], start=a + 1)
+    }
+    adjacent = [
+        pair
+        for pair, named in names.items()
+        if named in assembly.disabled or are_neighbours(assembly, *pair)
+    ]
+    apart = [pair for pair in names if pair not in adjacent]
+    q = sampled_configurations(assembly, SAMPLES)
+    if not apart or q is None:
+        return BodyPairs(tuple(apart), tuple(adjacent))
+    if assembly.pairs is None:
+        touched, parted = contacts_seen(assembly, apart, SAMPLES)
+        always = {pair for pair, seen in zip(apart, parted, strict=True) if not seen}
+        unseen = {pair for pair, seen in zip(apart, touched, strict=True) if not seen}
+    else:
+        derived = DerivedPairs.from_json(assembly.pairs)
+        always = {pair for pair in apart if names[pair] in derived.always}
+        unseen = {pair for pair in apart if names[pair] in derived.never}
+    groups: dict[str, list[Pair]] = {
+        name: [] for name in ("tested", "always", "never", "unseen", "overlapping")
+    }
+    for pair in apart:
+        if pair in always:
+            group = "always"
+        elif assembly.pairs is not None and pair in unseen:
+            group = "unseen"
+        elif pair in unseen and _never_touch(assembly, shapes, pair):
+            group = "never"
+        elif BodyCollision.of_pair(assembly.model, shapes, pair).collides(q).all():
+            group = "overlapping"
+        else:
+            group = "tested"
+        groups[group].append(pair)
+    sorted_pairs = {name: tuple(pairs) for name, pairs in groups.items()}
+    return BodyPairs(adjacent=tuple(adjacent), **sorted_pairs)
+
+
+def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
+    """Return whether two bodies are proven to stay apart.
+
+    The proof takes a grid over the joints between them and a bound of their motion within a step.
+    The distances are those of the covers or, where these are too close, coal's on a coarser grid.
+    Pairs with more than two joints between them are never proven, and so always tested.
+    """
+    items, table = list(assembly.geometry.geometryObjects), assembly.table
+    bodies = body_table(table, [items[body] for body in pair])
+    strokes = np.abs(joint_limits(assembly)).max(axis=0)
+    reach = reaches(table.chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
+    way = pair_reaches(np.array([[0, 1]], dtype=np.int64), reach)[0]  # (joints,)
+    # joints that follow others share their coordinates
+    way = np.asarray(
+        np.bincount(table.index_q, way * np.abs(table.rule[:, 0]), table.num_coordinates),
+        dtype=np.float64,
+    )
+    moving = np.flatnonzero(way > 0.0)
+    if len(moving) > 2:
+        return False
+    q, slack = _grid(assembly, moving, way, GRID)
+    if float(BodyCollision.of_pair(assembly.model, shapes, pair).clearance(q).least.min()) > slack:
+        return True
+    q, slack = _grid(assembly, moving, way, COARSE_GRID)
+    return bool(_coal_distances(assembly, pair, q).min() > slack)
+
+
+def _grid(
+    assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int
+) -> tuple[FloatArray, float]:
+    """Return configurations on a grid, and a bound of a distance's change within half a step.
+
+    Args:
+        moving: Indices of the coordinates that the grid spans.
+        way: (nq,) bound of |d distance / dq| by coordinate.
+        size: Values per coordinate.
+
+    Returns:
+        (nq, n) configurations, and the bound [length unit].
+    """
+    low, high = joint_limits(assembly)
+    step = (high[moving] - low[moving]) / size
+    values = [low[c] + s * (np.arange(size) + 0.5) for c, s in zip(moving, step, strict=True)]
+    grid = np.meshgrid(*values, indexing="ij") if len(moving) else []
+    q = np.repeat(0.5 * (low + high)[:, None], grid[0].size if grid else 1, axis=1)
+    for column, value in zip(moving, grid, strict=True):
+        q[column] = value.ravel()
+    return q, float(np.sum(way[moving] * 0.5 * step))
+
+
+def _coal_distances(assembly: Assembly, pair: Pair, q: FloatArray) -> FloatArray:
+    """Return the distances of two bodies, (configurations,)."""
+    model, data = assembly.model, assembly.model.createData()
+    items = [assembly.geometry.geometryObjects[body] for body in pair]
+    request, result, out = coal.DistanceRequest(), coal.DistanceResult(), np.empty(q.shape[1])
+    for n in range(q.shape[1]):
+        pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
+        places = [data.oMi[item.parentJoint] * item.placement for item in items]
+        one, two = (coal.Transform3s(place.rotation, place.translation) for place in places)
+        result.clear()
+        out[n] = coal.distance(items[0].geometry, one, items[1].geometry, two, request, result)
+    return out

@@ -1,0 +1,339 @@
+"""Kernel of clearances: the least ones of bodies made of spheres and capsules.
+
+Eight configurations at a time, as vectors (`numeric.vectors`): forward kinematics; the centres of
+balls around bodies and parts of bodies; balls against obstacles and against each other. What no
+ball rules out in any of the eight is measured exactly. Bounds are widened by `MARGIN`, so rounding
+rules out no contact, and the result does not depend on what was skipped.
+
+Where robots are made of spheres alone and only yes or no is asked for, `contact_kernels` answers.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.collision.bodies.body_tables import (
+    AROUND,
+    FIRST_BALL,
+    FIRST_CAPSULE,
+    FIRST_PART,
+    FIRST_RUN,
+    JOINT,
+    REACH,
+    STOP_CAPSULE,
+    STOP_ENTRY,
+    STOP_PART,
+    STOP_RUN,
+    THICKNESS,
+    BodyTables,
+    FlatTables,
+    named_tables,
+)
+from evoexp.collision.bodies.capsule_distances import (
+    Segments,
+    nearest_on_segments,
+    segment_to_point,
+    segment_to_segments,
+)
+from evoexp.collision.bodies.contact_kernels import find_contacts
+from evoexp.collision.bodies.distances import (
+    MARGIN,
+    POINT,
+    Motion,
+    Place,
+    Row,
+    distance_from_core,
+    move_spheres,
+    moved_point,
+    place_point,
+    point_at,
+    seen_from,
+    spheres_to_spheres,
+    squared_distance,
+    turned,
+)
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.vectors import (
+    LANES,
+    Vector,
+    any_lane,
+    load,
+    lower,
+    magnitude,
+    select,
+    spread,
+    store,
+    upper,
+)
+from evoexp.records import FloatArray
+from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, eight_of, spatial_frames
+from evoexp.robots.kinematics import SPATIAL_ROWS, U
+from evoexp.scenarios.obstacles import HALF_SPACE
+
+
+class Memory(NamedTuple):
+    """Scratch for eight configurations."""
+
+    q: FloatArray  # (nq · LANES,) the last ones of a batch, padded
+    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
+    middles: FloatArray  # (units · POINT,) centres of the balls
+    centers: FloatArray  # (spheres · POINT,) a body's, seen from another
+    least: FloatArray  # (3 · LANES,) rows OBSTACLES, BETWEEN, SELF of the clearances so far
+
+
+@kernel
+def least_clearances(
+    tables: FlatTables, limit: float, decide: bool, q: FloatArray, out: FloatArray
+) -> None:
+    """Write the least clearances of a batch of configurations.
+
+    Args:
+        tables: Of `tables.flattened`.
+        limit: Above it no clearance is measured [length unit].
+        decide: Whether only their sign is asked for: all rows are the same then, and negative where
+            anything overlaps. The limit is 0.
+        q: (nq, configurations) [rad], lengths for joints that slide; contiguous.
+        out: (3, configurations), written: rows OBSTACLES, BETWEEN, SELF; NaN where q holds NaN.
+    """
+    named, count = named_tables(tables[0], tables[1]), q.shape[1]
+    if decide and len(named.capsules) == 0:
+        hits = np.empty(count, dtype=np.bool_)
+        if find_contacts(tables, False, q, hits) == 0:
+            for row in range(3):
+                for n in range(count):
+                    out[row, n] = -np.inf if hits[n] else limit
+            return
+    memory = Memory(
+        np.zeros(U(q.shape[0]) * VECTOR),
+        np.empty(U(len(named.chain.parent) + 1) * SPATIAL_FRAME),
+        np.empty(U(len(named.units)) * POINT),
+        np.empty(U(len(named.spheres)) * POINT),
+        np.empty(3 * LANES),
+    )
+    _least_clearances(named, limit, decide, q.reshape(-1), count, out, memory)
+
+
+@kernel
+def _least_clearances(
+    tables: BodyTables,
+    limit: float,
+    decide: bool,
+    q: FloatArray,
+    count: int,
+    out: FloatArray,
+    memory: Memory,
+) -> None:
+    """Do the work of `least_clearances` in given memory, so that no loop counts references."""
+    tables, q, out, memory = borrowed((tables, q, out, memory))
+    units, middles, least = tables.units, memory.middles, memory.least
+    world = U(len(tables.chain.parent)) * SPATIAL_FRAME
+    for row in range(SPATIAL_ROWS):
+        one = 1.0 if row in (0, 4, 8) else 0.0
+        store(memory.frames, world + U(row) * VECTOR, spread(one))
+    for first in range(0, count, LANES):
+        # frames of the joints, centres of the balls
+        eight, sound = eight_of(q, first, count, memory.q), spread(0.0)
+        spatial_frames(tables.chain, eight, 1.0, memory.frames)
+        for b in range(len(units)):
+            place_point(memory.frames, units[b, JOINT], tables.balls[b], middles, U(b))
+            x, y, z = point_at(middles, U(b))
+            sound = sound + x * 0.0 + y * 0.0 + z * 0.0
+        # the limit, NaN where q holds NaN; then exact distances where a ball is nearer
+        for row in range(3):
+            store(least, U(row) * VECTOR, limit + sound)
+        # from the tip, which is nearest to most obstacles, to the base
+        for b in range(len(units) - 1, -1, -1):
+            for t in range(units[b, FIRST_BALL], units[b, STOP_ENTRY]):
+                _meet_obstacle(tables, memory, b, tables.owners[t], decide)
+        for p in range(len(tables.pairs)):
+            _meet_body(tables, memory, p, decide)
+        for row in range(3):
+            own = 0 if decide else row * LANES
+            for lane in range(min(LANES, count - first)):
+                out[row, first + lane] = least[own + lane]
+
+
+@inlined
+def _lower(memory: Memory, row: np.uint64, found: Vector, decide: bool) -> None:
+    """Lower a row of the least clearances; NaN stays.
+
+    Where only the sign is asked for, nothing is nearer than what overlaps.
+    """
+    so_far = load(memory.least, row)
+    if decide:
+        found = select(found < 0.0, spread(-np.inf), found)
+    store(memory.least, row, select(found < so_far, found, so_far))
+
+
+@inlined
+def _is_near(tables: BodyTables, memory: Memory, unit: int, o: int) -> bool:
+    """Return whether a unit's ball may be nearer to an obstacle than the clearance so far.
+
+    The obstacle's ball is tested first, then the box that it is, or that is around it.
+    """
+    center, turn, core = tables.obstacles.center[o], tables.obstacles.rotation[o], tables.cores[o]
+    reach, least, zero = tables.balls[unit, REACH], load(memory.least, U(0)), spread(0.0)
+    middle = point_at(memory.middles, U(unit))
+    if tables.obstacles.kind[o] == HALF_SPACE:
+        level = turn[2] * center[0] + turn[5] * center[1] + turn[8] * center[2]
+        height = turn[2] * middle[0] + turn[5] * middle[1] + turn[8] * middle[2] - level
+        return any_lane(height < least + (reach * MARGIN + abs(level) * (MARGIN - 1.0)))
+    within = upper(zero, (least + (reach + core[AROUND]) * MARGIN) * MARGIN)
+    square = squared_distance(middle, (center[0], center[1], center[2]))
+    if not any_lane(square < within * within):
+        return False
+    within = (least + (reach + core[THICKNESS]) * MARGIN) * MARGIN
+    x, y, z = seen_from(center, turn, middle)
+    u, v, w = magnitude(x) - core[0], magnitude(y) - core[1], magnitude(z) - core[2]
+    deeper = upper(upper(u, v), w) < lower(zero, within)
+    within = upper(zero, within)
+    u, v, w = upper(u, zero), upper(v, zero), upper(w, zero)
+    return any_lane((u * u + v * v + w * w < within * within) | deeper)
+
+
+@inlined
+def _meet_obstacle(tables: BodyTables, memory: Memory, b: int, o: int, decide: bool) -> None:
+    """Lower the clearance from obstacles to that of a body from one; far parts are skipped."""
+    units = tables.units
+    if not _is_near(tables, memory, b, o):
+        return
+    center, turn = tables.obstacles.center[o], tables.obstacles.rotation[o]
+    # the motion from the body's frame to the obstacle's
+    motion = _seen_from(
+        (turn[0], turn[1], turn[2], center[0]),
+        (turn[3], turn[4], turn[5], center[1]),
+        (turn[6], turn[7], turn[8], center[2]),
+        _frame(memory.frames, units[b, JOINT]),
+    )
+    first, stop = units[b, FIRST_PART], units[b, STOP_PART]
+    for part in range(first, stop):
+        if stop - first == 1 or _is_near(tables, memory, part, o):
+            _lower(memory, U(0), _from_obstacle(tables, part, o, motion), decide)
+
+
+@inlined
+def _from_obstacle(tables: BodyTables, unit: int, o: int, motion: Motion) -> Vector:
+    """Return the clearances of a unit from an obstacle into whose frame a motion leads."""
+    units, runs, spheres, capsules = tables.units, tables.runs, tables.spheres, tables.capsules
+    kind, core, least = tables.obstacles.kind[o], tables.cores[o], spread(np.inf)
+    for run in range(units[unit, FIRST_RUN], units[unit, STOP_RUN]):
+        for i in range(runs[run, 0], runs[run, 1]):
+            point = moved_point(motion, spheres[i, 0], spheres[i, 1], spheres[i, 2])
+            distance = distance_from_core(kind, core, point)
+            least = lower(least, distance - (core[THICKNESS] + spheres[i, 3]))
+    for i in range(units[unit, FIRST_CAPSULE], units[unit, STOP_CAPSULE]):
+        point = nearest_on_segments(kind, core, _moved_axis(motion, capsules[i]))
+        distance = distance_from_core(kind, core, point)
+        least = lower(least, distance - (core[THICKNESS] + capsules[i, 6]))
+    return least
+
+
+@inlined
+def _are_near(tables: BodyTables, memory: Memory, one: int, two: int, row: np.uint64) -> bool:
+    """Return whether the balls around two units may be nearer than the clearance so far."""
+    margin = (tables.balls[one, REACH] + tables.balls[two, REACH]) * MARGIN
+    within = upper(spread(0.0), (load(memory.least, row) + margin) * MARGIN)
+    a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
+    return any_lane(squared_distance(a, b) < within * within)
+
+
+@inlined
+def _meet_body(tables: BodyTables, memory: Memory, p: int, decide: bool) -> None:
+    """Lower a row of clearances to that of a pair of bodies; far parts are skipped."""
+    pairs = tables.pairs
+    one, two, first, stop = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
+    row = U(0) if decide else U(pairs[p, 4]) * VECTOR
+    if _are_near(tables, memory, one, two, row):
+        for t in range(first, stop):
+            a, b = tables.parts[t, 0], tables.parts[t, 1]
+            if _are_near(tables, memory, a, b, row):
+                _lower(memory, row, _between(tables, memory, a, b), decide)
+
+
+@inlined
+def _between(tables: BodyTables, memory: Memory, one: int, two: int) -> Vector:
+    """Return the clearances of two units, as seen from the first one's frame."""
+    units, runs, spheres, capsules = tables.units, tables.runs, tables.spheres, tables.capsules
+    centers, least = memory.centers, spread(np.inf)
+    x, y, z = _frame(memory.frames, units[one, JOINT])
+    motion = _seen_from(x, y, z, _frame(memory.frames, units[two, JOINT]))
+    first, stop = units[two, FIRST_RUN], units[two, STOP_RUN]
+    begin, end = (runs[first, 0], runs[stop - 1, 1]) if first < stop else (0, 0)
+    move_spheres(motion, spheres, begin, end, centers)
+    # the second's spheres against the first's spheres and capsules
+    for run in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
+        least = spheres_to_spheres(runs, spheres, run, first, stop, centers, least)
+    for i in range(units[one, FIRST_CAPSULE], units[one, STOP_CAPSULE]):
+        for j in range(begin, end):
+            distance = segment_to_point(
+                _axis(capsules[i]), capsules[i, 7], point_at(centers, U(j - begin))
+            )
+            least = lower(least, distance - (capsules[i, 6] + spheres[j, 3]))
+    # the second's capsules against both
+    for j in range(units[two, FIRST_CAPSULE], units[two, STOP_CAPSULE]):
+        segments, thickness = _moved_axis(motion, capsules[j]), capsules[j, 6]
+        for run in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
+            for i in range(runs[run, 0], runs[run, 1]):
+                center = spheres[i, 0], spheres[i, 1], spheres[i, 2]
+                distance = segment_to_point(segments, capsules[j, 7], center)
+                least = lower(least, distance - (thickness + spheres[i, 3]))
+        for i in range(units[one, FIRST_CAPSULE], units[one, STOP_CAPSULE]):
+            distance = segment_to_segments(capsules[i], segments, capsules[j, 7])
+            least = lower(least, distance - (capsules[i, 6] + thickness))
+    return least
+
+
+@inlined
+def _axis(capsule: FloatArray) -> Segments:
+    """Return a capsule's constant axis."""
+    return Segments((capsule[0], capsule[1], capsule[2]), (capsule[3], capsule[4], capsule[5]))
+
+
+@inlined
+def _moved_axis(motion: Motion, capsule: FloatArray) -> Segments:
+    """Return a capsule's axis after a motion."""
+    x, y, z = capsule[3], capsule[4], capsule[5]
+    axis = turned(motion[0], x, y, z), turned(motion[1], x, y, z), turned(motion[2], x, y, z)
+    return Segments(moved_point(motion, capsule[0], capsule[1], capsule[2]), axis)
+
+
+@inlined
+def _frame(frames: FloatArray, joint: int) -> Motion:
+    """Return the frames of a joint, or of the world."""
+    j = U(joint) * SPATIAL_FRAME
+    return _frame_row(frames, j, 0), _frame_row(frames, j, 1), _frame_row(frames, j, 2)
+
+
+@inlined
+def _frame_row(frames: FloatArray, j: np.uint64, e: int) -> Row:
+    """Return row e of frames: three numbers of the rotation, one of the origin."""
+    x, origin = j + U(3 * e) * VECTOR, j + U(9 + e) * VECTOR
+    return (
+        load(frames, x),
+        load(frames, x + VECTOR),
+        load(frames, x + U(2) * VECTOR),
+        load(frames, origin),
+    )
+
+
+@inlined
+def _seen_from(x: Row, y: Row, z: Row, frame: Motion) -> Motion:
+    """Return frames as seen from the frames whose rows are x, y and z, vectors or numbers."""
+    shift = frame[0][3] - x[3], frame[1][3] - y[3], frame[2][3] - z[3]
+    return (
+        _column_seen(x[0], y[0], z[0], frame, shift),
+        _column_seen(x[1], y[1], z[1], frame, shift),
+        _column_seen(x[2], y[2], z[2], frame, shift),
+    )
+
+
+@inlined
+def _column_seen(a: Vector, b: Vector, c: Vector, frame: Motion, shift: Place) -> Row:
+    """Return the columns of frames and a shift, along the direction (a, b, c)."""
+    x, y, z = frame
+    return (
+        a * x[0] + b * y[0] + c * z[0],
+        a * x[1] + b * y[1] + c * z[1],
+        a * x[2] + b * y[2] + c * z[2],
+        a * shift[0] + b * shift[1] + c * shift[2],
+    )

@@ -1,0 +1,252 @@
+"""Points that joints move, and distances of spheres from spheres and obstacles, eight at a time.
+
+A point of eight configurations is three vectors (`numeric.vectors`) side by side.
+"""
+
+import numpy as np
+
+from evoexp.collision.bodies.body_tables import THICKNESS, BodyTables
+from evoexp.numeric.compilation import inlined
+from evoexp.numeric.vectors import Vector, load, lower, magnitude, root, spread, store, upper
+from evoexp.records import FloatArray, IntArray
+from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
+from evoexp.robots.kinematics import U
+from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE, SPHERE
+
+MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
+
+POINT = U(3) * VECTOR
+"""Numbers of a point of eight configurations: x, y, z."""
+
+Row = tuple[Vector, Vector, Vector, Vector]
+Motion = tuple[Row, Row, Row]
+"""Eight rigid motions: per coordinate a row of the rotation, and the translation."""
+
+Place = tuple[Vector, Vector, Vector]
+"""Eight points or directions: x, y, z."""
+
+
+@inlined
+def turned(row: Row, x: float, y: float, z: float) -> Vector:
+    """Return a coordinate of a constant direction after a motion."""
+    return row[0] * x + row[1] * y + row[2] * z
+
+
+@inlined
+def moved_point(motion: Motion, x: float, y: float, z: float) -> Place:
+    """Return a constant point after a motion."""
+    return (
+        turned(motion[0], x, y, z) + motion[0][3],
+        turned(motion[1], x, y, z) + motion[1][3],
+        turned(motion[2], x, y, z) + motion[2][3],
+    )
+
+
+@inlined
+def point_at(points: FloatArray, k: np.uint64) -> Place:
+    """Return a point that `place_point` or `move_spheres` wrote."""
+    own = U(k) * POINT
+    return load(points, own), load(points, own + VECTOR), load(points, own + U(2) * VECTOR)
+
+
+@inlined
+def place_point(
+    frames: FloatArray, joint: int, local: FloatArray, points: FloatArray, k: np.uint64
+) -> None:
+    """Write a point that a joint moves.
+
+    Args:
+        frames: Of `spatial_frames`.
+        joint: Index into the kinematic table.
+        local: (≥ 3,) the point in the table's frame [length unit].
+        points: (≥ (k + 1) · POINT,) written.
+        k: Which of them it is.
+    """
+    j, x, y, z = U(joint) * SPATIAL_FRAME, local[0], local[1], local[2]
+    for row in range(3):
+        a, o = j + U(3 * row) * VECTOR, j + U(9 + row) * VECTOR
+        along = (
+            load(frames, a) * x + load(frames, a + VECTOR) * y + load(frames, a + U(2) * VECTOR) * z
+        )
+        store(points, U(k) * POINT + U(row) * VECTOR, load(frames, o) + along)
+
+
+@inlined
+def move_spheres(
+    motion: Motion, spheres: FloatArray, begin: int, end: int, centers: FloatArray
+) -> None:
+    """Write the centres of some spheres after a motion, one behind the other.
+
+    Args:
+        motion: From their body's frame to another one.
+        spheres: (spheres, 4) centres in the body's frame, and radii.
+        begin: First sphere.
+        end: One past the last.
+        centers: (≥ spheres · POINT,) written.
+    """
+    for j in range(begin, end):
+        x, y, z = moved_point(motion, spheres[j, 0], spheres[j, 1], spheres[j, 2])
+        o = U(j - begin) * POINT
+        store(centers, o, x)
+        store(centers, o + VECTOR, y)
+        store(centers, o + U(2) * VECTOR, z)
+
+
+@inlined
+def squared_distance(a: Place, b: Place | tuple[float, float, float]) -> Vector:
+    """Return the squared distance of two points, each of vectors or numbers."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    square: Vector = x * x + y * y + z * z
+    return square
+
+
+@inlined
+def seen_from(center: FloatArray, turn: FloatArray, point: Place) -> Place:
+    """Return a point as seen from an obstacle's frame, whose rotation has rows `turn` (9,)."""
+    x, y, z = point[0] - center[0], point[1] - center[1], point[2] - center[2]
+    return (
+        turn[0] * x + turn[3] * y + turn[6] * z,
+        turn[1] * x + turn[4] * y + turn[7] * z,
+        turn[2] * x + turn[5] * y + turn[8] * z,
+    )
+
+
+@inlined
+def distance_from_core(kind: int, core: FloatArray, point: Place) -> Vector:
+    """Return the signed distance of a point in an obstacle's frame from the obstacle's core.
+
+    The core of spheres, capsules and boxes is a box, with edges of length 0 where needed.
+
+    Args:
+        kind: Of the obstacle.
+        core: A row of `BodyTables.cores`, whose thickness is left to the caller.
+        point: Seen from the obstacle's frame.
+    """
+    x, y, z = point
+    if kind == HALF_SPACE:
+        return z
+    nothing, w = spread(0.0), magnitude(z) - core[2]
+    if kind == CYLINDER:
+        u = root(x * x + y * y) - core[0]
+        inside = lower(upper(u, w), nothing)
+        u, w = upper(u, nothing), upper(w, nothing)
+        return root(u * u + w * w) + inside
+    u, v = magnitude(x) - core[0], magnitude(y) - core[1]
+    inside = lower(upper(upper(u, v), w), nothing)
+    u, v, w = upper(u, nothing), upper(v, nothing), upper(w, nothing)
+    return root(u * u + v * v + w * w) + inside
+
+
+@inlined
+def nearest_to_obstacle(
+    tables: BodyTables, o: int, centers: FloatArray, first: np.uint64, stop: np.uint64
+) -> Vector:
+    """Return the least signed distance of some points from an obstacle's surface.
+
+    Args:
+        centers: (spheres · POINT,).
+        first: First point.
+        stop: One past the last.
+    """
+    kind, center, core = tables.obstacles.kind[o], tables.obstacles.center[o], tables.cores[o]
+    least, turn = spread(np.inf), tables.obstacles.rotation[o]
+    if kind == SPHERE:  # one square root for all
+        middle = center[0], center[1], center[2]
+        for k in range(first, stop):
+            least = lower(least, squared_distance(point_at(centers, U(k)), middle))
+        beyond: Vector = root(least) - core[THICKNESS]
+        return beyond
+    for k in range(first, stop):
+        point = seen_from(center, turn, point_at(centers, U(k)))
+        least = lower(least, distance_from_core(kind, core, point))
+    clearance: Vector = least - core[THICKNESS]
+    return clearance
+
+
+@inlined
+def nearest(
+    centers: FloatArray, one: np.uint64, end: np.uint64, first: np.uint64, stop: np.uint64
+) -> Vector:
+    """Return the least squared distance between two ranges of points [length unit²].
+
+    Args:
+        centers: (spheres · POINT,).
+        one: First point of one range.
+        end: One past its last.
+        first: First point of the other.
+        stop: One past its last.
+    """
+    i, least = one, spread(np.inf)
+    # four of them are held in registers
+    while i + U(3) < end:
+        p, q = point_at(centers, i), point_at(centers, i + U(1))
+        r, s = point_at(centers, i + U(2)), point_at(centers, i + U(3))
+        a, b, c, d = least, least, least, least
+        for j in range(first, stop):
+            other = point_at(centers, U(j))
+            a, b = lower(a, squared_distance(p, other)), lower(b, squared_distance(q, other))
+            c, d = lower(c, squared_distance(r, other)), lower(d, squared_distance(s, other))
+        least = lower(lower(a, b), lower(c, d))
+        i += U(4)
+    # the rest one by one
+    while i < end:
+        p = point_at(centers, i)
+        for j in range(first, stop):
+            least = lower(least, squared_distance(p, point_at(centers, U(j))))
+        i += U(1)
+    return least
+
+
+@inlined
+def spheres_to_spheres(
+    runs: IntArray,
+    spheres: FloatArray,
+    one: int,
+    other: int,
+    other_stop: int,
+    centers: FloatArray,
+    least: Vector,
+) -> Vector:
+    """Lower a clearance to the distances of a run of constant spheres from moved ones.
+
+    Args:
+        runs: (runs, 2) first and one-past-last sphere of equal radius.
+        spheres: See `move_spheres`.
+        one: The run.
+        other: First run of the other body.
+        other_stop: One past its last.
+        centers: Of `move_spheres`, of the other body.
+        least: The clearance so far [length unit].
+    """
+    base = runs[other, 0] if other < other_stop else 0
+    for two in range(other, other_stop):
+        square = spread(np.inf)
+        for j in range(runs[two, 0], runs[two, 1]):
+            center = point_at(centers, U(j - base))
+            square = _nearest_constant(spheres, runs[one, 0], runs[one, 1], center, square)
+        both = spheres[runs[one, 0], 3] + spheres[runs[two, 0], 3]
+        least = lower(least, root(square) - both)
+    return least
+
+
+@inlined
+def _nearest_constant(
+    spheres: FloatArray, first: int, stop: int, center: Place, square: Vector
+) -> Vector:
+    """Lower a squared distance to the least of a moved centre from constant ones."""
+    # two chains of minima: the next does not wait for the last
+    i, other = first, square
+    while i + 1 < stop:
+        square = lower(square, squared_distance(center, _constant(spheres, i)))
+        other = lower(other, squared_distance(center, _constant(spheres, i + 1)))
+        i += 2
+    if i < stop:
+        square = lower(square, squared_distance(center, _constant(spheres, i)))
+    nearest_of_both: Vector = lower(square, other)
+    return nearest_of_both
+
+
+@inlined
+def _constant(spheres: FloatArray, i: int) -> tuple[float, float, float]:
+    """Return a sphere's centre in its body's frame."""
+    return spheres[i, 0], spheres[i, 1], spheres[i, 2]

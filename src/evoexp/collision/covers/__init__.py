@@ -1,0 +1,1 @@
+"""Sphere covers of bodies, and shapes within bodies."""

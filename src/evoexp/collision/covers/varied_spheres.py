@@ -1,0 +1,173 @@
+"""Spheres of different radii that cover a convex body, and reach beyond it no farther than asked.
+
+A ball around a point within a convex body that lies d deep may be d + i wide: no point of it is
+farther than i from the body. Deep points so cover much at once. The body is cut into small cells,
+and balls are chosen one after the other, each that which contains most of the cells left. A cell is
+done when one ball contains all that it has of the body, so the balls contain the body.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.collision.covers.covered_solids import Solid
+from evoexp.records import BoolArray, FloatArray
+
+FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to its corners
+DEEP = 0.25  # [-] of a cell's depth: the same, of a cell within
+MOST_CELLS = 120_000
+OF_A_CELL = 0.3  # [-] of its edge squared: at least the surface per cell (seen: .05 to .24)
+COARSER = 1.25  # [-] by which the inflation grows where balls do not suffice
+CANDIDATES = 800  # middles of balls, within the body
+AT_ONCE = 64  # cells that are compared with all candidates together
+COAL_ERROR = 1e-5  # [-] of a body's size: more than that of its distances
+LESS = 1.0 - 1e-9  # of a ball's radius: more than rounding
+
+
+class Balls(NamedTuple):
+    """Balls around a body."""
+
+    centers: FloatArray  # (balls, 3)
+    radii: FloatArray  # (balls,) [length unit]
+    reach: float  # how far they reach beyond the body at most [length unit]
+
+
+class _Cells(NamedTuple):
+    """Balls that hold a body together, each around the part of it in one cube."""
+
+    middles: FloatArray  # (cells, 3)
+    sizes: FloatArray  # (cells,) radii
+
+
+def varied_spheres(solid: Solid, inflation: float, most: int, farthest: float) -> Balls | None:
+    """Cover a hull with balls that reach as far as asked, or as little more as they can.
+
+    Args:
+        inflation: How far the balls may reach beyond it [length unit].
+        most: Number of balls that is not exceeded; where so many do not suffice, the inflation
+            grows.
+        farthest: What the inflation stays below [length unit].
+
+    Returns:
+        The balls; None if so many do not suffice.
+    """
+    edge, cells = np.inf, None  # of the smallest cells, on which all of them depend
+    while inflation < farthest:
+        if edge != (edge := _cell_edge(solid, inflation)):
+            cells = _cells(solid, edge)
+        if cells is not None and (found := _balls(solid, inflation, most, cells)) is not None:
+            return found
+        inflation *= COARSER
+    return None
+
+
+def _balls(solid: Solid, inflation: float, most: int, cells: _Cells) -> Balls | None:
+    """Choose balls that contain all cells together; None if so many do not suffice."""
+    kept: list[tuple[FloatArray, FloatArray]] = []
+    left = np.ones(len(cells.middles), dtype=np.bool_)
+    # deep balls first; whatever they leave is covered by balls around the cells themselves
+    for centers in (_within(solid, cells), cells.middles):
+        if not left.any():
+            break
+        if centers is cells.middles:
+            centers = centers[left]
+        radii = inflation - solid.far(centers)
+        wide = radii > 0.0
+        budget = most - sum(len(each) for each, _ in kept)
+        chosen = _chosen(centers[wide], radii[wide], cells, left, budget)
+        kept.append((centers[wide][chosen], radii[wide][chosen]))
+        if sum(len(each) for each, _ in kept) >= most and left.any():
+            return None
+    if left.any():
+        return None
+    return Balls(
+        np.vstack([centers for centers, _ in kept]),
+        np.concatenate([radii for _, radii in kept]),
+        inflation,
+    )
+
+
+def _cell_edge(solid: Solid, inflation: float) -> float:
+    """Return the edge of the cells at the surface, which halves the body's longest."""
+    edge = float((solid.high - solid.low).max())
+    while 0.5 * edge * float(np.sqrt(3.0)) > FINE * inflation:
+        edge *= 0.5
+    return edge
+
+
+def _cells(solid: Solid, least: float) -> _Cells | None:
+    """Cut a body into cubes, the smallest at its surface; None if they are too many."""
+    if solid.area > MOST_CELLS * OF_A_CELL * least * least:
+        return None
+    edge = float((solid.high - solid.low).max())
+    slack = COAL_ERROR * edge
+    middles = 0.5 * (solid.low + solid.high)[None]
+    found: list[_Cells] = []
+    count = 0
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.25
+    while len(middles) > 0:
+        half = 0.5 * edge * float(np.sqrt(3.0))
+        height, normals = solid.heights(middles)
+        # beyond a sharp edge a point is far from the body, however low above its planes
+        distance, above = height.copy(), np.flatnonzero((height > 0.0) & (height <= half))
+        distance[above] = np.maximum(height[above], solid.far(middles[above]) - slack)
+        met = distance <= half
+        middles, height, normals = middles[met], height[met], normals[met]
+        small = (edge <= least) | (half <= -DEEP * height)
+        # of a cell whose middle is outside, what lies below the plane: a cap, less than half a ball
+        out = np.maximum(height[small], 0.0)
+        onto = middles[small] - out[:, None] * normals[small]
+        found.append(_Cells(onto, np.sqrt(np.maximum(half * half - out * out, 0.0)) / LESS))
+        count += int(small.sum())
+        middles = (middles[~small][:, None] + edge * corners).reshape(-1, 3)
+        edge *= 0.5
+        if count + len(middles) > 8 * MOST_CELLS or count > MOST_CELLS:
+            return None
+    return _Cells(
+        np.vstack([each.middles for each in found]),
+        np.concatenate([each.sizes for each in found]),
+    )
+
+
+def _within(solid: Solid, cells: _Cells) -> FloatArray:
+    """Return points on a lattice within a body, where deep balls have their middles."""
+    edges = solid.high - solid.low
+    step = float(np.prod(edges) / CANDIDATES) ** (1.0 / 3.0)
+    counts = np.maximum(np.ceil(edges / max(step, 1e-300)), 1.0).astype(int)
+    axes = [
+        low + edge * (np.arange(n) + 0.5) / n
+        for low, edge, n in zip(solid.low, edges, counts, strict=True)
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.asarray(points[solid.heights(points)[0] < 0.0])
+
+
+def _chosen(
+    centers: FloatArray, radii: FloatArray, cells: _Cells, left: BoolArray, most: int
+) -> list[int]:
+    """Choose balls, at most so many, each that which contains most of the cells left.
+
+    Cells that a chosen ball contains are struck off `left`.
+    """
+    if len(centers) == 0:
+        return []
+    where = np.flatnonzero(left)
+    middles, sizes = cells.middles[where], cells.sizes[where]
+    contains = np.empty((len(where), len(centers)), dtype=np.bool_)  # a row per cell
+    reached = radii * LESS
+    for k in range(0, len(where), AT_ONCE):
+        own = slice(k, k + AT_ONCE)
+        x, y, z = (middles[own, None, e] - centers[:, e] for e in range(3))
+        room = np.maximum(reached - sizes[own, None], 0.0)
+        contains[own] = (x * x + y * y + z * z <= room * room) & (room > 0.0)
+    counts = contains.sum(axis=0)
+    found: list[int] = []
+    waiting = np.ones(len(where), dtype=np.bool_)
+    while len(found) < most and counts.max() > 0:
+        best = int(counts.argmax())
+        found.append(best)
+        new = waiting & contains[:, best]
+        counts -= contains[new].sum(axis=0)
+        waiting &= ~new
+    left[where[~waiting]] = False
+    return found

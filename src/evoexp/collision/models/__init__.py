@@ -1,1 +1,0 @@
-"""Collision models of the planners: the papers' own."""

@@ -1,0 +1,234 @@
+"""The collision model of Lavoie & Boudreau 2001: a planar arm's links as lines among ellipses."""
+
+from functools import cache
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.planar.ellipse_kernels import Ellipses, TestedPath, gap, paths_collide
+from evoexp.errors import SettingError
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.vectors import LANES
+from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.assembly import Assembly
+from evoexp.robots.planar_ends import PlanarArm, block_ends, planar_arm
+from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
+from evoexp.validation import Component, LayoutCount
+
+NUM_FIRST = 1  # positions tested before chords are swept, so that few blocks go all the way
+
+
+class LinkEllipses(Component):
+    """Exact tests of positions and chords along a joint-space line; contact is collision."""
+
+    component: ClassVar[str] = "link_ellipses"
+
+    # M of Eq. 3: equally spaced positions that are tested, the end included, the start not
+    num_positions: LayoutCount
+    # whether the chord of every link end from one position to the next must be free, too
+    swept: Literal["none", "chords"]
+    blind: bool = False  # whether obstacles are ignored (a control: its solutions must collide)
+
+    def bind(self, assembly: Assembly, obstacles: ObstacleTable) -> "EllipseCollision":
+        """Return the model of an arm among obstacles.
+
+        Raises:
+            SettingError: If the robot is no single planar arm of thin links, or an obstacle no
+                ellipse in its plane.
+        """
+        arm = planar_arm(assembly)
+        if thick := [link.radius for link in assembly.links if link.radius > 0.0]:
+            raise SettingError(
+                "robot.link_radius", "0: this collision model knows links as lines", thick[0]
+            )
+        for k, (kind, center) in enumerate(zip(obstacles.kind, obstacles.center, strict=True)):
+            if kind != ELLIPSE or center[2] != 0.0:
+                raise SettingError(
+                    f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind)
+                )
+        seen = 0 if self.blind else len(obstacles.kind)
+        columns = obstacles.center, obstacles.rotation, obstacles.size
+        rows = list(zip(*columns, strict=True))[:seen]
+        maps = np.array([_to_unit_circle(*row) for row in rows]).reshape(-1, 5)
+        reached = np.array([_first_link(arm, *row) for row in rows], dtype=np.int64)
+        ellipses, swept = Ellipses(maps, reached), self.swept == "chords"
+        return EllipseCollision(arm, ellipses, self.num_positions, swept, obstacles)
+
+
+class Contact(NamedTuple):
+    """The first contact of a path."""
+
+    position: int  # j of Eq. 3.
+    obstacle: int  # counted from 1
+    link: int  # link, or link end if it was swept, counted from 1
+    swept: bool  # whether the chord of a link end, between positions j − 1 and j, touches
+
+
+class EllipseCollision(NamedTuple):
+    """An arm among ellipses."""
+
+    arm: PlanarArm  # link lengths and base
+    ellipses: Ellipses  # the ellipses as the kernels read them
+    num_positions: int  # m
+    chords: bool  # whether chords are swept
+    obstacles: ObstacleTable  # the obstacle table
+
+    @property
+    def num_tests(self) -> int:
+        """Pairs of shapes that one configuration has: links and ellipses."""
+        return len(self.arm.lengths) * len(self.ellipses.maps)
+
+    @property
+    def path(self) -> TestedPath:
+        """The positions tested: the end, halves, quarters, …; all again if chords are swept."""
+        return _tested_path(self.num_positions, self.chords)
+
+    @property
+    def queries(self) -> int:
+        """Configurations that judging one path asks for; none if there is nothing to meet."""
+        return self.num_positions if len(self.ellipses.maps) else 0
+
+    def collide(self, starts: FloatArray, ends: FloatArray) -> BoolArray:
+        """Return which paths collide, (individuals,).
+
+        Args:
+            starts: (N, individuals) relative joint angles [rad].
+            ends: (N, individuals).
+
+        Raises:
+            ValueError: If their shapes are others.
+        """
+        num = len(self.arm.lengths)
+        if starts.shape != ends.shape or starts.ndim != 2 or len(starts) != num:
+            raise ValueError(
+                f"starts and ends must be ({num}, individuals), were {starts.shape} and "
+                f"{ends.shape}"
+            )
+        lanes = np.arange(starts.shape[1])
+        hit = np.zeros(len(lanes), dtype=np.bool_)
+        starts, ends = (np.ascontiguousarray(q, dtype=np.float64) for q in (starts, ends))
+        paths_collide(starts, ends, lanes, len(lanes), self.arm, self.ellipses, self.path, hit)
+        return hit
+
+    def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
+        """Return the first contact of a path between postures (N,) [rad]; None if it is free."""
+        start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
+        position, obstacle, link, swept = _first_contact(
+            start, end, self.arm, self.ellipses, self.num_positions, self.chords
+        )
+        return None if position < 0 else Contact(position, obstacle + 1, link, bool(swept))
+
+
+class EllipseConfigurations:
+    """The model of Lavoie & Boudreau 2001 at single configurations, without chords."""
+
+    def __init__(self, collision: EllipseCollision) -> None:
+        """Take the model of paths."""
+        self._collision = collision._replace(num_positions=1, chords=False)
+
+    def collides(self, q: FloatArray) -> BoolArray:
+        """Return which configurations (N, count) [deg] collide, (count,)."""
+        angles = np.ascontiguousarray(DEGREE * q)
+        return self._collision.collide(angles, angles)
+
+    def any_collides(self, q: FloatArray) -> bool:
+        """Whether any of the configurations (N, count) [deg] collides."""
+        return bool(self.collides(q).any())
+
+
+@kernel
+def _first_contact(
+    start: FloatArray,
+    end: FloatArray,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    num_positions: int,
+    chords: bool,
+) -> tuple[int, int, int, bool]:
+    """Find the first contact of one path, by position, ellipse and link, chords before links.
+
+    Args:
+        start: (N,) joint angles at the start [rad].
+        end: (N,) at the end.
+        num_positions: M.
+        chords: Whether chords are swept.
+
+    Returns:
+        Position; index of the ellipse; link, or link end, from 1; whether the chord of that end
+        touches. −1, −1, −1 and false if nothing touches.
+    """
+    num = len(start)
+    begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)
+    x, y = np.empty((2, (num + 1) * LANES)), np.empty((2, (num + 1) * LANES))
+    block_ends(begin, stop, arm, 0, num_positions, x[0], y[0])
+    for position in range(1, num_positions + 1):
+        old, new = (position + 1) % 2, position % 2
+        block_ends(begin, stop, arm, position, num_positions, x[new], y[new])
+        for e in range(len(ellipses.maps)):
+            ellipse = ellipses.maps[e]
+            for k in range(num + 1):
+                at, root = k * LANES, max(k - 1, 0) * LANES
+                here = _mapped(ellipse, x[new, at], y[new, at])
+                if chords and _meets(_mapped(ellipse, x[old, at], y[old, at]), here):
+                    return position, e, k, True
+                if _meets(_mapped(ellipse, x[new, root], y[new, root]), here):
+                    return position, e, k, False
+    return -1, -1, -1, False
+
+
+@kernel
+def _mapped(ellipse: FloatArray, x: float, y: float) -> tuple[float, float]:
+    """Return a point in an ellipse's frame."""
+    return ellipse[0] * x + ellipse[1] * y + ellipse[2], ellipse[3] * y + ellipse[4]
+
+
+@kernel
+def _meets(one: tuple[float, float], two: tuple[float, float]) -> bool:
+    """Return whether a segment, given by its `_mapped` ends, touches the unit circle."""
+    return bool(gap(one[0], one[1], two[0], two[1]) <= 0.0)
+
+
+def _to_unit_circle(
+    center: FloatArray, rotation: FloatArray, size: FloatArray
+) -> tuple[float, ...]:
+    """Return a … e of the map (x, y) → (a x + b y + c, d y + e) of an ellipse to the unit circle.
+
+    The map is the Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without
+    cancellation.
+    """
+    (cosine, sine), one, two = (rotation[0], rotation[3]), 1.0 / size[0], 1.0 / size[1]
+    a = float(np.sqrt(cosine * one * cosine * one + sine * two * sine * two))
+    b, d = float(cosine * sine * (one * one - two * two) / a), float(one * two / a)
+    return a, b, float(-(a * center[0] + b * center[1])), d, float(-d * center[1])
+
+
+def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: FloatArray) -> int:
+    """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box, else N + 2."""
+    lengths, c, s = arm.lengths, rotation[0], rotation[3]
+    wide = np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2)
+    high = np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2)
+    half = np.array([wide, high])
+    off = np.maximum(np.abs(center[:2] - (arm.base_x, arm.base_y)) - half, 0.0)
+    nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
+    within = np.flatnonzero(np.cumsum(lengths) >= nearest)
+    return int(within[0]) + 1 if len(within) else len(lengths) + 2
+
+
+@cache
+def _tested_path(num_positions: int, chords: bool) -> TestedPath:
+    """Return the positions that are tested, made once: every judged plan asks for them."""
+    first = _spread(num_positions)
+    return TestedPath(num_positions, first[:NUM_FIRST] if chords else first, chords)
+
+
+def _spread(num_positions: int) -> IntArray:
+    """Return 1 … M in an order that spreads: M, the middle, the quarters, …."""
+    order, parts = [num_positions], 2
+    while len(order) < num_positions:
+        for k in range(1, parts, 2):
+            position = max(1, round(k * num_positions / parts))
+            if position not in order:
+                order.append(position)
+        parts *= 2
+    return np.array(order, dtype=np.int64)

@@ -1,0 +1,231 @@
+"""Planar arms of two links: where their lines and envelopes are, and when two of them touch.
+
+Curkovic, Jerbic & Stipancic 2013. Each arm has an absolute angle per link, from +x. A link is its
+line (section 3); or it is two boundary lines, parallel to it, and a circle of variable radius lies
+around the tool centre point (section 4, Fig. 11). Boundary lines have no ends across: an arm may
+lie between another's two lines unnoticed, as in the paper.
+
+Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, of the second x, y.
+Lines need the first four rows only.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.collision.planar.segment_predicates import contact_tolerance, meeting, squared_distance
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import exact_sincos
+from evoexp.records import FloatArray
+from evoexp.robots.kinematics import U
+
+Point = tuple[float, float]
+
+POINT_ROWS, OUTLINE_ROWS = 4, 8
+
+
+class Arm(NamedTuple):
+    """A planar arm of two links, with its envelope [length unit of the scene]."""
+
+    base: Point  # x, y of its first joint
+    lengths: Point  # of its links; 0 is allowed
+    half_width: float = 0.0  # distance of the boundary lines from their link; 0: the link itself
+    tcp_radius: float = 0.0  # of the circle around the tip; 0: no circle
+
+    @property
+    def is_enveloped(self) -> bool:
+        """Whether the arm is more than its lines."""
+        return self.half_width > 0.0 or self.tcp_radius > 0.0
+
+    @property
+    def in_floats(self) -> "Arm":
+        """The same arm, its numbers as kernels take them."""
+        (x, y), (first, second) = self.base, self.lengths
+        base, lengths = (float(x), float(y)), (float(first), float(second))
+        return Arm(base, lengths, float(self.half_width), float(self.tcp_radius))
+
+    def outlines(self, q: FloatArray) -> FloatArray:
+        """Return the outlines of a population, (K, 8, N).
+
+        Args:
+            q: (K, 2, N) angles of the links from +x [rad].
+
+        Raises:
+            ValueError: If q has another shape.
+        """
+        q = checked("q", q, 2)
+        outlines = np.empty((q.shape[0], OUTLINE_ROWS, q.shape[2]))
+        write_outlines(q, self.in_floats, outlines)
+        return outlines
+
+
+def checked(name: str, array: FloatArray, *rows: int) -> FloatArray:
+    """Return an array of a population, contiguous.
+
+    Raises:
+        ValueError: If it is not (configurations, one of some numbers of rows, individuals).
+    """
+    array = np.ascontiguousarray(array, dtype=np.float64)
+    if array.ndim != 3 or array.shape[1] not in rows:
+        allowed = " or ".join(map(str, rows))
+        raise ValueError(
+            f"{name} must have shape (configurations, {allowed}, individuals), was {array.shape}"
+        )
+    return array
+
+
+def path_configurations(
+    genes: FloatArray, start: FloatArray, goal: FloatArray, collision_substeps: int
+) -> FloatArray:
+    """Return the configurations at which a path is tested.
+
+    The path start → genes → goal, straight in joint angles, is cut into equal parts. Start and goal
+    themselves are left out: they are checked before any search. With one substep the configurations
+    are the genes.
+
+    Args:
+        genes: (K, 2, N) [rad].
+        start: (2,) [rad].
+        goal: (2,) [rad].
+        collision_substeps: Parts per segment [-].
+
+    Returns:
+        Configurations ((K + 1) · collision_substeps − 1, 2, N) [rad]; every `collision_substeps`-th
+        is a gene's own.
+
+    Raises:
+        ValueError: If a shape does not fit, or collision_substeps is below 1.
+    """
+    genes = checked("genes", genes, 2)
+    if collision_substeps < 1:
+        raise ValueError(f"collision_substeps must be at least 1, was {collision_substeps}")
+    for name, end in (("start", start), ("goal", goal)):
+        if np.shape(end) != (2,):
+            raise ValueError(f"{name} must have shape (2,), was {np.shape(end)}")
+    num = genes.shape[2]
+    before, after = (np.repeat(np.reshape(end, (1, 2, 1)), num, axis=2) for end in (start, goal))
+    corners = np.concatenate([before, genes, after])[:, None]
+    shares = (np.arange(1, collision_substeps + 1) / collision_substeps)[:, None, None]
+    parts = corners[:-1] + shares * (corners[1:] - corners[:-1])
+    parts[:, -1] = corners[1:, 0]  # a gene's own configuration, without rounding
+    return np.ascontiguousarray(parts.reshape(-1, 2, num)[:-1])
+
+
+@kernel
+def write_outlines(q: FloatArray, arm: Arm, outlines: FloatArray) -> None:
+    """Write elbows and tips (Eq. 11), and the links' directions where there is room for them.
+
+    Args:
+        q: (K, 2, N) angles of the links from +x [rad].
+        arm: Its base and lengths count.
+        outlines: (K, 4 | 8, N), written.
+    """
+    num_configurations, rows, count = outlines.shape
+    (base_x, base_y), (first, second) = arm.base, arm.lengths
+    angles, flat, num = q.reshape(-1), outlines.reshape(-1), U(count)
+    for k in range(num_configurations):
+        x = U(rows * k) * num
+        y, z, w = x + num, x + U(2) * num, x + U(3) * num
+        for link in range(2):
+            _write_directions(angles, U(2 * k + link) * num, count, flat, x + U(2 * link) * num)
+        if rows == OUTLINE_ROWS:
+            for n in range(4 * count):
+                flat[x + U(4) * num + U(n)] = flat[x + U(n)]
+        # the elbow from the base, the tip from the elbow
+        for n in range(count):
+            flat[x + U(n)] = base_x + first * flat[x + U(n)]
+            flat[y + U(n)] = base_y + first * flat[y + U(n)]
+        for n in range(count):
+            flat[z + U(n)] = flat[x + U(n)] + second * flat[z + U(n)]
+            flat[w + U(n)] = flat[y + U(n)] + second * flat[w + U(n)]
+
+
+@kernel
+def _write_directions(
+    angles: FloatArray, begin: np.uint64, count: int, out: FloatArray, x: np.uint64
+) -> None:
+    """Write cosines, then sines, of a row of angles to x on, exact at multiples of 90°."""
+    y = x + U(count)
+    for n in range(count):
+        sine, cosine = exact_sincos(angles[begin + U(n)])
+        out[x + U(n)] = cosine
+        out[y + U(n)] = sine
+
+
+@kernel
+def tolerance_of(arm_1: Arm, arm_2: Arm) -> float:
+    """Return the `contact_tolerance` of two arms [length unit]."""
+    return contact_tolerance(max(largest_coordinate(arm_1), largest_coordinate(arm_2)))
+
+
+@kernel
+def largest_coordinate(arm: Arm) -> float:
+    """Return the greatest coordinate that an arm can reach [length unit]."""
+    (x, y), (first, second) = arm.base, arm.lengths
+    return max(abs(x), abs(y)) + first + second + (arm.half_width + arm.tcp_radius)
+
+
+@kernel
+def num_boundaries(arm: Arm) -> int:
+    """Return the number of an arm's lines: its links, or two boundary lines for each of them."""
+    return 4 if arm.half_width > 0.0 else 2
+
+
+@kernel
+def boundary(
+    arm: Arm, outlines: FloatArray, k: int, n: int, line: int
+) -> tuple[float, float, float, float]:
+    """Return the ends (x, y, x, y) of a line: right and left of the first link, then the second."""
+    link, x, y = line, 0.0, 0.0
+    if arm.half_width > 0.0:
+        link, side = line // 2, 2.0 * (line % 2) - 1.0
+        c, s = outlines[k, 4 + 2 * link, n], outlines[k, 5 + 2 * link, n]
+        x, y = -(side * arm.half_width * s), side * arm.half_width * c
+    elbow_x, elbow_y = outlines[k, 0, n], outlines[k, 1, n]
+    if link == 0:
+        return arm.base[0] + x, arm.base[1] + y, elbow_x + x, elbow_y + y
+    return elbow_x + x, elbow_y + y, outlines[k, 2, n] + x, outlines[k, 3, n] + y
+
+
+@kernel
+def colliding(
+    arm_1: Arm,
+    outlines_1: FloatArray,
+    i: int,
+    arm_2: Arm,
+    outlines_2: FloatArray,
+    j: int,
+    k: int,
+    tolerance: float,
+) -> bool:
+    """Return whether two individuals collide in configuration k, the lines decided exactly.
+
+    What is at most a tolerance apart touches.
+    """
+    radius_1, radius_2 = arm_1.tcp_radius, arm_2.tcp_radius
+    # circle against circle
+    cx, cy = outlines_1[k, 2, i], outlines_1[k, 3, i]
+    fx, fy = outlines_2[k, 2, j], outlines_2[k, 3, j]
+    if _near((fx - cx) * (fx - cx) + (fy - cy) * (fy - cy), radius_1 + radius_2, tolerance):
+        return True
+    # lines of arm 1 against the circle and the lines of arm 2
+    for one in range(num_boundaries(arm_1)):
+        ax, ay, bx, by = boundary(arm_1, outlines_1, k, i, one)
+        if _near(squared_distance(ax, ay, bx, by, fx, fy), radius_2, tolerance):
+            return True
+        for two in range(num_boundaries(arm_2)):
+            dx, dy, ex, ey = boundary(arm_2, outlines_2, k, j, two)
+            if meeting(ax, ay, bx, by, dx, dy, ex, ey, tolerance):
+                return True
+    # lines of arm 2 against the circle of arm 1
+    for two in range(num_boundaries(arm_2)):
+        dx, dy, ex, ey = boundary(arm_2, outlines_2, k, j, two)
+        if _near(squared_distance(dx, dy, ex, ey, cx, cy), radius_1, tolerance):
+            return True
+    return False
+
+
+@kernel
+def _near(squared: float, radius: float, tolerance: float) -> bool:
+    """Return whether a squared distance from the centre of a circle is in it; of radius 0: none."""
+    return radius > 0.0 and squared <= (radius + tolerance) * (radius + tolerance)

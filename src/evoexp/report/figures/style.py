@@ -1,0 +1,344 @@
+"""The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
+
+import contextlib
+import io
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextvars import ContextVar
+from typing import Any, Literal, NamedTuple
+
+import matplotlib as mpl
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from evoexp.report.figures.fitted_texts import fit_texts
+from evoexp.report.figures.style_files import own_style, read_style_file
+
+ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
+CONDITION_COLOURS = (
+    "#332288",
+    "#CC6677",
+    "#117733",
+    "#DDAA33",
+    "#88CCEE",
+    "#882255",
+    "#44AA99",
+    "#999933",
+)  # Tol
+NUM_CURVE_COLOURS = 6  # that curves which cross are still told apart by
+CURVE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
+NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"
+ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+DOTS: dict[str, Any] = {"mec": "white", "ms": 5, "clip_on": False}  # configurations of a path
+THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
+FEW_DECADES = 30.0  # [-] last over first number of an axis, below which powers of ten are few
+WIDTH = 7.2  # [inch] of a figure over the whole page
+SMALLEST_TEXT = 3.0  # [pt] of a legend whose names are wide
+
+
+class Look(NamedTuple):
+    """How figures are drawn."""
+
+    width: Literal["page", "column"] = "page"  # over the whole page, or over one of two columns
+    # Path of a matplotlib style file, applied over evoexp's own style; None: that alone
+    style: str | None = None
+
+
+class _Scale(NamedTuple):
+    """Shares of the sizes of a figure over the whole page: its width, its height, its text."""
+
+    width: float
+    height: float
+    text: float
+
+
+_SCALES = {"page": _Scale(1.0, 1.0, 1.0), "column": _Scale(3.5 / WIDTH, 0.62, 0.78)}
+_scale: ContextVar[_Scale] = ContextVar("_scale", default=_SCALES["page"])
+_SCALED = ("size", "labelpad", "handlelength", ".major.pad", "_pad", "linewidth")
+"""Endings of the names of parameters that are sizes of text, or distances between parts."""
+
+PLAIN = Look()
+_FONT = b"'DejaVu Sans'"  # as matplotlib names it in an SVG
+_FONTS = b"'DejaVu Sans', Verdana, sans-serif"  # Verdana's letters are as wide
+
+# nothing that changes from one day, or one machine, to the next
+_METADATA: dict[str, dict[str, Any]] = {
+    "svg": {"Date": None, "Creator": "evoexp"},
+    "png": {"Software": "evoexp"},
+    "pdf": {"CreationDate": None, "Creator": "evoexp", "Producer": None},
+}
+
+
+def drawn(
+    draw: Callable[[], Figure], formats: Sequence[str], dpi: int, look: Look = PLAIN
+) -> dict[str, bytes]:
+    """Draw a figure in evoexp's style, whatever the user's own settings are.
+
+    Args:
+        draw: Gives the figure; called anew where a name is no formula, though it looks like one.
+        formats: File formats.
+        dpi: Resolution of raster formats [1/inch].
+        look: Width and style.
+
+    Returns:
+        One file per format; the same figure gives the same bytes.
+
+    Raises:
+        SettingError: If the style file is none of matplotlib's.
+    """
+    try:
+        return _drawn(draw, formats, dpi, look)
+    except ValueError:  # a name with a $ that begins no formula
+        return _drawn(draw, formats, dpi, look, formulas=False)
+
+
+def _drawn(
+    draw: Callable[[], Figure],
+    formats: Sequence[str],
+    dpi: int,
+    look: Look,
+    *,
+    formulas: bool = True,
+) -> dict[str, bytes]:
+    with _looking(look):
+        mpl.rcParams["text.parse_math"] = formulas
+        mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
+        figure, images = draw(), {}
+        FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
+        if engine := figure.get_layout_engine():  # arranged once, for all formats
+            engine.execute(figure)
+            if fit_texts(figure):  # what is broken into lines takes room from the others
+                engine.execute(figure)
+        figure.set_layout_engine(None)  # with "none" every file would be drawn twice
+        for kind in formats:
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
+            images[kind] = buffer.getvalue()
+    if "svg" in images:
+        images["svg"] = images["svg"].replace(_FONT, _FONTS)
+    return images
+
+
+@contextlib.contextmanager
+def _looking(look: Look) -> Iterator[None]:
+    """Let figures be drawn in a look, for as long as the context lasts."""
+    scale = _SCALES[look.width]
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        for name, value in own_style().items():
+            is_scaled = isinstance(value, float) and name.endswith(_SCALED)
+            mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
+        if look.style is not None:
+            for name, value in read_style_file(look.style).items():
+                mpl.rcParams[name] = value  # type: ignore[index]
+        token = _scale.set(scale)
+        try:
+            yield
+        finally:
+            _scale.reset(token)
+
+
+def figure(height: float, width: float = WIDTH) -> Figure:
+    """Return an empty figure that arranges itself [inch]; smaller where it is for a column."""
+    scale = _scale.get()
+    return Figure(figsize=(width * scale.width, height * scale.height), layout="constrained")
+
+
+def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+    """Return a figure of some height [inch], and its panels side by side.
+
+    In a column half as many stand side by side, the others below them.
+    """
+    columns = _side_by_side(count)
+    lines = -(-count // columns)
+    found = figure(height * lines)
+    panels = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
+    for unused in panels[count:]:
+        unused.remove()
+    return found, panels[:count]
+
+
+def lines_of_panels(
+    height: float, count: int, per_line: int, foot: float
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with some panels, and the panels, line by line.
+
+    Args:
+        height: Of a line [inch].
+        count: Number of panels.
+        per_line: Panels side by side at most; half as many in a column.
+        foot: Height below the panels, for a legend [inch].
+    """
+    columns = _side_by_side(min(count, per_line))
+    lines = -(-count // columns)
+    found = figure(height * lines + foot)
+    return found, [found.add_subplot(lines, columns, k + 1) for k in range(count)]
+
+
+def _side_by_side(count: int) -> int:
+    """Return how many of some panels stand side by side: in a column half as many."""
+    return count if _scale.get() is _SCALES["page"] else -(-count // 2)
+
+
+def begins_line(axes: Axes) -> bool:
+    """Whether a panel of a grid is the first one of its line."""
+    place = axes.get_subplotspec()
+    return place is not None and place.is_first_col()
+
+
+def ends_column(axes: Axes, panels: Sequence[Axes]) -> bool:
+    """Whether no other panel of a grid, filled line by line, stands below a panel."""
+    places = [place for panel in panels if (place := panel.get_subplotspec()) is not None]
+    own = axes.get_subplotspec()
+    return own is not None and not any(
+        place.colspan == own.colspan and place.rowspan.start > own.rowspan.start for place in places
+    )
+
+
+def arm_colour(arm: int) -> str:
+    """Return the colour of an arm, counted from 0."""
+    return ARM_COLOURS[arm % len(ARM_COLOURS)]
+
+
+def condition_colour(position: int) -> str:
+    """Return the colour of a condition by its position in the experiment."""
+    return CONDITION_COLOURS[position % len(CONDITION_COLOURS)]
+
+
+def curve_look(position: int) -> dict[str, Any]:
+    """Return the look of one of many curves: six colours, then the next line style.
+
+    A later curve is thinner, so that one below it is seen where both are equal.
+    """
+    line, colour = divmod(position, NUM_CURVE_COLOURS)
+    return {
+        "color": CONDITION_COLOURS[colour],
+        "linestyle": CURVE_STYLES[line % len(CURVE_STYLES)],
+        "linewidth": 2.2 - 0.2 * colour,
+    }
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text of so many signs at most; of a longer one the middle is left out."""
+    if len(text) <= most:
+        return text
+    return f"{text[: (most - 1) // 2]}…{text[len(text) - most // 2 :]}"
+
+
+def row_colour(position: int, count: int) -> str:
+    """Return the colour of a condition that has a row with its name to itself.
+
+    Where there are more conditions than colours none is repeated, which would join what does not
+    belong together: the first condition has its colour, all others are grey.
+    """
+    if count <= len(CONDITION_COLOURS) or position == 0:
+        return condition_colour(position)
+    return NEUTRAL
+
+
+def joint_symbol(arm: int, joint: int) -> str:
+    """Return the name of a joint angle: θ₁, α₂, …, both counted from 0."""
+    letter = ARM_SYMBOLS[arm] if arm < len(ARM_SYMBOLS) else f"q{arm + 1},"
+    return letter + str(joint + 1).translate(SUBSCRIPTS)
+
+
+def few_ticks() -> MaxNLocator:
+    """Return ticks that leave room in a small panel."""
+    return MaxNLocator(nbins=4)
+
+
+def shorten_thousands(axis: Axis) -> None:
+    """Write the numbers along an axis with k and M where they are large: 200 k."""
+    if axis.get_view_interval()[1] >= THOUSANDS:
+        axis.set_major_formatter(EngFormatter())
+
+
+def log_axis(axes: Axes, first: float, last: float) -> None:
+    """Make the horizontal axis logarithmic; a short one has numbers between powers of ten, too."""
+    axes.set(xscale="log", xlim=(first, last))
+    if last < FEW_DECADES * first:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(EngFormatter())
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def operational_axes(axes: Axes, unit: str) -> None:
+    """Set up axes as a plane of the operational space."""
+    axes.set_aspect("equal", adjustable="box")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+
+
+def draw_arm(
+    axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False
+) -> None:
+    """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
+    x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
+    colour = arm_colour(arm)
+    line: dict[str, Any] = (
+        {"linestyle": (0, (2, 1)), "linewidth": 2} if dashed else {"linewidth": 3}
+    )
+    axes.plot(x, y, color=colour, alpha=alpha, zorder=3 + dashed, **line)
+    joints: dict[str, Any] = {"color": "white", "markeredgecolor": colour, "ms": 5}
+    axes.plot(x[:-1], y[:-1], "o", alpha=alpha, zorder=4, **joints)
+    axes.plot(x[-1], y[-1], "o", color=colour, alpha=alpha, markersize=4, zorder=4)
+
+
+def configuration_axes(axes: Axes, arm: int) -> None:
+    """Set up axes as an arm's plane of joint angles [deg]."""
+    x, y = (f"{joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
+    axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
+    axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+    """Put the legend of some axes under the whole figure."""
+    _put_below(figure, *axes.get_legend_handles_labels(), columns)
+
+
+def _put_below(
+    figure: Figure | SubFigure, handles: Sequence[Artist], labels: Sequence[str], columns: int
+) -> None:
+    """Put a legend under the whole figure, in as many columns as are wanted and as fit.
+
+    Names that are wider than the figure are written smaller.
+    """
+    count, look = max(columns, 1), dict[str, Any](loc="outside lower center")
+    legend = figure.legend(handles, labels, ncols=count, **look)
+    size = float(legend.get_texts()[0].get_fontsize()) if labels else SMALLEST_TEXT
+    while legend.get_window_extent().width > figure.bbox.width and size > SMALLEST_TEXT:
+        size *= 1.0 if count > 1 else 0.95
+        count = max(count - 1, 1)
+        legend.remove()
+        legend = figure.legend(handles, labels, ncols=count, fontsize=size, **look)
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Return an entry of a legend: a line or marker that is drawn nowhere else."""
+    return Line2D([], [], label=label, **look)
+
+
+def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D]:
+    """Return entries of a legend for arms, counted from 0: "arm 1" in the arm's colour, …."""
+    return [key(f"{name} {int(k) + 1}", color=arm_colour(int(k)), **look) for k in arms]
+
+
+def keys_below(
+    figure: Figure | SubFigure, keys: Sequence[Artist], columns: int | None = None
+) -> None:
+    """Put a legend of given entries under the whole figure, in one line if no columns are given."""
+    _put_below(figure, keys, [str(one.get_label()) for one in keys], columns or len(keys))
+
+
+def legend_of_all(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
+    """Put one legend of the labels of all panels under the whole figure, each label once."""
+    handles: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    _put_below(figure, list(handles.values()), list(handles), columns)

@@ -1,0 +1,197 @@
+"""Builds a report; no other module of it writes its files."""
+
+import functools
+import hashlib
+import inspect
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from evoexp.condition import Condition
+from evoexp.report.pages import markdown, page_of
+from evoexp.report.pages.html_page import HTML, html_page
+from evoexp.report.pages.index import document
+from evoexp.report.pages.latex_tables import latex_tables
+from evoexp.report.pages.motion_pictures import players_of
+from evoexp.report.pages.page_parts import Drawing, Page
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.stored_results import Results, gather
+from evoexp.report.statistics.inference import forget_resamples
+from evoexp.shipped import Option
+from evoexp.store.files import write_files
+from evoexp.version import __version__
+
+INDEX = "index.md"
+_KINDS = {"b": "true or false", "i": "integer", "u": "integer", "f": "number"}
+
+
+class Request(NamedTuple):
+    """The conditions of a report, and the words that ask for it."""
+
+    report_name: str  # directory under `reports`
+    experiment: str  # name of the experiment; empty for runs given by their hashes
+    budget: str  # name of the budget; empty for runs given by their hashes
+    conditions: Sequence[tuple[str, Condition]]  # (label, condition) in the order of the experiment
+    # What was asked for, as words of the command line: "rana_planar budget=smoke"; derived if empty
+    arguments: str = ""
+    # Label → the options that were taken; None: those that the runs' manifests name
+    options: Mapping[str, tuple[Option, ...]] | None = None
+    command: str = "report"  # that draws it
+
+    @property
+    def words(self) -> str:
+        """Words of the command line that ask for this report."""
+        if self.arguments:
+            return self.arguments
+        if self.experiment and "+" not in self.report_name:
+            return (
+                self.experiment
+                if self.budget == "paper"
+                else f"{self.experiment} budget={self.budget}"
+            )
+        return " ".join(dict.fromkeys(condition.id[:12] for _, condition in self.conditions))
+
+    @property
+    def hint(self) -> str:
+        """The command that helps where nothing is stored."""
+        if self.experiment and self.words.split(" ")[0] == self.experiment:
+            return f"evoexp run experiment={self.words}"
+        return f"evoexp run {self.words}" if self.arguments else f"evoexp show {self.words}"
+
+
+class ReportFiles(NamedTuple):
+    """A report before it is written."""
+
+    directory: Path  # its folder
+    files: dict[str, bytes]  # name → content
+
+
+def report(
+    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
+) -> Path:
+    """Write a report and return the path of its `index.md`; see `derived`."""
+    return write_report(derived(request, settings, outputs, num_replicates))
+
+
+def derived(
+    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
+) -> ReportFiles:
+    """Return a report as it follows from the outputs; nothing is written.
+
+    Args:
+        request: Names its conditions.
+        settings: Formats and levels.
+        outputs: Root of all outputs.
+        num_replicates: Planned for every condition; None: as many as each one has.
+
+    Raises:
+        NothingStored: If nothing of it has been run.
+        UnknownOption: If the settings name a page that does not exist.
+        CorruptLog: If a log cannot be trusted.
+    """
+    found = gather(
+        outputs,
+        request.conditions,
+        num_replicates,
+        request.experiment,
+        request.budget,
+        request.hint,
+        request.options,
+    )
+    page = page_of(found, settings)
+    forget_resamples()  # before figures take their room
+    return page_files(request, page, found, settings)
+
+
+def page_files(
+    request: Request, page: Page, found: Results, settings: ReportSettings
+) -> ReportFiles:
+    """Draw a page's figures and return all its files."""
+    files: dict[str, bytes] = {}
+    for drawing in page.drawings:
+        files |= _drawn(drawing, settings)
+    players = players_of(page.drawings, found.experiment)
+    command = f"evoexp {request.command} {request.words}"
+    text = document(page, found, settings, command, players)
+    files |= latex_tables(text)
+    files[HTML] = html_page(text, files)
+    files |= {player.file: player.content for player in players.values()}
+    files[INDEX] = markdown.page(text).encode()
+    return ReportFiles(found.outputs / "reports" / request.report_name, files)
+
+
+def write_report(report: ReportFiles) -> Path:
+    """Write the files of a report and return the path of its `index.md`."""
+    directory, files = report
+    directory.mkdir(parents=True, exist_ok=True)
+    write_files({directory / name: content for name, content in files.items()})
+    for path in stale_files(report):
+        path.unlink()
+    return directory / INDEX
+
+
+def stale_files(report: ReportFiles) -> list[Path]:
+    """Return the files in a report's folder that it does not have: those of an earlier one."""
+    directory, files = report
+    if not directory.is_dir():
+        return []
+    return sorted(
+        path
+        for path in directory.iterdir()
+        if path.name not in files and not path.name.startswith(".")
+    )
+
+
+def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
+    """Return the files of one figure: pictures, data rows, sidecar."""
+    from evoexp.report.figures.style import Look, drawn
+
+    table = drawing.table()
+    look = Look(settings.width, settings.style)
+    images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi, look)
+    pictures = {f"{drawing.stem}.{kind}": image for kind, image in images.items()}
+    rows = table.to_csv(index=False, lineterminator="\n").encode()
+    sidecar = {
+        "figure": drawing.title,
+        "code_version": __version__,
+        "conditions": _provenance(drawing),
+        "data": {
+            "file": f"{drawing.stem}.csv",
+            "rows": len(table),
+            "sha256": _sha256(rows),
+            # kinds of its columns, and what they hold
+            "columns": {
+                str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
+            },
+            "description": drawing.columns or description(drawing.table),
+        },
+        "files": {name: _sha256(content) for name, content in pictures.items()},
+    }
+    text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
+
+
+def _provenance(drawing: Drawing) -> list[dict[str, Any]]:
+    return [
+        {
+            "label": c.label,
+            "run": c.condition.id,
+            "planned": c.planned,
+            "done": c.done,
+            "failed": c.failed,
+            "run_code": c.code,
+        }
+        for c in drawing.conditions
+    ]
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def description(source: Callable[..., Any]) -> str:
+    """Return a function's docstring as one line."""
+    while isinstance(source, functools.partial):
+        source = source.func
+    return " ".join((inspect.getdoc(source) or "").split())

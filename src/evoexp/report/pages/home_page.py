@@ -1,0 +1,232 @@
+"""The home page of all reports: papers, other reports, stored runs, and a search over them."""
+
+import html
+import json
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+from urllib.parse import quote
+
+from pydantic import Field, TypeAdapter
+
+from evoexp.report.pages.html_page import HTML, script_json, telling_rank, verdict_counts, written
+
+MARKDOWN = "index.md"
+MAX_LINKS = 3  # reports named beside a run
+FROM_HOME = "?home"  # tells a report that it can link back
+COMPARE = "compare"
+USUAL = {"Conditions", "Results", "Claims", "Motions", "Figures", "Parameters", "Failures"}
+"""Headings of nearly every report, which nobody looks for."""
+_SUMMARY = re.compile(r'<script type="application/json" id="summary">(.*?)</script>', re.DOTALL)
+_MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
+
+Hash = Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
+Picture = Annotated[str, Field(pattern=r"^([\w.-]+\.(svg|png))?$")]  # in the report's own folder
+
+
+class ReportSummary(NamedTuple):
+    """A report that is there, as its page says."""
+
+    folder: str  # its name under `reports`
+    file: str  # its page in the folder
+    title: str  # heading
+    command: str = ""  # that draws it, without `evoexp`; empty where it is not known
+    partial: str = ""  # the remark that results are missing; empty if none is
+    failed: int = 0  # number of failed replicates
+    # (text, place on the page) of its sections and figures
+    headings: tuple[tuple[str, str], ...] = ()
+    claims: tuple[tuple[str, str], ...] = ()  # (text, verdict)
+    runs: tuple[tuple[Hash, str], ...] = ()  # (hash, label) of its conditions
+    picture: Picture = ""  # the figure that shows best what it is about; empty if there is none
+
+    @property
+    def experiment(self) -> str:
+        """Name of the experiment in its folder's name: without budget and overrides."""
+        return re.split("[@+]", self.folder)[0]
+
+    @property
+    def is_comparison(self) -> bool:
+        """Whether `evoexp compare` draws it."""
+        return self.command.split(" ")[0] == COMPARE
+
+
+_REPORT = TypeAdapter(ReportSummary)
+
+
+class Paper(NamedTuple):
+    """A paper that is reproduced."""
+
+    name: str  # the names of its experiments begin with it
+    title: str  # authors and year
+    subtitle: str  # what it is about
+    experiments: tuple[str, ...]  # names of its experiments
+    claims: dict[str, int]  # experiment → number of claims that it judges
+
+    def has(self, experiment: str) -> bool:
+        """Whether an experiment is one of this paper's, by its name."""
+        return experiment == self.name or experiment.startswith(f"{self.name}_")
+
+
+class StoredRun(NamedTuple):
+    """A stored run."""
+
+    hash12: str  # the twelve hex digits that name it
+    experiment: str  # that it belongs to; empty if that is not known
+    label: str  # of its condition; empty if that is not known
+    budget: str  # empty if that is not known
+    done: int  # finished replicates
+    planned: int  # planned replicates
+    failed: int  # failed replicates
+    damage: str = ""  # what is wrong with it; empty if nothing is
+
+    @property
+    def state(self) -> str:
+        """Done, partial, planned, failed or damaged, in words."""
+        if self.damage:
+            return "damaged"
+        if self.failed:
+            return "failed"
+        if self.done >= self.planned:
+            return "done"
+        return "partial" if self.done else "planned"
+
+
+class Link(NamedTuple):
+    """A link to a report."""
+
+    text: str  # name of its folder
+    url: str  # relative to the home page
+    partial: bool = False  # whether results are missing
+    failed: int = 0  # number of failed replicates
+    detail: str = ""  # its title
+    picture: str = ""  # address of its figure; empty if it has none
+
+
+class PaperCard(NamedTuple):
+    """A paper on the home page."""
+
+    title: str  # authors and year
+    subtitle: str  # what it is about
+    face: Link | None  # the report whose figure is shown; None if none has any
+    # (verdict, number of claims), over the reports of its experiments
+    counts: tuple[tuple[str, int], ...]
+    unjudged: int  # claims of experiments without a report at the paper's budget
+    links: tuple[Link, ...]  # to its reports
+    missing: tuple[str, ...]  # experiments without a report
+
+
+def read_summary(folder: Path) -> ReportSummary | None:
+    """Return the summary of a report's folder; None if it holds no report.
+
+    A report of an earlier version, which has no HTML page, has only a title and its command.
+    """
+    try:
+        found = _SUMMARY.search((folder / HTML).read_text(encoding="utf-8"))
+        if found:
+            named = {"folder": folder.name, "file": HTML, **json.loads(found[1])}
+            return _REPORT.validate_python(named)
+    except (OSError, ValueError, TypeError):
+        pass  # nobody's page, or no page of ours
+    try:
+        text = (folder / MARKDOWN).read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return None
+    title = text.partition("\n")[0].removeprefix("# ")
+    made = _MADE_BY.search(text)
+    command = html.unescape(made[1]) if made else ""
+    return ReportSummary(folder.name, MARKDOWN, html.unescape(title) or folder.name, command)
+
+
+def summaries(reports: Path) -> list[ReportSummary]:
+    """Return the summaries of all reports in a folder, by the names of their folders."""
+    folders = sorted(each for each in reports.glob("[!.]*") if each.is_dir())
+    return [found for folder in folders if (found := read_summary(folder)) is not None]
+
+
+def home_page(
+    found: Sequence[ReportSummary], papers: Sequence[Paper], runs: Sequence[StoredRun]
+) -> bytes:
+    """Return the home page; the same reports and runs give the same bytes."""
+    content = site(found, papers, runs)
+    return written("home_page.html", site=content, search=script_json(list(_search(found))))
+
+
+def site(
+    found: Sequence[ReportSummary], papers: Sequence[Paper], runs: Sequence[StoredRun]
+) -> dict[str, Any]:
+    """Return the content of the home page, by the names that its template has."""
+    owned = {
+        paper.name: [r for r in found if paper.has(r.experiment) and not r.is_comparison]
+        for paper in papers
+    }
+    of_papers = {each.folder for several in owned.values() for each in several}
+    others = [each for each in found if each.folder not in of_papers]
+    groups = {
+        "Arenas and other experiments": [each for each in others if not each.is_comparison],
+        "Comparisons": [each for each in others if each.is_comparison],
+    }
+    return {
+        "num_reports": len(found),
+        "partial": [_link(each) for each in found if each.partial],
+        # of which only the title is known
+        "num_earlier": sum(each.file != HTML for each in found),
+        "unfinished": sum(run.state != "done" for run in runs),
+        "papers": [_card(paper, owned[paper.name]) for paper in papers],
+        "others": [(name, list(map(_link, group))) for name, group in groups.items() if group],
+        "runs": [(run, list(_links(run, found))) for run in runs],
+    }
+
+
+def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
+    """Return the card of a paper; its claims are those of whole experiments, not of variants."""
+    whole = [each for each in reports if each.folder == each.experiment]
+    drawn, shown = {each.folder for each in whole}, {each.experiment for each in reports}
+    names = (*paper.experiments, *paper.claims)
+    face = min(
+        (each for each in whole or reports if each.picture),
+        key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
+        default=None,
+    )
+    return PaperCard(
+        paper.title,
+        paper.subtitle,
+        _link(face) if face else None,
+        verdict_counts(verdict for each in whole for _, verdict in each.claims),
+        sum(count for name, count in paper.claims.items() if name not in drawn),
+        tuple(map(_link, reports)),
+        tuple(sorted({name for name in names if paper.has(name)} - shown)),
+    )
+
+
+def _link(report: ReportSummary) -> Link:
+    picture = f"{quote(report.folder)}/{quote(report.picture)}" * bool(report.picture)
+    told = bool(report.partial), report.failed, report.title
+    return Link(report.folder, _url(report), *told, picture)
+
+
+def _url(report: ReportSummary, place: str = "") -> str:
+    """Return the address of a report, or of a place in it."""
+    if report.file != HTML:
+        return f"{quote(report.folder)}/{report.file}"
+    return f"{quote(report.folder)}/{HTML}{FROM_HOME}" + f"#{place}" * bool(place)
+
+
+def _links(run: StoredRun, found: Iterable[ReportSummary]) -> Iterator[Link]:
+    """Yield links to a run's place in the reports that show it, at most `MAX_LINKS`."""
+    shown = [each for each in found if run.hash12 in dict(each.runs)]
+    for each in shown[:MAX_LINKS]:
+        yield Link(each.folder, _url(each, f"run-{run.hash12}"))
+
+
+def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
+    """Yield the entries that the search looks through."""
+    for each in found:
+        entries = [
+            ("report", each.title, ""),
+            *(("heading", text, place) for text, place in each.headings if text not in USUAL),
+            *((f"claim, {verdict}", text, "claims") for text, verdict in each.claims),
+            *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
+        ]
+        for kind, text, place in entries:
+            yield {"text": text, "kind": kind, "report": each.folder, "url": _url(each, place)}

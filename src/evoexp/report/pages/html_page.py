@@ -1,0 +1,219 @@
+"""A page in HTML: complete in itself, readable without scripts, offline; all values are escaped."""
+
+import functools
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from evoexp.report.pages.index import CLAIMS, FAILURES
+from evoexp.report.pages.page_parts import Document, Figures, FigureText, Table, Verdict
+from evoexp.report.pages.templates import asset, environment
+
+if TYPE_CHECKING:  # loaded only where a page is written
+    from markdown_it import MarkdownIt
+    from markupsafe import Markup
+
+HTML = "index.html"
+FEW = 3  # failures named at the top
+PIXELS_PER_POINT = 4.0 / 3.0
+VERDICTS = ("reproduced", "contradicted", "inconclusive", "not")  # their first words, in order
+TELLING = ("snapshot", "scene", "motion", "stages", "operational", "posture", "path")
+"""Parts of the names of figures that show what an experiment is about, the best one first."""
+NO_VALUE = ("–", "")  # cells of a column of numbers that hold none
+LONGEST_NUMBER = 48  # characters of a cell that is still a number, with its interval and unit
+_SIZE = re.compile(rb'<svg [^>]*?height="([\d.]+)pt"[^>]*? width="([\d.]+)pt"')
+_NUMBER = re.compile(r"[-−]?(\d[\d.]*(e[-+−]?\d+)?|∞)($|[ \[%°])")
+_HASH = re.compile("<code>([0-9a-f]{12})</code>")
+_COUNT = re.compile(r"\s\(n\s=\s\d+\)")  # behind a condition in the head of a table
+
+
+class FigurePlace(NamedTuple):
+    """A figure on the page."""
+
+    text: FigureText  # title, caption, files
+    anchor: str  # its address on the page
+    file: str  # the picture that is shown; empty if there is none
+    size: tuple[int, int] | None  # width and height [px]; None: not known
+
+
+class SectionPlace(NamedTuple):
+    """A section on the page."""
+
+    heading: str  # above it
+    anchor: str  # its address on the page
+    table: Table | None  # None: it is that of the figures
+    figures: tuple[FigurePlace, ...]  # those in it
+    verdicts: tuple[tuple[str, int], ...]  # (verdict, number of claims); empty where it has none
+
+
+def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
+    """Return a page as HTML; the same text gives the same bytes.
+
+    Args:
+        pictures: File name → content of its pictures.
+    """
+    sections = tuple(_places(document, pictures))
+    return written(
+        "report_page.html",
+        {run.hash12: run.label for run in document.runs},
+        document=document,
+        sections=sections,
+        failures=document.rows_below(FAILURES),
+        failures_anchor=next((s.anchor for s in sections if s.heading == FAILURES), ""),
+        few=FEW,
+        summary=script_json(_summary(document, sections)),
+    )
+
+
+def _summary(document: Document, sections: Sequence[SectionPlace]) -> dict[str, Any]:
+    """Return the summary of a page that it carries for the home page."""
+    figures = [figure for section in sections for figure in section.figures]
+    places = [(section.heading, section.anchor) for section in sections]
+    return {
+        "title": document.title,
+        "command": document.command.removeprefix("evoexp "),
+        "partial": "".join(n.text for n in document.notices if n.title == "Partial results"),
+        "failed": sum(run.failed for run in document.runs),
+        "headings": [*places, *((each.text.title, each.anchor) for each in figures)],
+        "claims": [
+            [str(row[0]), cell.text]
+            for row in document.rows_below(CLAIMS)
+            for cell in row
+            if isinstance(cell, Verdict)
+        ],
+        "runs": [[run.hash12, run.label] for run in document.runs],
+        "picture": min((each.file for each in figures if each.file), key=telling_rank, default=""),
+    }
+
+
+def telling_rank(name: str) -> int:
+    """Return the place of a figure among those that tell what an experiment is about; 0: best."""
+    return next((k for k, word in enumerate(TELLING) if word in name), len(TELLING))
+
+
+def verdict_counts(verdicts: Iterable[str]) -> tuple[tuple[str, int], ...]:
+    """Return how often each verdict was given, without the reasons in brackets, in one order."""
+    found = Counter(verdict.split(" (")[0] for verdict in verdicts)
+    ranks = {word: rank for rank, word in enumerate(VERDICTS)}
+    return tuple(
+        sorted(found.items(), key=lambda item: (ranks.get(verdict_class(item[0]), 9), item[0]))
+    )
+
+
+def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[SectionPlace]:
+    taken: Counter[str] = Counter({"commands": 1, "content": 1})
+
+    def anchor(name: str) -> str:
+        """Return an address on the page that no other place has."""
+        slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "part"
+        taken[slug] += 1
+        return slug if taken[slug] == 1 else f"{slug}--{taken[slug]}"
+
+    for section in document.sections:
+        place = anchor(section.heading)
+        if isinstance(section, Figures):
+            shown = [(figure, figure.picture("svg", "png")) for figure in section.figures]
+            figures = tuple(
+                FigurePlace(figure, anchor(figure.stem), file, _size(pictures.get(file, b"")))
+                for figure, file in shown
+            )
+            yield SectionPlace(section.heading, place, None, figures, ())
+        else:
+            cells = (cell for row in section.rows for cell in row)
+            verdicts = verdict_counts(cell.text for cell in cells if isinstance(cell, Verdict))
+            yield SectionPlace(section.heading, place, section, (), verdicts)
+
+
+def _size(picture: bytes) -> tuple[int, int] | None:
+    """Return width and height of an SVG [px]."""
+    found = _SIZE.search(picture[:2000])
+    if found is None:
+        return None
+    width, height = float(found[2]), float(found[1])
+    return round(width * PIXELS_PER_POINT), round(height * PIXELS_PER_POINT)
+
+
+def written(template: str, runs: Mapping[str, str] | None = None, **values: Any) -> bytes:
+    """Return a page.
+
+    Args:
+        template: Name of its file in `assets/site`.
+        runs: Hash → label of the runs that the page has a place for: codes that name a hash, and
+            heads of tables that name a label, link to it.
+        values: By the names that the template has for them.
+    """
+    from markupsafe import Markup
+
+    known = frozenset(runs or {})
+    places = {label: name for name, label in reversed(list((runs or {}).items()))}
+
+    def label(text: object) -> Markup:
+        """Return the head of a row or column; a label may have its number of runs behind it."""
+        name = places.get(_COUNT.sub("", str(text)))
+        if name is None:
+            return inline(str(text), known)
+        return Markup('<a href="#run-{}">{}</a>').format(name, inline(str(text)))
+
+    text = (
+        environment()
+        .get_template(template)
+        .render(
+            inline=lambda value: inline(str(value), known),
+            label=label,
+            is_verdict=lambda value: isinstance(value, Verdict),
+            verdict_class=verdict_class,
+            number_columns=number_columns,
+            style=Markup(asset("site.css")),
+            script=Markup(asset("site.js")),
+            **values,
+        )
+    )
+    return text.lstrip("\n").encode()
+
+
+def inline(text: str, hashes: frozenset[str] = frozenset()) -> "Markup":
+    """Return anybody's text as HTML: words between grave accents as code, all else as it is.
+
+    Codes that are one of the hashes link to the place of their run.
+    """
+    from markupsafe import Markup
+
+    def linked(code: re.Match[str]) -> str:
+        return f'<a href="#run-{code[1]}">{code[0]}</a>' if code[1] in hashes else code[0]
+
+    return Markup(_HASH.sub(linked, _reader().renderInline(text)))
+
+
+@functools.cache
+def _reader() -> "MarkdownIt":
+    """Return a reader of Markdown that knows code alone: all else in a text is as it is."""
+    from markdown_it import MarkdownIt
+
+    return MarkdownIt("zero").enable("backticks")
+
+
+def script_json(value: Any) -> "Markup":
+    """Return data for a script element: nothing in it can end the element."""
+    from markupsafe import Markup
+
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+    return Markup(text.replace("<", "\\u003c"))
+
+
+def verdict_class(verdict: str) -> str:
+    """Return the class of a verdict's badge: its first word."""
+    word = re.match("[a-z]*", verdict)
+    return word[0] if word else ""
+
+
+def number_columns(headers: Sequence[str], rows: Sequence[Sequence[object]]) -> Mapping[int, bool]:
+    """Return position → whether every cell of a column begins with a number, or has no value."""
+    found = {}
+    for k in range(len(headers)):
+        cells = [text for row in rows if (text := str(row[k])) not in NO_VALUE]
+        found[k] = bool(cells) and all(
+            len(text) <= LONGEST_NUMBER and _NUMBER.match(text) for text in cells
+        )
+    return found

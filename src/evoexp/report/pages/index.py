@@ -1,0 +1,306 @@
+"""The text of a report, from its page and its results."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import (
+    Claim,
+    Document,
+    Drawing,
+    Figures,
+    FigureText,
+    LogText,
+    Notice,
+    Page,
+    Player,
+    RunText,
+    Table,
+    Verdict,
+    provenance,
+)
+from evoexp.report.pages.page_words import WORDS
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.parameters import Parameter, parameters, planned_replicates
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison
+from evoexp.report.statistics.inference import Proportion
+
+FEW = 3  # damaged logs named of each condition
+WIDEST = 20  # conditions side by side; more stand one below the other
+LONGEST_NAME = 40  # letters of a table's heading in the name of its file
+PARTS = (
+    "In brackets: the conditions that have a value, where not all have it. A planner alone stands "
+    "for it on all problems, a problem alone for all of its planners."
+)
+BETWEEN = " · "  # the parts of a label of a problem and a planner
+CLAIMS, FAILURES = "Claims", "Failures"  # headings
+
+
+def document(
+    page: Page,
+    results: Results,
+    settings: ReportSettings,
+    command: str,
+    players: Mapping[tuple[str, int], Player] | None = None,
+) -> Document:
+    """Return the text of a page; the same results give the same text.
+
+    `players` are the pages that play motions, by the keys of the played runs.
+    """
+    notices = (_incomplete(results), _damaged(results), _added(results))
+    first = _conditions(results, settings), _quantities(page, results)
+    later = (
+        _claims(page.claims),
+        Table("Known defects and checks", ("check", "finding"), page.checks),
+        *(_comparison(heading, rows, settings) for heading, rows in page.comparisons),
+    )
+    figures = Figures(tuple(_figure(each, settings, players or {}) for each in page.drawings))
+    sections = (
+        *(table for table in first if table.rows),
+        *page.tables,
+        *(table for table in later if table.rows),
+        *((figures,) if figures.figures else ()),
+        _parameters(results),
+        *_failures(results),
+    )
+    return Document(
+        page.title,
+        command,
+        results.experiment,
+        results.budget,
+        tuple(notice for notice in notices if notice.text),
+        page.introduction,
+        tuple(_with_files(sections)),
+        tuple(map(_run, results.conditions)),
+        _seeds(results.conditions),
+    )
+
+
+def _run(c: ConditionResults) -> RunText:
+    """Return a run, with the addresses of its logs as seen from `reports/<name>/`."""
+
+    def address(path: Path) -> str:
+        return Path("../..", *path.parts[-4:]).as_posix()  # runs/<hash>/replicates/<file>
+
+    words = {True: ", certified", False: ", refuted"}
+    results = {
+        int(k): f"{markdown.number(float(cost))}{words.get(certified, '')}"
+        for k, cost, certified in zip(
+            c.summaries.index, c.column("best_cost"), c.column("certified"), strict=True
+        )
+    }
+    done = (LogText(k, address(c.run.log_path(k)), text) for k, text in results.items())
+    failed = (LogText(k, address(c.run.failure_path(k)), "failed") for k in c.failures)
+    logs = tuple(sorted((*done, *failed)))
+    return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, logs)
+
+
+def _with_files(sections: Iterable[Table | Figures]) -> Iterator[Table | Figures]:
+    """Name the files of tables: by their number and heading."""
+    number = 0
+    for section in sections:
+        if isinstance(section, Table):
+            number += 1
+            words = "_".join(re.findall("[a-z0-9]+", section.heading.lower()))[:LONGEST_NAME]
+            section = section._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex")
+        yield section
+
+
+def _seeds(conditions: Iterable[ConditionResults]) -> tuple[int, ...]:
+    return tuple(sorted({c.condition.seed for c in conditions}))
+
+
+def _incomplete(results: Results) -> Notice:
+    """Name the replicates that are missing; empty if none is."""
+    missing = [
+        f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed"
+        for c in results.conditions
+        if c.done < c.planned
+    ]
+    return Notice(
+        "Partial results",
+        f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
+        * bool(missing),
+    )
+
+
+def _damaged(results: Results) -> Notice:
+    """Name the logs that are damaged and left out; empty if none is."""
+    lost = [
+        f"{c.label}: {len(c.damaged)} ({', '.join(list(c.damaged)[:FEW])}"
+        + f"{', …' if len(c.damaged) > FEW else ''})"
+        for c in results.conditions
+        if c.damaged
+    ]
+    return Notice(
+        "Damaged logs",
+        f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
+        "experiment runs them again." * bool(lost),
+    )
+
+
+def _added(results: Results) -> Notice:
+    """Name the replicates that were added when results could be known; empty if none was."""
+    fixed = planned_replicates(results) if results.experiment else 0
+    added = [
+        f"{c.label}: {n} of {c.done}"
+        for c in results.conditions
+        if (n := c.added(c.condition.num_replicates(fixed)))
+    ]
+    return Notice(
+        "Replicates added later",
+        f"{'; '.join(added)}: asked for when results of earlier ones were stored already. Numbers "
+        "and verdicts below use all of them." * bool(added),
+    )
+
+
+def _conditions(results: Results, settings: ReportSettings) -> Table:
+    rows = []
+    for c in results.conditions:
+        solved, verdicts, found = "–", ("–",) * 5, c.verdicts
+        if c.done:
+            interval = Proportion(c.solved, c.done).interval(settings.confidence)
+            solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
+        exact: tuple[object, ...] = verdicts
+        if found.judged:
+            proven = found.certified, found.refuted, found.undecided
+            exact = (*proven, found.solved_refuted, found.margin_broken)
+        name = f"`{c.condition.id[:12]}`"
+        rows.append((c.label, name, c.done, c.planned, c.failed, solved, *exact))
+    return WORDS.table("conditions", rows, level=100 * settings.confidence)
+
+
+def _quantities(page: Page, results: Results) -> Table:
+    labels = [c.label for c in results.with_data]
+    heads = [f"{c.label} (n\u00a0=\u00a0{c.done})" for c in results.with_data]
+    cells = [[markdown.spread(q.spreads[label]) for label in labels] for q in page.quantities]
+    if len(labels) > WIDEST:
+        names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
+        below = zip(heads, *cells, strict=True) if cells else ()
+        return WORDS.table("results", below)._replace(headers=("condition", *names))
+    rows = [(q.name, q.unit, *own) for q, own in zip(page.quantities, cells, strict=True)]
+    return WORDS.table("results", rows * bool(labels), behind=heads)
+
+
+def _claims(claims: Sequence[Claim]) -> Table:
+    rows = [
+        (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
+        for c in claims
+    ]
+    return WORDS.table("claims", rows)
+
+
+def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettings) -> Table:
+    cells = [
+        (
+            c.quantity,
+            c.num_seeds,
+            markdown.number(c.median_difference),
+            f"{c.better.a12:.3f} [{c.better.interval.low:.3f}, {c.better.interval.high:.3f}]",
+            *map(
+                markdown.p_value,
+                (c.test.p_value, c.p_adjusted, c.unpaired.p_value, c.unpaired_adjusted),
+            ),
+        )
+        for c in rows
+    ]
+    level, resamples = 100 * settings.confidence, settings.num_resamples
+    return WORDS.table("comparison", cells, heading=heading, level=level, resamples=resamples)
+
+
+def _figure(
+    drawing: Drawing, settings: ReportSettings, players: Mapping[tuple[str, int], Player]
+) -> FigureText:
+    runs = [(c.condition.id[:12], c.done) for c in drawing.conditions]
+    whose = provenance(runs, _seeds(drawing.conditions))
+    caption = f"{drawing.caption} {whose}".strip()
+    motions = tuple(players[run.key] for run in drawing.plays if run.key in players)
+    return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats), motions)
+
+
+def _parameters(results: Results) -> Table:
+    """Return one row per setting, and one per value where conditions differ in it."""
+    by_name: dict[str, dict[Parameter, list[str]]] = {}
+    for condition in results.conditions:
+        for parameter in parameters(results, condition):
+            by_name.setdefault(parameter.name, {}).setdefault(parameter, []).append(condition.label)
+    every = [condition.label for condition in results.conditions]
+    rows = [
+        (
+            f"`{name}`"
+            + ("" if len(labels) == len(every) else f" ({in_few_words(labels, every)})"),
+            parameter.value,
+            parameter.unit or "–",
+            parameter.source or "–",
+        )
+        for name in _ordered(by_name)
+        for parameter, labels in by_name[name].items()
+    ]
+    return WORDS.table("parameters", rows, note=PARTS * have_two_parts(every))
+
+
+def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
+    """Yield settings group by group, seed and number of replicates last."""
+    groups = list(dict.fromkeys(name.split(".")[0].split("[")[0] for name in by_name))
+    groups.sort(key=lambda group: group in ("seed", "num_replicates"))
+    for group in groups:
+        yield from (name for name in by_name if name.split(".")[0].split("[")[0] == group)
+
+
+def _failures(results: Results) -> Iterator[Table]:
+    """Yield the table of failed replicates, if there are any."""
+    rows = [
+        (c.label, replicate, reason)
+        for c in results.conditions
+        for replicate, reason in c.failures.items()
+    ]
+    if rows:
+        yield WORDS.table("failures", rows)
+
+
+def have_two_parts(labels: Sequence[str]) -> bool:
+    """Whether all labels are of a problem and a planner, and some share one."""
+    parts = [label.split(BETWEEN) for label in labels]
+    names = {part for own in parts for part in own}
+    return all(len(own) == 2 for own in parts) and len(names) < 2 * len(parts)
+
+
+def in_few_words(labels: Sequence[str], every: Sequence[str]) -> str:
+    """Return a list of labels; a part of them stands for all labels that have it.
+
+    Args:
+        labels: Some of them.
+        every: All labels of the page.
+
+    Returns:
+        "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
+        labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
+        themselves where they have not two parts.
+    """
+    if not have_two_parts(every):
+        return ", ".join(labels)
+    parts = [(label.split(BETWEEN)[0], label.split(BETWEEN)[1]) for label in every]
+    chosen = {own for own, label in zip(parts, every, strict=True) if label in set(labels)}
+    turned, chosen_turned = [own[::-1] for own in parts], {own[::-1] for own in chosen}
+    found = _grouped(chosen, parts), _grouped(chosen_turned, turned)
+    return min((", ".join(labels), *found), key=len)
+
+
+def _grouped(chosen: set[tuple[str, str]], parts: Sequence[tuple[str, str]]) -> str:
+    """Return pairs by their second parts, those together that are chosen of the same first ones."""
+    groups: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
+    for second in dict.fromkeys(own[1] for own in parts):
+        own = [pair for pair in parts if pair[1] == second]
+        in_it = tuple(first for first, _ in own if (first, second) in chosen)
+        out = tuple(first for first, _ in own if (first, second) not in chosen)
+        if in_it:
+            groups.setdefault((in_it, out), []).append(second)
+    words = []
+    for (in_it, out), names in groups.items():
+        where = (
+            f" except on {', '.join(out)}" if len(out) < len(in_it) else f" on {', '.join(in_it)}"
+        )
+        words.append(", ".join(names) + where * bool(out))
+    return "; ".join(words)

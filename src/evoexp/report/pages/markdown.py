@@ -1,0 +1,94 @@
+"""A page in Markdown, and its numbers as text."""
+
+import math
+import re
+import string
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from evoexp.report.pages.page_parts import Document
+from evoexp.report.pages.templates import environment
+from evoexp.report.statistics.inference import Interval, Spread
+
+_HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
+_LINK = re.compile(r"\]\(([^)]*)\)?")
+_OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json|tex|html)")
+
+
+def page(document: Document) -> str:
+    """Return a page as Markdown."""
+    template = environment().get_template("report_page.md")
+    return inert(template.render(document=document, table=table).rstrip("\n") + "\n")
+
+
+def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table; bars inside of cells are escaped."""
+    lines = [_row(headers), _row(["---"] * len(headers)), *(_row(row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def inert(text: str) -> str:
+    """Return a page in which no name can be more than text: no HTML, no links but to its own files.
+
+    Labels, names of options and reasons of failures may come from anybody.
+    """
+    text = _HTML.sub("&lt;", text)
+    return _LINK.sub(
+        lambda link: link[0] if _OWN_FILE.fullmatch(link[1]) else f"]\\({link[1]})", text
+    )
+
+
+def number(value: float) -> str:
+    """Return a number with four significant digits, whole ones with all digits, NaN as a dash."""
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    whole = value == round(value) and abs(value) < 1e9
+    return (f"{value + 0.0:.0f}" if whole else f"{value:.4g}").replace("-", "−")  # −0.0 is 0
+
+
+def filled(template: str, words: Mapping[str, object]) -> str:
+    """Fill in the words of a sentence: `{x!n}` is written as `number` does, `{p!p}` as `p_value`.
+
+    Raises:
+        KeyError: If a word is missing.
+    """
+    return _Sentence().vformat(template, (), words)
+
+
+class _Sentence(string.Formatter):
+    def convert_field(self, value: Any, conversion: str | None) -> Any:
+        if conversion in ("n", "p"):
+            return (number if conversion == "n" else p_value)(float(value))
+        return super().convert_field(value, conversion)
+
+
+def p_value(p: float) -> str:
+    """Return a p-value with two significant digits."""
+    return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}".replace("-", "−")
+
+
+def share(count: int, total: int) -> str:
+    """Return a count of a total."""
+    return f"{count} of {total}"
+
+
+def percent(interval: Interval) -> str:
+    """Return an interval of a proportion in percent."""
+    return f"{100 * interval.low:.0f}–{100 * interval.high:.0f} %"
+
+
+def spread(values: Spread) -> str:
+    """Return a median with its quartiles; a single value as it is."""
+    if not values.num_values:
+        return "–"
+    if values.num_values == 1:
+        return number(values.median)
+    return f"{number(values.median)} [{number(values.lower)}, {number(values.upper)}]"
+
+
+def _row(cells: Sequence[object]) -> str:
+    return (
+        "| " + " | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+    )

@@ -1,0 +1,1 @@
+"""Stored runs, and what is read and measured of them."""

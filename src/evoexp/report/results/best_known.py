@@ -1,0 +1,133 @@
+"""The shortest proven answer known of each problem: a fixed length that targets are multiples of.
+
+The best of the runs that are being compared would not do: it would change with every run added, and
+with it all shares of targets reached. So the lengths stand in a file of their own,
+`assets/best_known.yaml`, and change only where somebody writes lower ones into it
+(`scripts/update-best-known`). A problem is known by a key of robot and scenario, see
+`planner_runs.problem_key`:
+
+    "0123456789ab": {problem: "box_panda", length: 3.77, run: "4da9210db51b", replicate: 3}
+
+Run and replicate are those that found it.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from evoexp.errors import SettingError
+from evoexp.input_files import read_bounded
+from evoexp.report.results.planner_runs import PlannerRuns
+
+_HASH = re.compile("[0-9a-f]{12}")
+_HEAD = """# The shortest proven answer known of each problem, in joint space [rad, m]: targets of
+# `evoexp compare` are multiples of it. The key is that of robot and scenario, as the page of a
+# comparison shows it. Written by scripts/update-best-known, from stored runs.
+"""
+
+
+class BestKnown(NamedTuple):
+    """The shortest proven answer known of a problem."""
+
+    problem: str  # its name, for readers
+    length: float  # of the joints' path [rad, m]
+    run: str  # hash of the run that found it, 12 hex digits
+    replicate: int  # of that run
+
+
+def shipped_best_known() -> dict[str, BestKnown]:
+    """Return the shipped file's content by the keys of problems."""
+    file = resources.files("evoexp").joinpath("assets/best_known.yaml")
+    return parsed(file.read_bytes(), "best_known.yaml")
+
+
+def read_best_known(path: str | Path) -> dict[str, BestKnown]:
+    """Return a file's content by the keys of problems.
+
+    Raises:
+        SettingError: If something in it cannot be.
+        OSError: If it cannot be read.
+    """
+    return parsed(read_bounded(path), Path(path).name)
+
+
+def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
+    """Return a file's content by the keys of problems.
+
+    Raises:
+        SettingError: If something in it cannot be.
+    """
+    try:
+        found = yaml.safe_load(content) or {}
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
+        raise SettingError(name, "YAML", str(error).splitlines()[0]) from None
+    if not isinstance(found, dict):
+        raise SettingError(name, "a mapping of keys of problems", found)
+    return {_key(key, name): _entry(entry, f"{name}, {key}") for key, entry in found.items()}
+
+
+def _key(key: Any, name: str) -> str:
+    if not isinstance(key, str) or not _HASH.fullmatch(key):
+        raise SettingError(name, "keys of 12 hex digits in quotation marks", key)
+    return key
+
+
+def _entry(entry: Any, where: str) -> BestKnown:
+    if not isinstance(entry, dict) or set(entry) != set(BestKnown._fields):
+        raise SettingError(where, f"a mapping of {', '.join(BestKnown._fields)}", entry)
+    length, run, replicate = entry["length"], entry["run"], entry["replicate"]
+    if type(length) not in (int, float) or not 0.0 < length < math.inf:
+        raise SettingError(f"{where}, length", "a number above 0", length)
+    if not isinstance(run, str) or not _HASH.fullmatch(run):
+        raise SettingError(f"{where}, run", "12 hex digits in quotation marks", run)
+    if type(replicate) is not int or replicate < 0:
+        raise SettingError(f"{where}, replicate", "a whole number, at least 0", replicate)
+    return BestKnown(str(entry["problem"]), float(length), run, replicate)
+
+
+def to_yaml(known: Mapping[str, BestKnown]) -> bytes:
+    """Return a file's content, in the order of the problems' names."""
+    lines = [
+        f"{json.dumps(key)}: {{problem: {json.dumps(each.problem, ensure_ascii=False)}, "
+        f"length: {each.length!r}, run: {json.dumps(each.run)}, replicate: {each.replicate}}}\n"
+        for key, each in sorted(known.items(), key=lambda item: (item[1].problem, item[0]))
+    ]
+    return (_HEAD + "".join(lines)).encode()
+
+
+def shortest(runs: Iterable[PlannerRuns]) -> dict[str, BestKnown]:
+    """Return the shortest proven answer of runs that were judged here, by the problems' keys."""
+    found: dict[str, BestKnown] = {}
+    for own in runs:
+        good = own.table[own.table["certified"]]
+        if own.condition is None or not len(good):
+            continue
+        row = good.iloc[int(good["length"].to_numpy().argmin())]
+        length, before = float(row["length"]), found.get(own.problem.key)
+        if before is None or length < before.length:
+            run = own.condition.run.hash12
+            found[own.problem.key] = BestKnown(own.problem.name, length, run, int(row["replicate"]))
+    return found
+
+
+def lowered(
+    known: Mapping[str, BestKnown], found: Mapping[str, BestKnown]
+) -> tuple[dict[str, BestKnown], list[str]]:
+    """Put shorter lengths into those that are known; return all, and a line for each new one.
+
+    The name that a problem has stays.
+    """
+    now, lines = dict(known), list[str]()
+    for key, each in found.items():
+        before = known.get(key)
+        if before is None or each.length < before.length:
+            now[key] = each if before is None else each._replace(problem=before.problem)
+            was = "new" if before is None else f"{before.length:.6g}"
+            lines.append(f"{now[key].problem} ({key}): {was} → {each.length:.6g}")
+    return now, lines

@@ -1,0 +1,289 @@
+"""Geometry of stored motions: places of links, outlines of obstacles, distances and contacts.
+
+Motions are looked at one after the other and not kept, so that ten thousand take no more memory
+than one.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pinocchio as pin
+from scipy.spatial import ConvexHull
+
+from evoexp.collision.certifier.certificate import PAIR
+from evoexp.collision.certifier.least_distance import LeastDistance, known
+from evoexp.collision.scene import Scene
+from evoexp.condition import Prepared
+from evoexp.numeric.elementary import DEGREE
+from evoexp.records import FloatArray
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.robots.assembly import Assembly
+from evoexp.scenarios.obstacles import BOX, CYLINDER, ELLIPSE, HALF_SPACE, SPHERE, ObstacleTable
+
+OUTLINE_POINTS = 49  # of a round obstacle
+Measure = Callable[[FloatArray], FloatArray]  # (nq, configurations) → (configurations,)
+LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]  # columns of `links_table`
+
+
+class Nearest(NamedTuple):
+    """The two nearest points of two bodies."""
+
+    distance: float  # between them
+    points: FloatArray  # (2, 3)
+
+
+def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:
+    """Return the configurations of a solution's motion, (nq, instants) [deg]."""
+    return np.ascontiguousarray(prepared.planner.motion(prepared.problem, solution).q.T / DEGREE)
+
+
+def straight_line(
+    shape: Sequence[tuple[int, int]], start: FloatArray, goal: FloatArray
+) -> FloatArray:
+    """Return the solution that goes straight from start to goal in equal steps, flat.
+
+    Args:
+        shape: Of a solution, part by part: (rows, joints).
+        start: (sum of joints,).
+        goal: (sum of joints,) in the same unit.
+    """
+    parts, first = [], 0
+    for rows, joints in shape:
+        own, share = slice(first, first + joints), np.linspace(0.0, 1.0, rows)[:, None]
+        parts.append(((1.0 - share) * start[own] + share * goal[own]).ravel())
+        first += joints
+    return np.concatenate(parts)
+
+
+def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
+    """Return a motion sampled along its straight segments.
+
+    Args:
+        q: (nq, instants).
+        samples: Per segment.
+
+    Returns:
+        Times in instants, (segments · samples + 1,), and configurations, (nq, the same).
+    """
+    times = np.arange((q.shape[1] - 1) * samples + 1) / samples
+    before = np.minimum(times.astype(np.int64), q.shape[1] - 2)
+    share = times - before
+    return times, (1.0 - share) * q[:, before] + share * q[:, before + 1]
+
+
+def joint_positions(
+    assembly: Assembly, q: FloatArray
+) -> Iterator[tuple[int, int, FloatArray, FloatArray]]:
+    """Yield (arm, link of the arm, start (instants, 3), end (instants, 3)) of every link.
+
+    Args:
+        q: (nq, instants) [deg].
+    """
+    frames = list(_frames(assembly, q))
+    numbers = [0] * assembly.num_arms
+    for link in assembly.links:
+        start, end = (
+            np.array([frame[link.joint] @ np.append(point, 1.0) for frame in frames])[:, :3]
+            for point in (link.start, link.end)
+        )
+        yield link.arm, numbers[link.arm], start, end
+        numbers[link.arm] += 1
+
+
+def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
+    """Return the closed outlines of obstacles as seen along z, each (points, 2).
+
+    Args:
+        reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth
+            of it deep.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    outlines = []
+    for kind, center, rotation, size in zip(*table, strict=True):
+        matrix = rotation.reshape(3, 3)
+        if kind == BOX:
+            corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (-1, -1, 0)]) * size
+            outline = (corners @ matrix.T)[:, :2]
+        elif kind == CYLINDER:
+            ends = [
+                np.column_stack([size[0] * circle, np.full(len(circle), z)])
+                for z in (-size[1], size[1])
+            ]
+            points = (np.vstack(ends) @ matrix.T)[:, :2]
+            hull = ConvexHull(points).vertices
+            outline = points[[*hull, hull[0]]]
+        elif kind == ELLIPSE:
+            outline = (circle * size[:2]) @ matrix[:2, :2].T
+        elif kind == HALF_SPACE:
+            inward = -matrix[:2, 2]
+            along, depth = reach * np.array([-inward[1], inward[0]]), 0.1 * reach * inward
+            outline = np.array([along, -along, depth - along, depth + along, along])
+        else:
+            along = np.zeros(2) if kind == SPHERE else size[1] * matrix[:2, 2]
+            outline = size[0] * circle + np.where((circle @ along >= 0.0)[:, None], along, -along)
+            # the outline begins where it turns from one end to the other
+            if kind != SPHERE and along.any():
+                first = int(np.argmax(np.diff(circle @ along >= 0.0))) + 1
+                outline = np.roll(outline[:-1], -first, axis=0)
+                outline = np.vstack([outline, outline[:1]])
+        outlines.append(outline + center[:2])
+    return outlines
+
+
+class BodyDistance:
+    """Exact distances between bodies, by coal."""
+
+    def __init__(self, model: Any, geometry: Any) -> None:
+        """Take a `pin.Model`, and its `pin.GeometryModel` with the pairs that are looked at."""
+        self._model, self._geometry = model, geometry
+        self._data, self._placements = model.createData(), geometry.createData()
+
+    def nearest(self, q: FloatArray, pair: int | None = None) -> Nearest:
+        """Return the nearest points of two bodies at one configuration (nq,) [rad].
+
+        `pair` is the number of the pair, None: the closest one. Where bodies touch it is 0.
+        """
+        pin.computeDistances(self._model, self._data, self._geometry, self._placements, q)
+        results = list(self._placements.distanceResults)
+        least = min(results if pair is None else [results[pair]], key=lambda r: r.min_distance)
+        points = np.array([least.getNearestPoint1(), least.getNearestPoint2()])
+        return Nearest(max(0.0, float(least.min_distance)), points)
+
+    def __call__(self, q: FloatArray) -> FloatArray:
+        """Return the least distance at each configuration (nq, configurations) [rad]."""
+        robot, results = (self._model, self._data, self._geometry), self._placements.distanceResults
+        least = np.empty(q.shape[1])
+        for k, one in enumerate(np.ascontiguousarray(q.T)):
+            closest = pin.computeDistances(*robot, self._placements, one)
+            least[k] = max(0.0, results[closest].min_distance)
+        return least
+
+
+def link_distance(assembly: Assembly) -> BodyDistance:
+    """Return the distances between links of different arms, on the robot's own geometry."""
+    geometry = assembly.geometry.copy()
+    for a, first in enumerate(assembly.links):
+        for b, second in enumerate(assembly.links[:a]):
+            if first.arm != second.arm:
+                geometry.addCollisionPair(pin.CollisionPair(b, a))
+    return BodyDistance(assembly.model, geometry)
+
+
+def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
+    """Return all links at every instant of a motion.
+
+    Args:
+        q: (nq, instants) [deg].
+
+    Returns:
+        Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit], link by link.
+    """
+    rows = [
+        (instant, arm, link, *start[instant], *end[instant])
+        for arm, link, start, end in joint_positions(assembly, q)
+        for instant in range(q.shape[1])
+    ]
+    return pd.DataFrame(rows, columns=["instant", *LINK])
+
+
+def in_stages(table: pd.DataFrame, num_stages: int) -> pd.DataFrame:
+    """Return the rows of a motion's instants stage by stage, and all of them as the last stage.
+
+    Args:
+        table: With the column instant, whole numbers from 0 on.
+        num_stages: Stages that the motion is cut into, as far as it has instants.
+
+    Returns:
+        The columns of the table, stage, first and last (instants of the stage); an instant between
+        two stages belongs to both.
+    """
+    last = int(table["instant"].max())
+    cuts = np.unique(np.round(np.linspace(0, last, min(num_stages, last) + 1)).astype(np.int64))
+    parts = [
+        table[table["instant"].between(first, stop)].assign(stage=stage, first=first, last=stop)
+        for stage, (first, stop) in enumerate([*itertools.pairwise(cuts), (0, last)])
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _frames(assembly: Assembly, q: FloatArray) -> Iterator[FloatArray]:
+    """Yield the placements of all joints at each configuration, (joints, 4, 4)."""
+    data = assembly.model.createData()
+    for configuration in q.T:
+        pin.forwardKinematics(assembly.model, data, DEGREE * configuration)
+        yield np.array([placement.homogeneous for placement in data.oMi])
+
+
+def refuted(condition: ConditionResults) -> dict[int, tuple[float, str]]:
+    """Return the first contact of every refuted motion: replicate → (instant, its pair)."""
+    rows = condition.summaries[condition.summaries["refuted_at"].notna()]
+    columns = zip(rows.index, rows["refuted_at"], rows["refuted_pair"], strict=True)
+    return {int(k): (float(instant), str(pair)) for k, instant, pair in columns}
+
+
+def contact(
+    prepared: Prepared, solution: FloatArray, instant: float, pair: str
+) -> tuple[float, float]:
+    """Return the point in the plane, (x, y), at which two bodies touch."""
+    planner, problem = prepared
+    motion = planner.motion(problem, solution)
+    scene = next(p.scene for p in planner.parts(problem, motion) if p.first <= instant <= p.last)
+    number = [PAIR.join(scene.pair_names(k)) for k in range(len(scene.pairs))].index(pair)
+    points = BodyDistance(scene.model, scene.geometry).nearest(motion.at(instant), number).points
+    x, y, _ = np.mean(points, axis=0)
+    return float(x), float(y)
+
+
+class Extremes(NamedTuple):
+    """The least and the greatest value at each instant, and the configurations that have them."""
+
+    lowest: FloatArray  # (instants,); inf where nothing was seen
+    highest: FloatArray  # (instants,); −inf where nothing was seen
+    at_lowest: FloatArray  # (nq, instants), of the first replicate of several
+    at_highest: FloatArray  # (nq, instants), of the first replicate of several
+
+    def with_others(self, later: "Extremes") -> "Extremes":
+        """Return the extremes of these and others, of which these come first."""
+        own, later = self._of_length(len(later.lowest)), later._of_length(len(self.lowest))
+        lower, higher = later.lowest < own.lowest, later.highest > own.highest
+        return Extremes(
+            np.where(lower, later.lowest, own.lowest),
+            np.where(higher, later.highest, own.highest),
+            np.where(lower, later.at_lowest, own.at_lowest),
+            np.where(higher, later.at_highest, own.at_highest),
+        )
+
+    def _of_length(self, length: int) -> "Extremes":
+        """Return them with so many instants at least."""
+        more = max(0, length - len(self.lowest))
+        if not more:
+            return self
+        lowest = np.pad(self.lowest, (0, more), constant_values=np.inf)
+        highest = np.pad(self.highest, (0, more), constant_values=-np.inf)
+        at = (np.pad(q, ((0, 0), (0, more))) for q in (self.at_lowest, self.at_highest))
+        return Extremes(lowest, highest, *at)
+
+
+def extremes(
+    replicates: Sequence[int], sampled: Callable[[int], FloatArray], measures: Sequence[Measure]
+) -> tuple[Extremes, ...]:
+    """Return the extremes of several quantities over replicates, one at least.
+
+    `sampled` gives a replicate's motion, (nq, instants).
+    """
+    found: list[Extremes] = []
+    for replicate in replicates:
+        q = sampled(replicate)
+        own = [Extremes(values, values, q, q) for values in (measure(q) for measure in measures)]
+        pairs = zip(found, own, strict=True)
+        found = [seen.with_others(later) for seen, later in pairs] if found else own
+    return tuple(found)
+
+
+def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:
+    """Return a quick measure of a scene's least distance; coal where it alone knows bodies."""
+    return LeastDistance(scene) if known(scene) else exact

@@ -1,0 +1,271 @@
+"""Parameters of conditions with unit and source, as the comments of their option files state them.
+
+An experiment records the option that each group of a condition was taken from; a setting that
+differs from its option is an override. Logs without that record have each component compared with
+the shipped options of its group, and the table names the one that it is most like.
+"""
+
+import functools
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from evoexp.attachments import FILE, SHA256, keep
+from evoexp.condition import PARTS
+from evoexp.report.results.stored_results import WRAPPED, ConditionResults, Results
+from evoexp.shipped import Option, config_directory
+from evoexp.validation import TARGET
+
+OVERRIDE = "override"
+OF_FILE = "content of a file"
+_CAPS = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}
+_COMMENT = re.compile(r"#\s*(?:\[(?P<unit>[^\]]*)\])?\s*(?P<source>.*)")
+_REFERENCE = re.compile(r"\$\{(\w+)\}")
+_SHARED = re.compile(r"\$\{(\w+\.[\w.]+)\}")  # one setting of another group
+
+
+class Entry(NamedTuple):
+    """One value of an option file with the unit and the source that its comment names."""
+
+    value: Any
+    unit: str
+    source: str
+
+
+class Parameter(NamedTuple):
+    """One setting of a condition."""
+
+    name: str  # as one types it: `ga.population_size`
+    value: str  # as text
+    unit: str  # of the value; empty where the option states none
+    source: str  # "paper: …", "assumed: …", "override", "budget smoke", or the comment as it is
+
+
+def parameters(results: Results, condition: ConditionResults) -> list[Parameter]:
+    """Return all settings of one condition, its seed and its number of replicates."""
+    config = {part: getattr(condition.condition, part).canonical() for part in PARTS}
+    taken = {each.group: each for each in condition.options}
+    found: list[Parameter] = []
+    for part, value in config.items():
+        if WRAPPED in value:  # a control or a reference around the planner
+            outer = {key: v for key, v in value.items() if key != WRAPPED}
+            around = "reference" if condition.is_reference else "control"
+            found += _component(around, outer, taken)
+            value = value[WRAPPED]
+        found += _component(part, value, taken)
+    root = option(config_directory() / "config.yaml")
+    found.append(_parameter("seed", condition.condition.seed, root.get("seed"), OVERRIDE))
+    if (most := condition.condition.max_collision_queries) is not None:
+        own = _of_experiment(results).get(name := "budget.collision_queries")
+        found.append(_parameter(name, most, own, OVERRIDE))
+    if not condition.is_reference:  # which has one replicate, however many are planned
+        planned = Entry(planned_replicates(results), *root["num_replicates"][1:])
+        found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
+    budget = _file("budget", results.budget, taken)
+    caps = option(budget) if budget else {}
+    return [_capped(parameter, results.budget, caps) for parameter in found]
+
+
+def planned_replicates(results: Results) -> int:
+    """Return the number of replicates that an experiment has without any cap or override."""
+    name = "num_replicates"
+    default = option(config_directory() / "config.yaml")[name]
+    return int(_of_experiment(results).get(name, default).value)
+
+
+def _of_experiment(results: Results) -> dict[str, Entry]:
+    """Return the settings in the file of the experiment itself, by dotted key."""
+    taken = {each.group: each for c in results.conditions for each in c.options}
+    path = _file("experiment", results.experiment, taken)
+    return option(path) if path else {}
+
+
+def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:
+    """Return the file of the option taken of a group, else of the shipped option, else None."""
+    shipped = config_directory() / group / f"{name}.yaml"
+    path = Path(taken[group].path) if group in taken else shipped
+    return path if path.is_file() else None
+
+
+def overridden(found: Iterable[Parameter]) -> list[str]:
+    """Return the names of settings that are no longer the paper's.
+
+    Any seed is as good as its own, and more replicates are no worse.
+    """
+    changed = (p for p in found if p.source == OVERRIDE or p.source.startswith("budget"))
+    return [p.name for p in changed if p.name not in ("seed", "num_replicates")]
+
+
+@functools.cache
+def option(path: Path) -> dict[str, Entry]:
+    """Return the values of an option file, its defaults filled in, with comments, by dotted key."""
+    text = path.read_text()
+    node = yaml.compose(text)
+    entries: dict[str, Entry] = {}
+    for base in yaml.safe_load(text).get("defaults", ()):
+        if base != "_self_" and (isinstance(base, str) or all("@" in key for key in base)):
+            entries |= _taken_in(base, path, entries)
+    for key, leaf in _leaves(node, ""):
+        value = yaml.safe_load(yaml.serialize(leaf))
+        if key.endswith(f".{FILE}"):  # conditions know files by their content
+            key, value = key.removesuffix(FILE) + SHA256, keep((path.parent / value).read_bytes())
+        entries[key] = Entry(value, *_comment(text.splitlines(), leaf))
+    return entries
+
+
+def _taken_in(base: Any, path: Path, entries: dict[str, Entry]) -> dict[str, Entry]:
+    """Return the entries of an option that another option takes in.
+
+    Args:
+        base: An item of its defaults: `name`, `name@part` or `/group@part: name`.
+        path: Of the option that takes it in.
+        entries: Found so far; of a part that a group was taken in for, the group goes.
+    """
+    key, name = next(iter(base.items())) if isinstance(base, dict) else ("", str(base))
+    group, _, part = key.removeprefix("/").partition("@")
+    if key:
+        entries.pop(part, None)
+    else:
+        group, (name, _, part) = path.parent.name, name.partition("@")
+    beside = path.parents[1] / group / f"{name}.yaml"  # else it is a shipped one
+    found = option(beside if beside.is_file() else config_directory() / group / f"{name}.yaml")
+    return {f"{part}.{own}" if part else own: entry for own, entry in found.items()}
+
+
+def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    """Yield (dotted key, node) of every scalar and every list that is written in one line."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if prefix or key.value != "defaults":
+                yield from _leaves(value, f"{prefix}.{key.value}" if prefix else key.value)
+    elif isinstance(node, yaml.SequenceNode) and not node.flow_style:
+        for k, value in enumerate(node.value):
+            yield from _leaves(value, f"{prefix}[{k}]")
+    else:
+        yield prefix, node
+
+
+def _comment(lines: list[str], node: Any) -> tuple[str, str]:
+    line = lines[node.end_mark.line] if node.end_mark.line < len(lines) else ""
+    match = _COMMENT.match(line[node.end_mark.column :].strip())
+    if match is None:
+        return "", ""
+    unit = (match["unit"] or "").strip()
+    return "" if unit == "-" else unit, match["source"].strip()
+
+
+def _component(group: str, config: dict[str, Any], taken: dict[str, Option]) -> Iterator[Parameter]:
+    """Yield the settings of one component, and of the groups that its option takes in."""
+    if group in taken:
+        path = _file(group, "", taken)
+        where, entries = taken[group].source, option(path) if path else {}
+    else:
+        where, entries = _most_like(group, config)
+    otherwise = OVERRIDE if entries else where  # of a setting that the option does not have
+    yield Parameter(group, f"{config[TARGET]}, revision {config.get('revision')}", "", where)
+    for key, value in config.items():
+        if key not in (TARGET, "revision"):
+            yield from _setting(group, key, value, entries, otherwise, taken)
+
+
+def _setting(
+    group: str,
+    key: str,
+    value: Any,
+    entries: dict[str, Entry],
+    otherwise: str,
+    taken: dict[str, Option],
+) -> Iterator[Parameter]:
+    """Yield a setting; of a component in a component its settings."""
+    reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
+    if reference and isinstance(value, dict):
+        yield from _component(reference[1], value, taken)
+    elif isinstance(value, dict) and TARGET in value:
+        for name, item in value.items():
+            if name not in (TARGET, "revision"):
+                yield from _setting(group, f"{key}.{name}", item, entries, otherwise, taken)
+    else:
+        leaves = dict(_flat(value, key))
+        for path, leaf in leaves.items():
+            unknown = OF_FILE if path not in entries and _is_of_file(path, leaves) else otherwise
+            yield _parameter(f"{group}.{path}", leaf, entries.get(path), unknown)
+        items = {path.split("]")[0] for path in entries if path.startswith(f"{key}[")}
+        if isinstance(value, list) and len(items) > len(value):  # a list cut short
+            yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
+
+
+def _is_of_file(path: str, leaves: Mapping[str, Any]) -> bool:
+    """Whether a setting is the hash of a file, or stands beside one in the item of a list."""
+    item = path.rpartition(".")[0]
+    return path.endswith(f".{SHA256}") or f"{item}.{FILE}.{SHA256}" in leaves
+
+
+def _most_like(group: str, config: dict[str, Any]) -> tuple[str, dict[str, Entry]]:
+    """Name the shipped option that agrees with a component in most settings, with its entries."""
+    leaves = dict(_flat(config, ""))
+    found: list[tuple[int, str, dict[str, Entry]]] = []
+    for path in sorted((config_directory() / group).glob("*.yaml")):
+        entries = option(path)
+        if TARGET not in entries or entries[TARGET].value != config[TARGET]:
+            continue
+        agreeing = sum(_same(leaves[key], entries[key].value) for key in leaves.keys() & entries)
+        lacking = entries.keys() - leaves.keys()
+        lacking_values = [key for key in lacking if not _REFERENCE.match(str(entries[key].value))]
+        where = f"most like conf/{group}/{path.name}"
+        found.append((agreeing - len(lacking_values), where, entries))
+    _, where, entries = max(found, key=lambda each: each[0], default=(0, OVERRIDE, {}))
+    return where, entries
+
+
+def _flat(value: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    """Yield (dotted key, leaf) of canonical data; lists of plain values are leaves."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if key != "revision" and not (prefix and key == TARGET):
+                yield from _flat(item, f"{prefix}.{key}" if prefix else key)
+    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+        for k, item in enumerate(value):
+            yield from _flat(item, f"{prefix}[{k}]")
+    else:
+        yield prefix, value
+
+
+def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Parameter:
+    if entry is None:
+        return Parameter(name, _text(value), "", otherwise)
+    if shared := _SHARED.fullmatch(str(entry.value)):
+        return Parameter(name, _text(value), "", f"as {shared[1]}")
+    source = entry.source if _same(value, entry.value) else otherwise
+    return Parameter(name, _text(value), entry.unit, source)
+
+
+def _capped(parameter: Parameter, budget: str, caps: dict[str, Entry]) -> Parameter:
+    """Name the budget as the source of a setting if it set the value, and no override did."""
+    key = _CAPS.get(parameter.name)
+    if parameter.source == OVERRIDE and key in caps and str(caps[key].value) == parameter.value:
+        return parameter._replace(source=f"budget {budget}")
+    return parameter
+
+
+def _same(value: Any, shipped: Any) -> bool:
+    if isinstance(value, list) and isinstance(shipped, list):
+        return len(value) == len(shipped) and all(
+            _same(a, b) for a, b in zip(value, shipped, strict=True)
+        )
+    if isinstance(shipped, str) and isinstance(value, float):  # 1e-3 is a text to YAML 1.1
+        try:
+            return float(shipped) == value
+        except ValueError:
+            return False
+    return bool(value == shipped)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return "[" + ", ".join(_text(item) for item in value) + "]"
+    return repr(value) if isinstance(value, float) else str(value)

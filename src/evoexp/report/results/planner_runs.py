@@ -1,0 +1,236 @@
+"""Finished runs of one planner on one problem, rated in one currency: by proven answers."""
+
+import hashlib
+import json
+import re
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from evoexp.condition import Condition
+from evoexp.records import FloatArray
+from evoexp.report.results.proven_answers import (
+    answers_of,
+    best_lengths,
+    first_reached,
+    straight_line,
+)
+from evoexp.report.results.stored_results import ConditionResults
+
+MULTIPLES = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of a problem's unit of length
+_SEPARATORS = re.compile(r" · |: |, | – | - ")  # between the parts of a label
+
+
+class Problem(NamedTuple):
+    """A task that planners are compared on."""
+
+    name: str  # that pages show
+    # Of robot and scenario, 12 hex digits, see `problem_key`; empty where nobody knows them
+    key: str = ""
+    straight: float = np.nan  # distance from start to goal [rad, m]; NaN where goals differ
+    # Length of the shortest proven answer known before these runs were compared [rad, m], see
+    # `best_known`; NaN: none is stored
+    best_known: float = np.nan
+
+    @property
+    def unit(self) -> float:
+        """Length whose multiples are targets [rad, m]; NaN: any proven answer is the only one."""
+        if not np.isnan(self.best_known):
+            return self.best_known
+        return self.straight if self.straight > 0.0 else np.nan
+
+    @property
+    def unit_name(self) -> str:
+        """The length whose multiples are targets, in words."""
+        if np.isnan(self.unit):
+            return "none: any proven answer is the only target"
+        return "straight line" if np.isnan(self.best_known) else "best known"
+
+    @property
+    def targets(self) -> tuple[float, ...]:
+        """Lengths that answers are to fall below [rad, m]; inf: any proven answer."""
+        if np.isnan(self.unit):
+            return MULTIPLES[:1]
+        return tuple(multiple * self.unit for multiple in MULTIPLES)
+
+
+class PlannerRuns(NamedTuple):
+    """Finished runs of one planner on one problem."""
+
+    planner: str  # its name in figures
+    problem: Problem  # that it was run on
+    label: str  # of both, in tables
+    # Its answers in order; columns replicate, collision_queries, length and certified
+    table: pd.DataFrame
+    replicates: tuple[int, ...]  # (runs,) in order
+    # (runs,) collision queries of the whole runs, those that the task tells of included
+    spent: FloatArray
+    # That was run; None: the runs were given, nobody here judged them
+    condition: ConditionResults | None
+
+    def first_reached(self, longest: float = np.inf) -> tuple[FloatArray, np.ndarray]:
+        """Return each run's effort up to an answer that is so short, and whether it has one.
+
+        Args:
+            longest: Length that an answer may have [rad, m].
+        """
+        effort, reached = first_reached(self.table, self.replicates, longest, self.spent)
+        return effort, reached
+
+    @property
+    def best_lengths(self) -> FloatArray:
+        """Least length of a proven answer of each run, (runs,) [rad, m]; inf: none is proven."""
+        return best_lengths(self.table, self.replicates)
+
+
+def stored_conditions(runs: Iterable[PlannerRuns]) -> tuple[ConditionResults, ...]:
+    """Return the conditions of those runs that were not given."""
+    return tuple(own.condition for own in runs if own.condition is not None)
+
+
+def prior_queries(condition: ConditionResults) -> int:
+    """Return how many configurations the task itself says to be free or not, as a map does."""
+    planner, problem = condition.prepared
+    return int(planner.prior_queries(problem))
+
+
+def problem_key(condition: Condition) -> str:
+    """Return 12 hex digits of robot and scenario: of all that a condition's problem consists of."""
+    parts = {"robot": condition.robot.canonical(), "scenario": condition.scenario.canonical()}
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def of_results(
+    conditions: Sequence[ConditionResults], known: Mapping[str, float] | None = None
+) -> list[PlannerRuns]:
+    """Return the runs of conditions, in order, with their answers judged.
+
+    Conditions of a problem that nobody has a motion for are left out: their answers are of another
+    kind. A planner without a motion where others have one has failed, and stays.
+
+    Args:
+        conditions: That are compared.
+        known: Key of a problem → best known length [rad, m].
+    """
+    found = answers_of(conditions)
+    moving = {_task(c) for c in conditions if len(found[c.label])}
+    kept = [c for c in conditions if _task(c) in moving]
+    if not kept:
+        return []
+    names = problem_names(kept)
+    problems = {}
+    for task, own in _by_task(kept).items():
+        key = problem_key(own[0].condition)
+        tables = [found[c.label] for c in own if len(found[c.label])]
+        straight = straight_line(pd.concat(tables))
+        problems[task] = Problem(names[task], key, straight, (known or {}).get(key, np.nan))
+    planners = planner_names(kept, names)
+    return [
+        PlannerRuns(
+            planners[c.label],
+            problems[_task(c)],
+            c.label,
+            found[c.label],
+            tuple(int(k) for k in c.summaries.index),
+            c.column("collision_queries") + prior_queries(c),
+            c,
+        )
+        for c in kept
+    ]
+
+
+def problem_names(conditions: Sequence[ConditionResults]) -> dict[Hashable, str]:
+    """Return a name for each problem: what the labels of its conditions, and no others, share.
+
+    Where its labels share nothing: the name of the scenario's option that was taken, or of its
+    component; and with it the robot's, where two problems have one name.
+    """
+    groups = _by_task(conditions)
+    parts = {task: [_parts(c) for c in own] for task, own in groups.items()}
+    names: dict[Hashable, str] = {}
+    for task, own in parts.items():
+        others = {
+            part for other in groups if other != task for each in parts[other] for part in each
+        }
+        shared = [part for part in own[0] if all(part in each for each in own)]
+        names[task] = ", ".join(dict.fromkeys(part for part in shared if part not in others))
+        is_planner = len(conditions) == 1  # the label of one condition names either
+        if not names[task] or is_planner:
+            names[task] = _option(groups[task][0], "scenario")
+    every = list(names.values())
+    robots = {
+        task: f"{name}, {_option(groups[task][0], 'robot')}" if every.count(name) > 1 else name
+        for task, name in names.items()
+    }
+    return _numbered(robots)
+
+
+def planner_names(
+    conditions: Sequence[ConditionResults], problems: dict[Hashable, str]
+) -> dict[str, str]:
+    """Return the planner's name of each condition, by its label.
+
+    Of one problem each condition is a planner. Of several, a planner's name is what its labels have
+    beside the problem's, if each such name stands for one component and one of them at least occurs
+    on two problems; else it is the component, with a number where its settings differ.
+    """
+    groups = _by_task(conditions)
+    if len(groups) == 1:
+        return {c.label: c.label for c in conditions}
+    everywhere = set.intersection(*(set(_parts(c)) for c in conditions))
+    rest: dict[str, str] = {}
+    for c in conditions:
+        problem = set(problems[_task(c)].split(", ")) | everywhere
+        rest[c.label] = ", ".join(p for p in _parts(c) if p not in problem)
+    every = [(_task(c), rest[c.label]) for c in conditions]
+    kinds = {(rest[c.label], c.condition.planner.component) for c in conditions}
+    num_names = len({name for _, name in every})
+    unique = len(set(every)) == len(every) and len(kinds) == num_names
+    if unique and all(rest.values()) and num_names < len(every):
+        return rest
+    return _component_names(conditions)
+
+
+def _component_names(conditions: Sequence[ConditionResults]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    kinds: list[Any] = list(dict.fromkeys(c.condition.planner for c in conditions))
+    for c in conditions:
+        same = [kind for kind in kinds if kind.component == c.condition.planner.component]
+        number = f" {same.index(c.condition.planner) + 1}" if len(same) > 1 else ""
+        found[c.label] = f"{c.condition.planner.component}{number}"
+    return found
+
+
+def _parts(c: ConditionResults) -> list[str]:
+    return _SEPARATORS.split(c.label)
+
+
+def _task(c: ConditionResults) -> Hashable:
+    return c.condition.robot, c.condition.scenario
+
+
+def _by_task(conditions: Sequence[ConditionResults]) -> dict[Hashable, list[ConditionResults]]:
+    found: dict[Hashable, list[ConditionResults]] = {}
+    for c in conditions:
+        found.setdefault(_task(c), []).append(c)
+    return found
+
+
+def _option(c: ConditionResults, group: str) -> str:
+    """Return the name of the option that was taken of a group; else that of the component."""
+    part: Any = getattr(c.condition, group)
+    taken = [option.name for option in c.options if option.group == group]
+    return taken[0] if taken else str(part.component)
+
+
+def _numbered(names: dict[Hashable, str]) -> dict[Hashable, str]:
+    """Return the names, with a number behind those that are not the only ones of their kind."""
+    every, seen = list(names.values()), dict[str, int]()
+    found = {}
+    for task, name in names.items():
+        seen[name] = seen.get(name, 0) + 1
+        found[task] = f"{name} {seen[name]}" if every.count(name) > 1 else name
+    return found

@@ -1,0 +1,111 @@
+"""Quantities of single runs, counts of runs and groups of conditions that several papers share."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from evoexp.records import BoolArray, FloatArray
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Values
+from evoexp.report.statistics.inference import Proportion
+
+
+def planned_by(results: Results, planner: type) -> bool:
+    """Return whether there are results, all of one type of planner, controls included."""
+    found = results.with_data
+    return bool(found) and all(isinstance(c.planner, planner) for c in found)
+
+
+def solved(condition: ConditionResults) -> np.ndarray:
+    """Return whether each run ended with a solution, (done,)."""
+    return condition.summaries["solved"].to_numpy(dtype=bool)
+
+
+def success(condition: ConditionResults) -> Proportion:
+    """Count the runs that ended with a solution."""
+    return Proportion(condition.solved, condition.done)
+
+
+def counted(holds: Any) -> Proportion:
+    """Count the runs in which something holds.
+
+    Args:
+        holds: (runs,) of truth values.
+    """
+    return Proportion(int(np.count_nonzero(holds)), len(holds))
+
+
+def search_seconds(condition: ConditionResults) -> FloatArray:
+    """Return the CPU time of each run without that of the exact verdict, (done,) [s]."""
+    return np.asarray(condition.column("cpu_s") - condition.column("certificate_s"))
+
+
+def evaluations_per_second(condition: ConditionResults) -> FloatArray:
+    """Return the evaluations of each run per second of its search, (done,) [1/s]."""
+    return np.asarray(condition.column("evaluations") / search_seconds(condition))
+
+
+def median_replicate(
+    condition: ConditionResults, values: FloatArray, among: np.ndarray | None = None
+) -> int:
+    """Return the replicate that has the median value, the lower one of two.
+
+    Args:
+        condition: The condition of the runs.
+        values: (done,) without NaN.
+        among: (done,) which runs are candidates, at least one; None: all.
+    """
+    candidates = np.arange(len(values)) if among is None else np.flatnonzero(among)
+    ordered = candidates[np.argsort(values[candidates], kind="stable")]
+    return int(condition.summaries.index[ordered[(len(ordered) - 1) // 2]])
+
+
+def grouped(
+    conditions: Iterable[ConditionResults], key: Callable[[ConditionResults], object]
+) -> tuple[tuple[ConditionResults, ...], ...]:
+    """Return the conditions in groups of equal keys, groups in the order of their first members.
+
+    Keys are compared by their `repr`, so a canonical form will do.
+    """
+    found: dict[str, list[ConditionResults]] = {}
+    for condition in conditions:
+        found.setdefault(repr(key(condition)), []).append(condition)
+    return tuple(map(tuple, found.values()))
+
+
+def first_feasible(condition: ConditionResults) -> FloatArray:
+    """Return the first generation that has a feasible individual, (done,); inf: none has.
+
+    A run without one is not left out: it took longer than every run that has one.
+    """
+    found = condition.column("first_feasible_generation")
+    return np.where(np.isnan(found), np.inf, found)
+
+
+def num_joints(condition: ConditionResults) -> int:
+    """Return the number of joints of the arm, whose start the scenario names."""
+    return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
+
+
+def certified(condition: ConditionResults) -> Proportion:
+    """Count the solved runs whose motions the exact verdict certifies."""
+    free = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
+    return counted(free[solved(condition)])
+
+
+def where_solved(values: Values) -> Values:
+    """Return values of runs, (done,), that are infinite where a run is not solved."""
+    return lambda condition: np.where(solved(condition), values(condition), np.inf)
+
+
+def on_common_seeds(
+    one: ConditionResults, two: ConditionResults, values: Values
+) -> list[tuple[FloatArray, BoolArray]]:
+    """Return values and success of the replicates that both conditions have, for each of both."""
+    common = one.summaries.index.intersection(two.summaries.index)
+    return [
+        (values(c)[rows], solved(c)[rows])
+        for c in (one, two)
+        for rows in (c.summaries.index.get_indexer(common),)
+    ]

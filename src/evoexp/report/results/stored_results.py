@@ -1,0 +1,361 @@
+"""Stored results of the conditions that a report is asked for."""
+
+import functools
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from evoexp.condition import Condition, Prepared
+from evoexp.errors import NothingStored
+from evoexp.paths.motion import Motion
+from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.records import FloatArray
+from evoexp.report.statistics.inference import Spread, spread
+from evoexp.shipped import ORIGIN, Option, config_directory, shipped
+from evoexp.store.files import warn
+from evoexp.store.identity import DamagedFile, Plan
+from evoexp.store.log_reader import read_array, read_log, read_solution
+from evoexp.store.messages import TERM
+from evoexp.store.run_directory import RunDirectory
+from evoexp.store.summaries import damaged_logs
+from evoexp.store.tables import read_generations, read_summaries
+
+Kind = TypeVar("Kind")
+# the field of a control (random search) that holds the planner it stands beside
+WRAPPED = "planner"
+
+
+def wrapped(planner: Any) -> Any:
+    """Return the planner that a control or a reference stands beside; of others themselves."""
+    return planner.planner if isinstance(planner, WrappedPlanner) else planner
+
+
+class Verdicts(NamedTuple):
+    """Counts of the exact verdicts on the motions of a condition's finished replicates."""
+
+    judged: int  # motions
+    certified: int  # free of contact
+    refuted: int  # in contact somewhere
+    undecided: int  # neither proven
+    solved_refuted: int  # accepted by the paper's own model and refuted
+    with_margin: int  # that never come closer than the security margin
+    margin_broken: int  # that do, and touch nothing: certified, required margin not kept
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionResults:
+    """One condition's replicates as far as they are stored and planned.
+
+    The content of their logs is read at its first use: a page that draws no convergence reads no
+    generation. Thousands of logs are opened one by one, and only the columns stay in memory.
+    """
+
+    label: str  # its name in figures
+    condition: Condition  # the condition that was run
+    # Number of planned replicates: by the experiment or, where more were asked for or are stored,
+    # that many
+    planned: int
+    summaries: pd.DataFrame  # one row per finished replicate, indexed by replicate, in order
+    failures: dict[int, str]  # replicate → reason of its failure
+    run: RunDirectory  # directory of the logs
+    code: dict[str, Any]  # version, commit and dirty flag of the code that created the run
+    # The option that was taken of each group; empty where nothing records it
+    options: tuple[Option, ...] = ()
+    # The numbers of replicates that were asked for, in order; empty where nothing records them
+    plans: tuple[Plan, ...] = ()
+    # Name → what is wrong with it, of the logs that are left out
+    damaged: Mapping[str, str] = field(default_factory=dict)
+
+    @functools.cached_property
+    def generations(self) -> pd.DataFrame:
+        """One row per generation of every finished replicate."""
+        return read_generations(self.run, self._finished)
+
+    @functools.cached_property
+    def solutions(self) -> dict[int, FloatArray]:
+        """Replicate → its best solution, flat."""
+        return {k: read_solution(self.run.log_path(k)).values for k in self._finished}
+
+    @functools.cached_property
+    def first_solution(self) -> FloatArray:
+        """Best of the initial population of the best replicate."""
+        return read_log(self.run.log_path(self.best_replicate)).solutions[0].values
+
+    def array(self, name: str) -> NDArray[Any]:
+        """Return an array attached to the log of the best replicate.
+
+        Raises:
+            KeyError: If there is none of this name.
+        """
+        return read_array(self.run.log_path(self.best_replicate), name)
+
+    @property
+    def _finished(self) -> list[int]:
+        return [int(replicate) for replicate in self.summaries.index]
+
+    @property
+    def done(self) -> int:
+        """Number of finished replicates."""
+        return len(self.summaries)
+
+    @property
+    def failed(self) -> int:
+        """Number of failed replicates."""
+        return len(self.failures)
+
+    def added(self, fixed: int) -> int:
+        """Return how many finished replicates were asked for when results were there already.
+
+        Args:
+            fixed: Replicates that the experiment fixes by itself; these never count.
+        """
+        known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
+        seen = [plan.num_replicates for plan in self.plans if plan.stored]
+        if not seen:
+            return 0
+        return int(np.count_nonzero(self.summaries.index >= max([fixed, *known])))
+
+    @property
+    def solved(self) -> int:
+        """Number of finished replicates whose best solution the paper's own model accepts."""
+        return int(self.summaries["solved"].sum())
+
+    @property
+    def verdicts(self) -> Verdicts:
+        """Count of the exact verdicts."""
+        motions = self.summaries[
+            self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
+        ]
+        certified, margin = motions["certified"], motions["certified_margin"]
+        refuted = certified.eq(False).fillna(False)
+        return Verdicts(
+            len(motions),
+            int(certified.eq(True).sum()),
+            int(refuted.sum()),
+            int(certified.isna().sum()),
+            int((refuted & motions["solved"]).sum()),
+            int(margin.eq(True).sum()),
+            int((margin.eq(False).fillna(False) & certified.eq(True).fillna(False)).sum()),
+        )
+
+    @property
+    def best_replicate(self) -> int:
+        """Replicate of the lowest best cost; among equals the first."""
+        return int(self.summaries.index[int(np.argmin(self.column("best_cost")))])
+
+    @property
+    def prepared(self) -> Prepared:
+        """Planner and problem, to judge solutions with."""
+        return self.condition.prepare()
+
+    def problem(self, kind: type[Kind]) -> Kind:
+        """Return the problem that the planner prepared, of the public type that a page expects.
+
+        Raises:
+            TypeError: If another planner was run.
+        """
+        found = self.prepared.problem
+        if not isinstance(found, kind):
+            raise TypeError(f"{self.label}: a {kind.__qualname__} is expected, was {type(found)}")
+        return found
+
+    def evaluate(self, solution: FloatArray) -> dict[str, float]:
+        """Return the named terms of a solution, as the planner's `evaluate` tells them."""
+        planner, problem = self.prepared
+        return dict(planner.evaluate(problem, solution))
+
+    def motion(self, replicate: int) -> Motion:
+        """Return the motion of a replicate's best solution.
+
+        Raises:
+            TypeError: If the planner's answer is no motion.
+        """
+        planner, problem = self.prepared
+        found = planner.motion(problem, self.solutions[replicate])
+        if not isinstance(found, Motion):
+            raise TypeError(f"{self.label}: its solutions are no motions")
+        return found
+
+    @property
+    def planner(self) -> Any:
+        """The paper's planner; of a control or a reference the planner that it stands beside."""
+        return wrapped(self.condition.planner)
+
+    @property
+    def is_control(self) -> bool:
+        """Return whether this is a control: a planner that stands beside the paper's."""
+        return isinstance(self.condition.planner, WrappedPlanner) and not self.is_reference
+
+    @property
+    def is_reference(self) -> bool:
+        """Return whether this is a reference: a truth that stands beside the planners."""
+        return self.condition.is_reference
+
+    def column(self, name: str) -> FloatArray:
+        """Return a column of the summaries as floats, (done,); NaN where there is none."""
+        if name not in self.summaries:
+            return np.full(self.done, np.nan)
+        return self.summaries[name].to_numpy(dtype=np.float64, na_value=np.nan)
+
+    def spread(self, name: str) -> Spread:
+        """Return median and quartiles of a column of the summaries."""
+        return spread(self.column(name))
+
+
+class Results(NamedTuple):
+    """Everything that a report is drawn from."""
+
+    experiment: str  # name of the experiment; empty for runs given by their hashes
+    budget: str  # name of the budget; empty for runs given by their hashes
+    conditions: tuple[ConditionResults, ...]  # in the order of the experiment
+    outputs: Path = Path()  # root of the outputs that they were read from
+
+    @property
+    def with_data(self) -> tuple[ConditionResults, ...]:
+        """Conditions of which at least one replicate is finished."""
+        return tuple(condition for condition in self.conditions if condition.done)
+
+    @property
+    def main(self) -> tuple[ConditionResults, ...]:
+        """Conditions with data without controls and references; controls if there are no others."""
+        return tuple(c for c in self.evolved if not c.is_control) or self.evolved
+
+    @property
+    def evolved(self) -> tuple[ConditionResults, ...]:
+        """Conditions with data without references; references if there are no others."""
+        return tuple(c for c in self.with_data if not c.is_reference) or self.with_data
+
+    @property
+    def references(self) -> tuple[ConditionResults, ...]:
+        """References with data."""
+        return tuple(c for c in self.with_data if c.is_reference)
+
+    @property
+    def terms(self) -> list[str]:
+        """Names of the terms that any summary has, in order."""
+        columns = {str(name) for c in self.with_data for name in c.summaries}
+        return sorted(name.removeprefix(TERM) for name in columns if name.startswith(TERM))
+
+    @property
+    def suffixed(self) -> Iterator[tuple[ConditionResults, str]]:
+        """Conditions of `main` with the ends of their files' names, empty for a single one."""
+        for k, condition in enumerate(self.main):
+            slug = re.sub(r"[^a-z0-9]+", "_", condition.label.lower()).strip("_") or str(k)
+            yield condition, "" if len(self.main) == 1 else f"_{k + 1}_{slug}"
+
+    def beside(self, experiment: str) -> "Results":
+        """Return the stored results of another shipped experiment at the paper's budget.
+
+        Conditions are found by their hashes, those that were never run are missing.
+        """
+        rows = [row for row in shipped() if (row.experiment, row.budget) == (experiment, "paper")]
+        runs = {row.label: RunDirectory(self.outputs, row.condition_id) for row in rows}
+        found = tuple(
+            _read(self.outputs, label, Condition.from_json(run.config_json()), None, None)
+            for label, run in runs.items()
+            if run.completed()
+        )
+        return Results(experiment, "paper", found, self.outputs)
+
+    def position(self, label: str) -> int:
+        """Return a condition's place in the experiment, which gives it its colour."""
+        return [condition.label for condition in self.conditions].index(label)
+
+
+def gather(
+    outputs: Path,
+    conditions: Sequence[tuple[str, Condition]],
+    num_replicates: int | None,
+    experiment: str,
+    budget: str,
+    command: str,
+    options: Mapping[str, tuple[Option, ...]] | None = None,
+) -> Results:
+    """Read the stored results of some conditions.
+
+    Args:
+        outputs: Root of all outputs.
+        conditions: (label, condition).
+        num_replicates: Planned for every condition, at least; every stored one is read.
+        experiment: Its name.
+        budget: Its name.
+        command: The command that helps where nothing is stored.
+        options: Label → options that were taken; None: those that the runs' manifests name.
+
+    Raises:
+        NothingStored: If no replicate of any condition is there, done or failed.
+        CorruptLog: If a log cannot be trusted.
+    """
+    found = tuple(
+        _read(outputs, label, condition, num_replicates, (options or {}).get(label))
+        for label, condition in conditions
+    )
+    if not any(condition.done or condition.failed for condition in found):
+        raise NothingStored(
+            f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}"
+        )
+    return Results(experiment, budget, found, outputs)
+
+
+def _read(
+    outputs: Path,
+    label: str,
+    condition: Condition,
+    num_replicates: int | None,
+    options: tuple[Option, ...] | None,
+) -> ConditionResults:
+    run = RunDirectory(outputs, condition.id)
+    is_stored = bool(run.completed() or run.failed())
+    if is_stored:
+        run.check_identity()
+    plans = _plans(run)
+    rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
+    rows = rows.set_index("replicate")
+    asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
+    done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
+    return ConditionResults(
+        label,
+        condition,
+        run.num_planned(asked),
+        done,
+        dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
+        run,
+        _code(run) if is_stored else {},
+        _recorded_options(run) if options is None and is_stored else options or (),
+        plans,
+        damaged_logs(run),
+    )
+
+
+def _plans(run: RunDirectory) -> tuple[Plan, ...]:
+    """Return the plans of a run; without its list of plans, which is said, none."""
+    try:
+        return tuple(run.plans())
+    except DamagedFile as error:
+        warn(f"{error}; added replicates are not marked")
+        return ()
+
+
+def _recorded_options(run: RunDirectory) -> tuple[Option, ...]:
+    """Return the options that a run's manifest names; only shipped ones have files to be read."""
+    recorded: dict[str, dict[str, str]] = run.manifest().get("options") or {}
+    found = []
+    for group, each in recorded.items():
+        shipped = config_directory() / group / f"{each['name']}.yaml"
+        path = str(shipped) if each["origin"] == ORIGIN else ""
+        found.append(Option(group, each["name"], each["origin"], path))
+    return tuple(found)
+
+
+def _code(run: RunDirectory) -> dict[str, Any]:
+    """Return version and commit of the code that created a run, from its manifest."""
+    manifest = run.manifest()
+    git = manifest.get("git") or {}
+    version = manifest.get("versions", {}).get("evoexp")
+    return {"version": version, "commit": git.get("commit"), "dirty": git.get("dirty")}

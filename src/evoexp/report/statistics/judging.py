@@ -1,0 +1,254 @@
+"""Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from evoexp.registry import CLAIMS, names, registered
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.parameters import option, planned_replicates
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules
+from evoexp.report.statistics.comparisons import Comparison, Values, compared
+from evoexp.report.statistics.inference import Proportion, fisher_exact
+from evoexp.shipped import config_directory, shipped
+
+REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
+    "reproduced",
+    "contradicted",
+    "inconclusive",
+    "not judged",
+)
+ONLY_CONTROLS = "only a control was run"
+Evidence = str | Mapping[str, object]
+"""The words of the rule's sentence of evidence, or a whole text."""
+
+
+class Hearing(NamedTuple):
+    """One claim before its judge: each method judges it by one kind of rule."""
+
+    rule: Rule  # of the claim, its words filled in
+    reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
+    significance: float  # below this adjusted p-value a difference counts
+
+    def every(self, evidence: Evidence, holds: int, done: int, planned: int) -> Claim:
+        """Judge a claim about every run.
+
+        One counter-example contradicts; all planned runs are needed to reproduce.
+        """
+        return self._claim("every", evidence, done, 0 < planned <= done, holds < done)
+
+    def majority(self, evidence: Evidence, holds: int, done: int) -> Claim:
+        """Judge a claim that is reproduced if it holds in more than half of the runs."""
+        most = holds > done / 2
+        return self._claim("majority", evidence, done, most, bool(done) and not most)
+
+    def better(self, row: Comparison | None, word: str, told: str = "{}") -> Claim:
+        """Judge a claim that the first condition of a comparison is better than the second.
+
+        Args:
+            row: The comparison; None where the two share no seed.
+            word: Of the one that is better: "lower", "earlier".
+            told: The evidence; its {} stands for the comparison in words.
+        """
+        says = row.says(self.significance) if row else 0
+        words = evidence(row, word) if row else "nothing to compare"
+        heard = self._replace(
+            rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
+        )
+        counted = row and row.num_seeds
+        return heard._claim("better", told.replace("{}", words), counted, says == 1, says == -1)
+
+    def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
+        """Judge a claim that a condition is better than each of several others.
+
+        One that is significantly better contradicts; all must be significantly worse to reproduce.
+        """
+        says = {row.says(self.significance) for row in rows}
+        return self._claim("better than all", evidence, _seeds(rows), says == {1}, -1 in says)
+
+    def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
+        """Judge a claim that one of several settings is the best.
+
+        One that is significantly better contradicts; it is reproduced if it has the best median and
+        one other setting at least is significantly worse: neighbours of a best setting are about as
+        good, so not all need be.
+        """
+        says = {row.says(self.significance) for row in rows}
+        holds = best_median and 1 in says
+        return self._claim("best", evidence, _seeds(rows), holds, -1 in says)
+
+    def greater(
+        self, evidence: Evidence, one: Proportion, two: Proportion, p_adjusted: float | None = None
+    ) -> Claim:
+        """Judge a claim that `one` is greater than `two`, by Fisher's exact test.
+
+        Its p-value is given where it is one of several, adjusted.
+        """
+        p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
+        says = greater(one, two, p_value, self.significance)
+        counted = f"{one.total} and {two.total}"
+        return self._claim("greater", evidence, counted, says == 1, says == -1)
+
+    def same_share(
+        self, evidence: Evidence, own: Proportion, printed: Proportion, p_adjusted: float
+    ) -> Claim:
+        """Judge a claim that gives a share, a sample itself, by Fisher's exact test."""
+        same, counted = p_adjusted >= self.significance, f"{own.total} and {printed.total}"
+        is_known = own.total > 0
+        return self._claim(
+            "same share", evidence, counted, is_known and same, is_known and not same
+        )
+
+    def own(self, evidence: Evidence, n: object, holds: bool | None) -> Claim:
+        """Judge a claim by a rule of its own, which its `claims.yaml` states.
+
+        Args:
+            evidence: The numbers.
+            n: Runs, or whatever else was counted.
+            holds: Whether it is reproduced; None: nobody can say.
+        """
+        return self._claim(OWN, evidence, n, holds is True, holds is False)
+
+    def elsewhere(self, evidence: Evidence) -> Claim:
+        """Return the claim unjudged: another experiment judges it, or nothing can."""
+        return self.made(evidence, "–", NOT_JUDGED)
+
+    def _claim(
+        self, kind: str, evidence: Evidence, n: object, reproduced: bool, contradicted: bool
+    ) -> Claim:
+        if kind != self.rule.kind:
+            raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
+        # a comparison without a pair of runs
+        reason = self.reason or ("nothing to compare" if n in (None, "0") else "")
+        if reason:
+            return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
+        verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else INCONCLUSIVE
+        return self.made(evidence, n, verdict)
+
+    def made(self, evidence: Evidence, n: object, verdict: str) -> Claim:
+        """Return the claim with this evidence and verdict."""
+        rule, counted = self.rule, "0" if n is None else str(n)
+        told = evidence if isinstance(evidence, str) else markdown.filled(rule.evidence, evidence)
+        return Claim(rule.claim, rule.source, told, verdict, rule.name, rule.text, counted)
+
+
+def _seeds(rows: Sequence[Comparison]) -> str:
+    """Return the numbers of common seeds: "20", or "18 to 20"."""
+    counts = sorted({row.num_seeds for row in rows})
+    return " to ".join(map(str, counts if len(counts) < 2 else (counts[0], counts[-1]))) or "0"
+
+
+def greater(one: Proportion, two: Proportion, p_value: float, significance: float) -> int:
+    """Return 1 if a proportion is significantly greater than another, −1 if smaller, else 0.
+
+    The p-value is that of Fisher's exact test, adjusted where it is one of several.
+    """
+    if not one.total or not two.total or p_value >= significance:
+        return 0
+    return int(one.share > two.share) - int(one.share < two.share)
+
+
+class Judge(NamedTuple):
+    """Opens the hearings of claims; where nothing is judged, each claim names the reason."""
+
+    reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
+    settings: ReportSettings  # levels and resamples
+    rules: Rules = NO_RULES  # of the paper's claims, by name
+
+    @property
+    def significance(self) -> float:
+        """Below this adjusted p-value a difference counts."""
+        return self.settings.significance
+
+    @property
+    def level(self) -> float:
+        """The level of every interval."""
+        return self.settings.confidence
+
+    def compared(
+        self, first: ConditionResults, second: ConditionResults, values: Values
+    ) -> Comparison | None:
+        """Compare two conditions in a quantity, lower is better; None: they share no seed."""
+        return next(iter(compared([(first, second)], values, self.settings)), None)
+
+    def share(self, proportion: Proportion, decimals: int = 0) -> str:
+        """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
+        return proportion.with_interval(self.level, decimals)
+
+    def on(self, name: str, **words: object) -> Hearing:
+        """Open the hearing of a claim.
+
+        Args:
+            name: Of its rule.
+            words: Filled in for the words in braces of its texts.
+
+        Raises:
+            KeyError: If there is no such rule, or a word is missing.
+        """
+        # a rule that compares names its own word where it is judged
+        rule = self.rules[name].about(**{"word": "{word}", **words})
+        return Hearing(rule, self.reason, self.significance)
+
+
+def judge(results: Results, settings: ReportSettings, rules: Rules = NO_RULES) -> Judge:
+    """Return the judge of an experiment's claims."""
+    return Judge(not_judged(results), settings, rules)
+
+
+def not_judged(results: Results) -> str:
+    """Return why claims are not to be judged; empty if they are."""
+    if results.budget != "paper":
+        return f"budget {results.budget or 'unknown'}"
+    if results.main and all(c.is_control for c in results.main):
+        return ONLY_CONTROLS
+    planned = planned_replicates(results)
+    if any(c.planned < c.condition.num_replicates(planned) for c in results.conditions):
+        return "fewer replicates than planned"
+    own = {
+        row.condition_id
+        for row in shipped()
+        if (row.experiment, row.budget) == (results.experiment, "paper")
+    }
+    seed = option(config_directory() / "config.yaml")["seed"].value  # another one is as good as any
+    if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
+        return "settings overridden"
+    return ""
+
+
+def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
+    """Yield the claims that an experiment judges on conditions which are not among its results."""
+    budget = results.budget if results.budget == "smoke" else "paper"
+    rows = [r for r in shipped() if (r.experiment, r.budget) == (results.experiment, budget)]
+    missing = {row.label for row in rows} - {c.label for c in results.conditions}
+    if not missing:
+        return
+    known, verdict = {claim.name for claim in judged}, f"{NOT_JUDGED} (conditions left out)"
+    for paper in names(CLAIMS):
+        registration = registered(CLAIMS, paper)
+        assert registration is not None
+        for rule in registration.load().values():
+            if results.experiment in rule.experiments and rule.name not in known:
+                told = "not among its conditions: " + ", ".join(sorted(missing))
+                yield Hearing(rule.unjudged(), "", 0.0).made(told, "0", verdict)
+
+
+def fisher_evidence(one: Proportion, two: Proportion) -> str:
+    """Return the test of two proportions in words: "Fisher's exact p = 0.02"."""
+    return f"Fisher's exact p = {markdown.p_value(fisher_exact(one, two))}"
+
+
+def evidence(comparison: Comparison, better: str) -> str:
+    """Return a comparison in words: "lower by 97 % of the signed ranks (…), in 80 % of all …".
+
+    The signed ranks come first: the verdict follows them. The two may differ where more runs are
+    better, but those that are worse are worse by more.
+    """
+    low, high = comparison.better.interval
+    return (
+        f"{better} by {100 * comparison.test.share:.0f} % of the signed ranks of seeds (p = "
+        f"{markdown.p_value(comparison.p_adjusted)}), in {100 * comparison.better.a12:.0f} % of "
+        f"all pairs of runs (A12 {comparison.better.a12:.3f} [{low:.3f}, {high:.3f}], rank-sum "
+        f"p = {markdown.p_value(comparison.unpaired_adjusted)})"
+    )

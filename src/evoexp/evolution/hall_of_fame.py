@@ -41,27 +41,6 @@ class Hall(NamedTuple):
         teams = np.empty((depth, num_populations), dtype=np.int64)
         return cls(teams, ages, collisions, np.empty(depth))
 
-    @classmethod
-    def empty(cls, num_populations: int) -> Self:
-        """Return a hall without teams."""
-        return cls.room(0, num_populations)
-
-    @property
-    def num_teams(self) -> int:
-        """Number of teams."""
-        return len(self.teams)
-
-    def first(self, count: int) -> Self:
-        """Return the first `count` teams."""
-        teams, ages, collisions, costs = self
-        return type(self)(teams[:count], ages[:count], collisions[:count], costs[:count])
-
-    def moved(self, first: int) -> Self:
-        """Return the hall in the next populations: the k-th team's members are at first + k."""
-        teams = np.empty_like(self.teams)
-        teams[:] = np.arange(first, first + self.num_teams)[:, np.newaxis]
-        return self._replace(teams=teams)
-
 
 class HallRules(NamedTuple):
     """Which teams a hall takes."""
@@ -114,21 +93,19 @@ def choose_collaborator(
 
 @kernel
 def gather_teams(
-    collisions: CollisionCounts, own: FloatArray, front: BoolArray, count: int, formed: Teams
+    collisions: CollisionCounts,  # (pairs, ≥ N, ≥ N)
+    own: FloatArray,  # (P, ≥ N)
+    front: BoolArray,  # (P, ≥ N) the non-dominated individuals
+    count: int,  # N
+    # with room for a team per member of a front; written in the order of the members that teams
+    # were formed around: population by population, index by index
+    formed: Teams,
 ) -> int:
     """Give every member of a front its best collaborators, of the first `count` individuals.
 
     They are chosen population by population, in order of index: the fewest collisions with all who
     are in the team already, then the lowest own cost, then the lowest index. A team may come up
     several times.
-
-    Args:
-        collisions: (pairs, ≥ N, ≥ N), see `best_team`.
-        own: (P, ≥ N), see `best_team`.
-        front: (P, ≥ N) the non-dominated individuals.
-        count: N.
-        formed: With room for a team per member of a front; written in the order of the members that
-            teams were formed around: population by population, index by index.
 
     Returns:
         How many teams there are.
@@ -151,28 +128,20 @@ def gather_teams(
 
 @kernel
 def renew_hall(
-    collisions: CollisionCounts,
-    own: FloatArray,
-    front: BoolArray,
-    count: int,
+    collisions: CollisionCounts,  # (pairs, ≥ N, ≥ N); keys of old teams are computed anew
+    own: FloatArray,  # (P, ≥ N)
+    front: BoolArray,  # (P, ≥ N) the non-dominated individuals
+    count: int,  # N
+    # with room for as many teams as it may hold; teams and ages are read up to `num_teams`,
+    # everything is rewritten
     hall: Hall,
-    num_teams: int,
+    num_teams: int,  # of the hall at present
+    # (P,) the best team of all, offered to the hall even if none of its members is on a front; −1:
+    # none is offered
     best: IntArray,
-    rules: HallRules,
+    rules: HallRules,  # which teams the hall takes
 ) -> int:
     """Choose the next hall: the best of its teams and of those formed around the fronts.
-
-    Args:
-        collisions: (pairs, ≥ N, ≥ N), see `best_team`; keys of old teams are computed anew.
-        own: (P, ≥ N), see `best_team`.
-        front: (P, ≥ N) the non-dominated individuals.
-        count: N.
-        hall: With room for as many teams as it may hold; teams and ages are read up to
-            `num_teams`, everything is rewritten.
-        num_teams: Teams of the hall at present.
-        best: (P,) the best team of all, offered to the hall even if none of its members is on a
-            front; −1: none is offered.
-        rules: Which teams the hall takes.
 
     Returns:
         Number of teams that the hall holds then.

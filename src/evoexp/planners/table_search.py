@@ -6,12 +6,12 @@ time, and a record of each another third.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.genetic_settings import PopulationSettings, ScaledGenetic
 from evoexp.evolution.operators.breeding import Breeding, Operators
 from evoexp.evolution.operators.operator import Genome
 from evoexp.evolution.scaled_selection import SelectionMemory
@@ -23,22 +23,6 @@ from evoexp.records import Best, Block, FloatArray, IntArray
 
 _NO_NORMALS = np.empty((0, 0))
 SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
-
-
-class Sizes(Protocol):
-    """How many individuals, and how often."""
-
-    @property
-    def population_size(self) -> int:
-        """Individuals that are evaluated at first."""
-
-    @property
-    def num_offspring(self) -> int:
-        """Individuals that are evaluated in every other generation."""
-
-    @property
-    def num_generations(self) -> int:
-        """Generations after the initial one."""
 
 
 def generations_per_call(most: int, size: int, cached: int) -> int:
@@ -72,7 +56,7 @@ class TableSearch(ABC):
     states: list[bytes] | None = None
     queries_each, is_done = 0, False
 
-    def __init__(self, ga: Sizes, per_call: int) -> None:
+    def __init__(self, ga: PopulationSettings, per_call: int) -> None:
         """Begin a run.
 
         Args:
@@ -183,7 +167,7 @@ class GeneticSearch(TableSearch):
         """Begin a run.
 
         Args:
-            ga: Sizes, rates and generations.
+            ga: PopulationSettings, rates and generations.
             operators: By which offspring are made.
             genome: Of every individual.
             per_call: Generations computed per call, at most.

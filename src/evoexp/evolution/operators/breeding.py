@@ -71,23 +71,24 @@ def breed(
     select: Select,
     cross: Cross,
     mutate: Mutate,
-    uniforms: FloatArray,  # those of selection, then of crossover, then of mutation
+    numbers: FloatArray,  # uniform, those of selection, then of crossover, then of mutation
     normals: FloatArray,  # (genes, ≥ offspring) normal deviates, if the mutation takes any
     index: int,  # t of the parents' generation
-    mutation_rate: float,  # on the way to the next one
-    breeding: Breeding,
+    rate: float,  # of mutation, on the way to the next one
+    rules: Breeding,
     costs: FloatArray,  # (individuals,) of the parents' generation
     genomes: FloatArray,  # (genes, individuals) of the same, padding allowed
     parents: IntArray,  # (offspring,) written
     out: FloatArray,  # (genes, ≥ offspring) written
 ) -> None:
     """Write offspring: selected, crossed and mutated."""
-    genome, rate, count = breeding.genome, breeding.crossover_rate, len(parents)
-    progress, sizes = index / breeding.num_generations, breeding.sizes[breeding.most - count]
+    genome, count, progress = rules.genome, len(parents), index / rules.num_generations
+    # the numbers of each operator
+    sizes = rules.sizes[rules.most - count]
     first, last = sizes[0], sizes[0] + sizes[1]
-    one, two, three = uniforms[:first], uniforms[first:last], uniforms[last : last + sizes[2]]
-    select(costs, Context(one, normals, 1.0, progress, breeding.selecting, genome), parents)
-    crossing = Context(two, normals, rate, progress, breeding.crossing, genome)
+    one, two, three = numbers[:first], numbers[first:last], numbers[last : last + sizes[2]]
+    # selection, crossover, mutation
+    select(costs, Context(one, normals, 1.0, progress, rules.selecting, genome), parents)
+    crossing = Context(two, normals, rules.crossover_rate, progress, rules.crossing, genome)
     cross(genomes, parents, crossing, out)
-    mutating = Context(three, normals, mutation_rate, progress, breeding.mutating, genome)
-    mutate(out, count, mutating)
+    mutate(out, count, Context(three, normals, rate, progress, rules.mutating, genome))

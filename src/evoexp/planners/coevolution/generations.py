@@ -113,7 +113,7 @@ def follow(
     index: int,  # the present generation
     rate: float,  # of mutation
     heredity: Heredity,  # the rules
-    table: Table,  # of generations; the next one is written
+    table: Table,  # generations, of which the next one is written
     num_teams: IntArray,  # (1,) changed
 ) -> int:
     """Renew the hall of fame, and breed the generation that follows one.

@@ -10,7 +10,7 @@ from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
 from evoexp.evolution.pareto import non_dominated
-from evoexp.evolution.succession import choose_elites
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions
@@ -41,7 +41,7 @@ def breed_robots(
     # (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation
     uniforms: FloatArray,
     index: int,  # of the present generation
-    mutation_rate: float,  # probability that an allele of an individual is mutated (Eq. 10).
+    rate: float,  # probability that an allele of an individual is mutated (Eq. 10)
     populations: FloatArray,  # (robots, genes, individuals)
     costs: FloatArray,  # (robots, individuals)
     # (teams, robots) members of the hall; written: their places in the next populations
@@ -61,18 +61,7 @@ def breed_robots(
         draws, genes, before = uniforms[row], bred[robot], populations[robot]
         own, row = costs[robot], row + 1
         breed(
-            select,
-            cross,
-            mutate,
-            draws,
-            normals,
-            index,
-            mutation_rate,
-            rules,
-            own,
-            before,
-            parents,
-            genes,
+            select, cross, mutate, draws, normals, index, rate, rules, own, before, parents, genes
         )
         # elites and members of the hall, untouched
         choose_elites(own, elites)
@@ -80,14 +69,6 @@ def breed_robots(
         copy_members(before, teams[:, robot], genes, count + num_elites)
     for k in range(len(teams)):
         teams[k] = count + num_elites + k
-
-
-@kernel
-def copy_members(before: FloatArray, members: IntArray, genes: FloatArray, first: int) -> None:
-    """Copy some individuals of a population (genes, individuals) to places from `first` on."""
-    for gene in range(len(genes)):
-        for k in range(len(members)):
-            genes[gene, first + k] = before[gene, members[k]]
 
 
 @kernel

@@ -6,29 +6,25 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import model_validator
 
 from evoexp.errors import SettingError
+from evoexp.evolution.genetic_settings import PopulationSettings
 from evoexp.evolution.operators.breeding import Operators
 from evoexp.evolution.operators.crossover import OnePoint
 from evoexp.evolution.operators.mutation import AlleleMutation
 from evoexp.evolution.operators.operator import Crossover, Mutation, Named, Selection
 from evoexp.evolution.operators.selection import DifferenceRoulette, InverseRoulette
 from evoexp.numeric.elementary import DEGREE
-from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
+from evoexp.validation import Count, Positive, Rate
 
 _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
-class CoevolutionSettings(Component):
+class CoevolutionSettings(PopulationSettings):
     """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3)."""
 
     component: ClassVar[str] = "coevolutionary"
 
-    population_size: Count  # individuals per population and generation [-]
-    num_generations: NonNegativeCount  # generations after the initial one [-]
-    crossover_rate: Rate  # probability that a pair of parents is crossed [-]
-    # probability that one allele of an individual is mutated, at the first generation [-]
-    mutation_rate: Rate
-    # difference of `mutation_rate` between the first and the last generation (Eq. 10) [-]; 0:
-    # it is constant
+    # difference of `mutation_rate`, that of one allele of an individual, between the first and the
+    # last generation (Eq. 10) [-]; 0: it is constant
     mutation_decay: Rate
     mutation_step: Positive  # largest change of an allele (Eq. 9) [deg]
     # `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`
@@ -36,8 +32,6 @@ class CoevolutionSettings(Component):
     # weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the
     # highest
     selection: Literal["inverse", "difference"] | Named[Selection]
-    # best individuals of each population copied untouched into the next generation [-]
-    num_elites: NonNegativeCount
     hall_depth: Rate  # share of a population that the hall of fame may hold [-]; 0: no hall
     # generations after which a team of the hall gives way to any new one [-]; None: never
     hall_memory: Count | None
@@ -80,11 +74,6 @@ class CoevolutionSettings(Component):
                 self.hall_frozen and self.hall_memory is not None,
                 "hall_memory",
                 "null where the hall is frozen (hall_frozen)",
-            ),
-            (
-                self.num_elites > self.population_size,
-                "num_elites",
-                f"at most population_size ({self.population_size})",
             ),
             (
                 self.num_offspring < 0,

@@ -36,11 +36,6 @@ class SelectiveSettings(PopulationSettings):
     rank_pressure: Annotated[float, Field(ge=1.0, le=2.0)]
 
     @property
-    def operators(self) -> Operators:
-        """The operators of a search."""
-        raise NotImplementedError
-
-    @property
     def selection_operator(self) -> Selection:
         """The selection that `selection` stands for."""
         if isinstance(self.selection, Selection):

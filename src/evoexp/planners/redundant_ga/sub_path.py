@@ -15,7 +15,7 @@ from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.kernels import Coding, Generations, Memory
+from evoexp.planners.redundant_ga.kernels import SubPath
 from evoexp.planners.redundant_ga.settings import BinaryGenetic
 from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
 from evoexp.planners.table_search import GeneticSearch, generations_per_call
@@ -67,13 +67,11 @@ class Search(GeneticSearch):
         if not self.evolving:
             self.num_drawn, self.num_normals = num_genes * ga.num_offspring, (0, 0)
         self._planner, self._problem = planner, problem
-        self._coding = Coding(num_genes, bits > 0, limits)
         self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
-        self._rng, tables = rng, np.zeros((self.num_places, rows, filled))
-        self._generations = Generations(tables, self.summaries)
+        self._rng, self._tables = rng, np.zeros((self.num_places, rows, filled))
         lanes, hit = np.empty(size + LANES, dtype=np.int64), np.zeros(size, dtype=np.bool_)
-        self._memory = Memory(self.parents, self.elites, lanes, hit)
-        self._tables, self.queries_each = self._generations.tables, problem.collision.queries
+        self._fixed = num_genes, bits > 0, limits, self.parents, self.elites, lanes, hit
+        self._num_genes, self.queries_each = num_genes, problem.collision.queries
         self._angles = self._tables[:, first:-RESULTS]
         self._attempts, self._path = 0, 0
         self._via_cost = np.inf  # of the posture A that takes the place of a plan
@@ -89,10 +87,10 @@ class Search(GeneticSearch):
             self._attempts += 1
         else:
             self._via = self.end
-        self._judging = self._planner.judging(self._problem, self._path)
-        self._starts = np.repeat(postures[-1][:, None], self._ga.population_size, axis=1)
-        self.costs = self._tables[:, None, -RESULTS, : self._ga.population_size]
-        self._shown = np.empty((self._coding.num_genes, self._ga.population_size))
+        size, judging = self._ga.population_size, self._planner.judging(self._problem, self._path)
+        self._sub_path = SubPath(*self._fixed, np.repeat(postures[-1][:, None], size, 1), judging)
+        self.costs = self._tables[:, None, -RESULTS, :size]
+        self._shown = np.empty((self._num_genes, size))
         best = self.keeper.best
         self.keeper.best = best._replace(terms=best.terms | self._counts)
         yield from self.blocks(self._rng)
@@ -113,28 +111,17 @@ class Search(GeneticSearch):
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        uniforms = rng.random(self._coding.num_genes * self._ga.population_size)
-        arguments = self._coding, self._judging, self._starts, self._generations, self._memory
-        kernels.begin(uniforms, *arguments)
+        uniforms = rng.random(self._num_genes * self._ga.population_size)
+        kernels.begin(uniforms, self._sub_path, self._tables, self.summaries)
         self.states = [state_bytes(rng.bit_generator)]
         self._prove(0)
 
     def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Compute generations, as far as the best end is not good enough."""
-        reached = kernels.evolve(
-            *self.operators,
-            uniforms,
-            normals,
-            first,
-            self._stop_cost,
-            self.evolving,
-            self.breeding,
-            self._coding,
-            self._judging,
-            self._starts,
-            self._generations,
-            self._memory,
-        )
+        (select, cross, mutate), stop_cost = self.operators, self._stop_cost
+        numbers = uniforms, normals, first, stop_cost, self.evolving
+        rules = self.breeding, self._sub_path, self._tables, self.summaries
+        reached = kernels.evolve(select, cross, mutate, *numbers, *rules)
         self._prove(reached % self.num_places)
         return int(reached)
 
@@ -195,9 +182,9 @@ class Search(GeneticSearch):
 
     def population(self, index: int) -> FloatArray:
         """Return the genomes of a generation, in the same array for all of a search."""
-        count, genes = self.costs.shape[2], self._coding.num_genes
+        count = self.costs.shape[2]
         shown = self._shown[:, :count]
-        np.copyto(shown, self._tables[index % self.num_places, :genes, :count])
+        np.copyto(shown, self._tables[index % self.num_places, : self._num_genes, :count])
         return shown
 
 

@@ -52,30 +52,28 @@ class CoveredStrings(Strings):
         return judged
 
     def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
-        """Go on from a generation to those behind it; see `Strings`."""
-        (offspring, terms, elites, parents), places = run.scratch, len(run.summaries)
-        judged, rate = Judgement(terms.cost, terms, 0), run.breeding.mutation_rate
-        select, cross, mutate = run.operators
-        for index, numbers in enumerate(uniforms, start=first):
-            before, after = (
-                kernels.Population(*(array[g % places] for array in run.table))
-                for g in (index, index + 1)
-            )
-            choose_elites(before.costs, elites)
-            genomes, children = kernels.by_gene(before.strings), kernels.by_gene(offspring)
-            given = index, rate, run.breeding, before.costs, genomes, parents, children
-            breed(select, cross, mutate, numbers, normals, *given)
-            self.smooth(offspring, len(parents))
-            self._judge(offspring, judged)
-            kernels.follow(before, run.scratch, after)
-            kernels.summarise_strings(*after[1:], run.summaries[(index + 1) % places])
+        """Go on from a generation to the next one; see `Strings`."""
+        (offspring, terms, elites, parents), rules = run.scratch, run.breeding
+        here, there = first % len(run.summaries), (first + 1) % len(run.summaries)
+        before, after = (
+            kernels.Population(*(array[place] for array in run.table)) for place in (here, there)
+        )
+        choose_elites(before.costs, elites)
+        (select, cross, mutate), rate = run.operators, rules.mutation_rate
+        genomes, out = kernels.by_gene(before.strings), kernels.by_gene(offspring)
+        rest = first, rate, rules, before.costs, genomes, parents, out
+        breed(select, cross, mutate, uniforms[0], normals, *rest)
+        self.smooth(offspring, len(parents))
+        self._judge(offspring, Judgement(terms.cost, terms, 0))
+        kernels.follow(before, run.scratch, after)
+        kernels.summarise_strings(*after[1:], run.summaries[there])
 
     def _judge(self, strings: FloatArray, judged: Judgement) -> None:
         """Write the terms of strings (Eqs. 2–7)."""
-        terms, count, substeps = judged.terms, len(judged.cost), self.judging.substeps
+        terms, count, substeps = judged.terms, len(judged.cost), self.settings.substeps
         measure_paths(strings, self.problem.arm_slices, terms.lengths, terms.unevenness)
         between = interpolate_linear(np.ascontiguousarray(strings[:, :, :count]), substeps)
         collides = self.collision.collides(between.reshape(len(between), -1))
         hits = np.where(collides, -1.0, 1.0).reshape(1, -1, substeps, count)
         count_collisions(hits, terms.collisions[:count])
-        weigh(self.judging.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)
+        weigh(self.settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

@@ -21,31 +21,19 @@ from evoexp.paths.relaxation import relax_points
 from evoexp.records import FloatArray, IntArray
 
 
-class Smoothing(NamedTuple):
-    """Settings and scratch of section 3.4 (c)."""
+class Settings(NamedTuple):
+    """Settings of the steps behind breeding, and scratch."""
 
-    redistribution: bool  # whether to redistribute
+    arm_slices: IntArray  # (arms, 2) rows of each arm
+    redistribution: bool  # whether to redistribute (section 3.4 c)
     samples: int  # of the arc length per segment
     pivots: FloatArray  # factor of the spline's system; see `Redistribution`
     floats: FloatArray  # scratch
     integers: np.ndarray  # scratch
-    relaxation_step: float  # delta of Eqs. 8, 9.
-
-
-class Judging(NamedTuple):
-    """Settings of Eqs. 2–7."""
-
+    relaxation_step: float  # delta of Eqs. 8, 9
     substeps: int  # configurations tested per segment
-    weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7.
+    weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7
     tables: Any  # `CircleTables` of the collision model; not read where bodies are covered
-
-
-class Settings(NamedTuple):
-    """Settings of a whole generation."""
-
-    breeding: Breeding  # of section 3.4 (a), (b), (d)
-    smoothing: Smoothing  # of section 3.4 (c)
-    judging: Judging  # of Eqs. 2–7.
 
 
 class Population(NamedTuple):
@@ -74,7 +62,7 @@ def evolve(
     uniforms: FloatArray,
     normals: FloatArray,  # normal deviates, of one generation only; see `breed`
     first: int,  # the present generation
-    arm_slices: IntArray,  # (arms, 2) rows of each arm
+    rules: Breeding,
     settings: Settings,
     # see `Population`: some generations; number g is at place g modulo the number of places
     table: Population,
@@ -82,33 +70,25 @@ def evolve(
     summaries: FloatArray,  # (places, 4) written, see `summarise_strings`
 ) -> None:
     """Go on from one generation to others."""
-    settings, table, scratch, summaries = borrowed((settings, table, scratch, summaries))
+    rules, settings, scratch = borrowed((rules, settings, scratch))
+    table, summaries = borrowed((table, summaries))
     (strings, costs, collisions), offspring, count = table, scratch.offspring, len(scratch.parents)
-    breeding = settings.breeding
+    rate = rules.mutation_rate
     for index in range(first, first + len(uniforms)):
-        own, other = index % len(costs), (index + 1) % len(costs)
+        own, other, draws = index % len(costs), (index + 1) % len(costs), uniforms[index - first]
         # elites: the lowest costs
         choose_elites(costs[own], scratch.elites)
         # (a) reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is
         # redistributed and relaxed once
+        before, parents = costs[own], scratch.parents
+        genomes, out = by_gene(strings[own]), by_gene(offspring)
         breed(
-            select,
-            cross,
-            mutate,
-            uniforms[index - first],
-            normals,
-            index,
-            breeding.mutation_rate,
-            breeding,
-            costs[own],
-            by_gene(strings[own]),
-            scratch.parents,
-            by_gene(offspring),
+            select, cross, mutate, draws, normals, index, rate, rules, before, genomes, parents, out
         )
         # (c) redistribution and relaxation
-        smooth(offspring, count, arm_slices, settings.smoothing)
+        smooth(offspring, count, settings)
         # Eqs. 2–7
-        judge(offspring, arm_slices, settings.judging, scratch.terms)
+        judge(offspring, settings, scratch.terms)
         following = Population(strings[other], costs[other], collisions[other])
         follow(Population(strings[own], costs[own], collisions[own]), scratch, following)
         summarise_strings(costs[other], collisions[other], summaries[other])
@@ -146,50 +126,34 @@ def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray
 
 
 @kernel
-def smooth(strings: FloatArray, count: int, arm_slices: IntArray, smoothing: Smoothing) -> None:
-    """Redistribute and relax the first `count` strings (section 3.4 c).
-
-    Args:
-        strings: (nq, N + 1, ≥ count), changed.
-        count: Number of strings.
-        arm_slices: See `evolve`.
-        smoothing: Settings and scratch.
-    """
+def smooth(strings: FloatArray, count: int, settings: Settings) -> None:
+    """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c)."""
     lanes = -(-count // 8) * 8  # whole vectors
-    if smoothing.redistribution and count > 0 and strings.shape[1] > 2:
-        redistribute_arms(
-            strings,
-            arm_slices,
-            lanes,
-            smoothing.samples,
-            smoothing.pivots,
-            smoothing.floats,
-            smoothing.integers,
-        )
-    if smoothing.relaxation_step > 0.0 and count > 0:
-        relax_points(strings, smoothing.relaxation_step, lanes)
+    if settings.redistribution and count > 0 and strings.shape[1] > 2:
+        arms, samples, pivots = settings.arm_slices, settings.samples, settings.pivots
+        scratch = settings.floats, settings.integers
+        redistribute_arms(strings, arms, lanes, samples, pivots, *scratch)
+    if settings.relaxation_step > 0.0 and count > 0:
+        relax_points(strings, settings.relaxation_step, lanes)
 
 
 @kernel
-def judge(strings: FloatArray, arm_slices: IntArray, judging: Judging, terms: StringTerms) -> None:
-    """Eqs. 2–7 for all strings; the instants 1 … N are the configurations that may collide.
+def judge(strings: FloatArray, settings: Settings, terms: StringTerms) -> None:
+    """Write the terms of strings (nq, N + 1, individuals), Eqs. 2–7.
 
-    Args:
-        strings: (nq, N + 1, individuals).
-        arm_slices: See `evolve`.
-        terms: Written.
+    The instants 1 … N are the configurations that may collide.
     """
-    substeps, (nq, num_points, lanes) = judging.substeps, strings.shape
+    substeps, (nq, num_points, lanes) = settings.substeps, strings.shape
     # Eqs. 2–5: lengths, and how uneven the distances of via-points are
-    measure_paths(strings, arm_slices, terms.lengths, terms.unevenness)
+    measure_paths(strings, settings.arm_slices, terms.lengths, terms.unevenness)
     # Eq. 6: contacts at the instants, which follow the start, and at the substeps before them
     configurations, start = strings, lanes
     if substeps > 1:
         configurations, start = np.empty((nq, (num_points - 1) * substeps, lanes)), 0
         interpolate(strings, substeps, configurations)
     hits = np.empty((num_points - 1) * substeps * lanes)
-    contacts(judging.tables, configurations.reshape((nq, -1)), start, hits)
+    contacts(settings.tables, configurations.reshape((nq, -1)), start, hits)
     by_instant = hits.reshape((1, num_points - 1, substeps, lanes))
     count_collisions(by_instant, terms.collisions)
     # Eq. 7
-    weigh(judging.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)
+    weigh(settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

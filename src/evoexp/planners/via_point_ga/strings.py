@@ -106,15 +106,14 @@ class Strings:
         self.planner, self.problem, spline = planner, problem, problem.spline
         self.num_arms = len(problem.arm_slices)
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
-        self.smoothing = kernels.Smoothing(
+        self.settings = kernels.Settings(
+            arm_slices=problem.arm_slices,
             redistribution=planner.redistribution,
             samples=spline.samples_per_segment,
             pivots=spline.pivots,
             floats=spline.floats,
             integers=spline.integers,
             relaxation_step=planner.relaxation_step,
-        )
-        self.judging = kernels.Judging(
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,
             tables=getattr(problem.collision, "tables", ()),
@@ -166,12 +165,12 @@ class Strings:
 
     def smooth(self, strings: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings."""
-        kernels.smooth(strings, count, self.problem.arm_slices, self.smoothing)
+        kernels.smooth(strings, count, self.settings)
 
     def judge(self, strings: FloatArray, count: int) -> Judgement:
         """Judge the first `count` strings; the arrays of terms keep the padding."""
         judged = self.unjudged(strings, count)
-        kernels.judge(strings, self.problem.arm_slices, self.judging, judged.terms)
+        kernels.judge(strings, self.settings, judged.terms)
         return judged
 
     def table(self, places: int) -> kernels.Population:
@@ -189,8 +188,7 @@ class Strings:
             normals: Normal deviates, see `breed`.
             first: The present generation.
         """
-        settings = kernels.Settings(run.breeding, self.smoothing, self.judging)
-        arguments = self.problem.arm_slices, settings, run.table, run.scratch, run.summaries
+        arguments = run.breeding, self.settings, run.table, run.scratch, run.summaries
         select, cross, mutate = run.operators
         kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
 
@@ -198,5 +196,5 @@ class Strings:
         """Return memory for a judgement."""
         lengths, unevenness = np.empty((2, self.num_arms, strings.shape[2]))
         terms = StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))
-        tested = self.planner.num_via_points * self.judging.substeps
+        tested = self.planner.num_via_points * self.settings.substeps
         return Judgement(terms.cost, terms, tested * count)

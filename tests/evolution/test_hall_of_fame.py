@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.evolution.best_team import best_team, find_best_team
+from evoexp.evolution.best_team import best_team
 from evoexp.evolution.hall_of_fame import (
     Hall,
     HallRules,
-    Teams,
     gather_teams,
     renew_hall,
 )
@@ -64,11 +63,10 @@ def rules(
     return HallRules(memory or 0, frozen, np.array([p not in shared for p in range(num)]))
 
 
-def form_teams(collisions: np.ndarray, own: np.ndarray, front: np.ndarray) -> Teams:
+def form_teams(collisions: np.ndarray, own: np.ndarray, front: np.ndarray) -> Hall:
     formed = Hall.room(int(front.sum()), len(own))
-    teams = Teams(formed.teams, formed.collisions, formed.costs)
-    gather_teams(collisions, own, front, own.shape[1], teams)
-    return teams
+    gather_teams(collisions, own, front, formed)
+    return formed
 
 
 def with_room(hall: Hall, depth: int) -> Hall:
@@ -87,10 +85,10 @@ def update_hall(
     taken: HallRules | None = None,
     best: np.ndarray | None = None,
 ) -> Hall:
-    num, count = own.shape
+    num = len(own)
     best, renewed = np.full(num, -1) if best is None else best, with_room(hall, depth)
     taken = taken or rules(num)
-    held = renew_hall(collisions, own, front, count, renewed, len(hall.teams), best, taken)
+    held = renew_hall(collisions, own, front, renewed, len(hall.teams), best, taken)
     return Hall(*(array[:held] for array in renewed))
 
 
@@ -305,29 +303,6 @@ def test_individuals_of_a_population_that_may_be_shared_are_in_many_teams() -> N
     front = np.array([[True] * 4, [True] + [False] * 3])
     chosen = update_hall(collisions, own, front, Hall.room(0, 2), 3, rules(2, shared=(1,)))
     assert chosen.teams.tolist() == [[0, 0], [1, 0], [2, 0]]
-
-
-@pytest.mark.parametrize("num", [2, 3])
-def test_kernels_ignore_padding(num: int) -> None:
-    w = world(5, num, 13)
-    hall = some_hall(1, num, 13, 3)
-    own, front = np.full((num, 16), -9.0), np.ones((num, 16), dtype=bool)
-    collisions = np.zeros((len(w.collisions), 16, 24), dtype=np.int16)
-    own[:, :13], front[:, :13], collisions[:, :13, :13] = w.own, w.front, w.collisions
-    team = np.empty(num, dtype=np.int64)
-    cost = find_best_team(collisions, own, 13, team)
-    best = best_team(w.collisions, w.own)
-    assert (cost, team.tolist()) == (best.cost, best.individuals.tolist())
-    room = Hall.room(num * 13, num)
-    teams = Teams(room.teams, room.collisions, room.costs)
-    count = gather_teams(collisions, own, front, 13, teams)
-    for mine, theirs in zip(teams, form_teams(*w), strict=True):
-        assert np.array_equal(mine[:count], theirs)
-    renewed = with_room(hall, 6)
-    forgetting, nobody = rules(num, memory=2), np.full(num, -1)
-    held = renew_hall(collisions, own, front, 13, renewed, 3, nobody, forgetting)
-    for mine, theirs in zip(renewed, update_hall(*w, hall, 6, forgetting), strict=True):
-        assert np.array_equal(mine[:held], theirs)
 
 
 def test_nothing_is_random_and_inputs_are_left_alone() -> None:

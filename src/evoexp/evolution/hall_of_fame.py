@@ -5,7 +5,7 @@ members' own costs): lower is better. Nothing is random and every tie is settled
 next hall takes candidates by key; among equals the present hall's own come first, in their order,
 then the new ones in the order of `gather_teams`, then the best team of all.
 
-The arrays `collisions` and `own` of P populations are those of `best_team`; `front`  # (P, ≥ N)
+The arrays `collisions` and `own` of P populations are those of `best_team`; `front`  # (P, N)
 bool: the non-dominated individuals of each population.
 """
 
@@ -16,14 +16,6 @@ import numpy as np
 from evoexp.evolution.best_team import CollisionCounts, pair_index, sort_by_cost
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
-
-
-class Teams(NamedTuple):
-    """Teams and their keys."""
-
-    teams: IntArray  # (teams, P) index of the member in each population
-    collisions: IntArray  # (teams,) colliding configurations within each team
-    costs: FloatArray  # (teams,) sum of the members' own costs
 
 
 class Hall(NamedTuple):
@@ -93,13 +85,12 @@ def choose_collaborator(
 
 @kernel
 def gather_teams(
-    collisions: CollisionCounts,  # (pairs, ≥ N, ≥ N)
-    own: FloatArray,  # (P, ≥ N)
-    front: BoolArray,  # (P, ≥ N) the non-dominated individuals
-    count: int,  # N
+    collisions: CollisionCounts,  # (pairs, N, N)
+    own: FloatArray,  # (P, N)
+    front: BoolArray,  # (P, N) the non-dominated individuals
     # with room for a team per member of a front; written in the order of the members that teams
     # were formed around: population by population, index by index
-    formed: Teams,
+    formed: Hall,
 ) -> int:
     """Give every member of a front its best collaborators, of the first `count` individuals.
 
@@ -110,8 +101,7 @@ def gather_teams(
     Returns:
         How many teams there are.
     """
-    num, filled = len(own), 0
-    order = sort_by_cost(own, count)
+    (num, count), order, filled = own.shape, sort_by_cost(own), 0
     for p in range(num):
         for i in range(count):
             if not front[p, i]:
@@ -128,10 +118,9 @@ def gather_teams(
 
 @kernel
 def renew_hall(
-    collisions: CollisionCounts,  # (pairs, ≥ N, ≥ N); keys of old teams are computed anew
-    own: FloatArray,  # (P, ≥ N)
-    front: BoolArray,  # (P, ≥ N) the non-dominated individuals
-    count: int,  # N
+    collisions: CollisionCounts,  # (pairs, N, N); keys of old teams are computed anew
+    own: FloatArray,  # (P, N)
+    front: BoolArray,  # (P, N) the non-dominated individuals
     # with room for as many teams as it may hold; teams and ages are read up to `num_teams`,
     # everything is rewritten
     hall: Hall,
@@ -147,7 +136,7 @@ def renew_hall(
         Number of teams that the hall holds then.
     """
     # candidates: the hall's own teams, one per member of a front, the best of all
-    most = num_teams + np.count_nonzero(front[:, :count]) + (1 if best[0] >= 0 else 0)
+    most = num_teams + np.count_nonzero(front) + (1 if best[0] >= 0 else 0)
     pool = np.empty((most, len(own)), dtype=np.int64)
     ages, ranks = np.zeros(most, dtype=np.int64), np.zeros(most, dtype=np.int64)
     hits, costs = np.empty(most, dtype=np.int64), np.empty(most)
@@ -158,8 +147,9 @@ def renew_hall(
             ranks[k] = k - num_teams  # before all new ones, in the order they have
         elif 0 < rules.memory < ages[k]:
             ranks[k] = 1  # behind all new ones
-    new = Teams(pool[num_teams:], hits[num_teams:], costs[num_teams:])
-    gather_teams(collisions, own, front, count, new)
+    first = num_teams
+    new = Hall(pool[first:], ages[first:], hits[first:], costs[first:])
+    gather_teams(collisions, own, front, new)
     if best[0] >= 0:
         pool[most - 1] = best
         hits[most - 1], costs[most - 1] = rate_team(collisions, own, best)

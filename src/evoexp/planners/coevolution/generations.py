@@ -18,6 +18,7 @@ from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.coevolution.kernels import (
     HALF_TURN,
     Heredity,
+    LineTask,
     breed_robots,
     evaluate_lines,
     renew,
@@ -60,8 +61,7 @@ def evolve(
     uniforms: FloatArray,  # numbers for all of them, in the order in which they are used
     rates: FloatArray,  # (generations,) of mutation, on the way to each of them
     first: int,  # the present generation
-    # see `evaluate_lines`: from `starts` to `collision_weight`
-    task: tuple[FloatArray, FloatArray, FloatArray, tuple[float, float, float], float],
+    task: LineTask,
     heredity: Heredity,
     table: Table,  # see `Table`, written
     num_teams: IntArray,  # (1,) teams that the hall holds, changed
@@ -74,7 +74,6 @@ def evolve(
         False if a coordinate is not finite.
     """
     table, summaries, taken = borrowed((table, summaries, taken))
-    starts, goals, arms, weights, collision_weight = task
     populations, places, begin = table.populations, len(summaries), 0
     for step in range(len(rates)):
         other = (first + step + 1) % places
@@ -84,9 +83,7 @@ def evolve(
         )
         begin += taken[step]
         found = at_place(table.judged, other)
-        if not evaluate_lines(
-            populations[other], starts, goals, arms, weights, collision_weight, found
-        ):
+        if not evaluate_lines(populations[other], task, found):
             return False
         table.team_costs[other] = survey(found, table.teams[other], summaries[other])
     return True

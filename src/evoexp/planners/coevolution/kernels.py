@@ -9,7 +9,7 @@ from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outline
 from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
 from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
-from evoexp.evolution.pareto import non_dominated
+from evoexp.evolution.pareto import pareto_front
 from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
@@ -31,6 +31,16 @@ class Heredity(NamedTuple):
     # whether copies count as one individual, and members of the hall are offered again; else
     # members of the hall and their copies leave the fronts
     by_genome: bool
+
+
+class LineTask(NamedTuple):
+    """Robots and the weights of their criteria."""
+
+    starts: FloatArray  # (robots, 2) link angles [rad]
+    goals: FloatArray  # (robots, 2) [rad]
+    arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
+    weights: tuple[float, float, float]  # of C2, C3, C4
+    collision_weight: float  # of C1
 
 
 @kernel
@@ -90,18 +100,17 @@ def renew(
     Returns:
         Number of teams that the hall holds then.
     """
-    hall, count = heredity.hall, populations.shape[2]
-    fronts = np.empty((len(populations), count), dtype=np.bool_)
+    hall = heredity.hall
+    fronts = np.empty(own.shape, dtype=np.bool_)
     for robot in range(len(populations)):
-        non_dominated(criteria[robot], count, fronts[robot])
+        fronts[robot] = pareto_front(criteria[robot])
     if heredity.by_genome:
         merge_copies(populations, criteria[:, 1], hall.teams[:num_teams], fronts)
         offered = best
     else:
         drop_copies(populations, hall.teams[:num_teams], fronts)
         offered = np.full(len(populations), -1)
-    rules = heredity.rules
-    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, offered, rules))
+    return int(renew_hall(collisions, own, fronts, hall, num_teams, offered, heredity.rules))
 
 
 @kernel
@@ -179,10 +188,7 @@ def same_genome(genes: FloatArray, one: int, other: int) -> bool:
 @kernel
 def measure(
     populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
-    starts: FloatArray,  # (robots, 2) [rad]
-    goals: FloatArray,  # (robots, 2) [rad]
-    arms: FloatArray,  # (robots, 4) base x, base y, lengths of both links [length unit]
-    weights: tuple[float, float, float],  # of C2, C3, C4
+    task: LineTask,
     # (robots, K + 2, 2, individuals) written: link angles, start and goal included
     paths: FloatArray,
     points: FloatArray,  # (robots, K + 2, 4, individuals) written: elbow x, y, tip x, y
@@ -190,7 +196,7 @@ def measure(
     own: FloatArray,  # (robots, individuals) written: their weighted sum
 ) -> None:
     """Lay out all paths, and measure their costs whoever their collaborators are."""
-    last = paths.shape[1] - 1
+    starts, goals, last = task.starts, task.goals, paths.shape[1] - 1
     for r in range(len(populations)):
         path, genes = paths[r], populations[r]
         # start, genes, goal
@@ -199,30 +205,26 @@ def measure(
             for k in range(1, last):
                 path[k, link] = genes[2 * (k - 1) + link]
         # where the links are (Eq. 11), then Eqs. 6–8
-        write_outlines(path, line_arm(arms, r), points[r])
-        measure_motions(path, points[r], weights, criteria[r, 1:], own[r])
+        write_outlines(path, line_arm(task.arms, r), points[r])
+        measure_motions(path, points[r], task.weights, criteria[r, 1:], own[r])
 
 
 @kernel
 def line_arm(arms: FloatArray, robot: int) -> Arm:
-    """Return a robot's arm without an envelope; arms as of `measure`."""
+    """Return a robot's arm without an envelope; arms as of `LineTask`."""
     return Arm((arms[robot, 0], arms[robot, 1]), (arms[robot, 2], arms[robot, 3]), 0.0, 0.0)
 
 
 @kernel
 def evaluate_lines(
     populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
-    starts: FloatArray,  # (robots, 2) [rad]
-    goals: FloatArray,  # (robots, 2) [rad]
-    arms: FloatArray,  # (robots, 4) base x, base y, lengths of both links [length unit]
-    weights: tuple[float, float, float],  # of C2, C3, C4
-    collision_weight: float,  # of C1
+    task: LineTask,
     found: Evaluated,  # written, all but `blocked`: there are no obstacles
 ) -> bool:
     """Evaluate everybody against everybody of the other robots, where robots are lines (Eq. 4).
 
     One call does what `Coevolution.evaluated` does step by step with other models; between the
-    steps Python would take a third of the time. The first arguments are those of `measure`.
+    steps Python would take a third of the time.
 
     Returns:
         False if a coordinate is not finite.
@@ -232,13 +234,13 @@ def evaluate_lines(
     last = genes // 2 + 1
     paths, points = np.empty((robots, last + 1, 2, count)), np.empty((robots, last + 1, 4, count))
     # C2 … C4 (Eqs. 6–8)
-    measure(populations, starts, goals, arms, weights, paths, points, criteria, own)
+    measure(populations, task, paths, points, criteria, own)
     # C1 (Eqs. 4, 5) at the configurations between start and goal
     rows, columns = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     sums, pair = np.zeros((robots, count), dtype=np.int64), 0
     for a in range(robots):
         for b in range(a + 1, robots):
-            one, two = line_arm(arms, a), line_arm(arms, b)
+            one, two = line_arm(task.arms, a), line_arm(task.arms, b)
             first, second, near = points[a][1:last], points[b][1:last], tolerance_of(one, two)
             count_pairs(one, first, two, second, near, None, collisions[pair], rows, columns)
             for k in range(count):
@@ -250,5 +252,5 @@ def evaluate_lines(
             if not abs(own[r, k]) < LARGEST:
                 return False
             criteria[r, 0, k] = sums[r, k]
-            costs[r, k] = collision_weight * sums[r, k] + own[r, k]
+            costs[r, k] = task.collision_weight * sums[r, k] + own[r, k]
     return True

@@ -264,7 +264,7 @@ def test_code_and_queries_run_as_they_stand(
         pytest.skip("no code")
     with fresh_folder(tmp_path, monkeypatch):
         assert main(["run", "experiment=rana_planar", "budget=smoke", "--no-report"]) == 0
-        names: dict[str, object] = {}
+        names: dict[str, object] = {"__name__": "__main__"}  # as in a script
         for block in found:
             if block.language == "sql":
                 assert duckdb.sql(block.text).fetchall(), block.text
@@ -276,7 +276,7 @@ def test_the_notebook_remakes_a_figure(tmp_path: Path, monkeypatch: pytest.Monke
     notebook = json.loads((ROOT / "docs/remake_a_figure.ipynb").read_text())
     with fresh_folder(tmp_path, monkeypatch):
         assert main(["run", "experiment=rana_planar", "budget=smoke", "--no-report"]) == 0
-        names: dict[str, object] = {}
+        names: dict[str, object] = {"__name__": "__main__"}  # as in a script
         for cell in notebook["cells"]:
             if cell["cell_type"] == "code":
                 assert not cell["outputs"]

@@ -154,7 +154,7 @@ LIGHT = {  # module → packages that neither it nor those before it may load
     "evoexp": ("numpy", "pandas", "hydra", "pinocchio"),
     "evoexp.cli": ("numpy", "pandas", "hydra", "pinocchio", "numba", "matplotlib"),
     "evoexp.store.log": ("hydra", "pandas", "pinocchio", "pyarrow", "numba", "scipy"),
-    "evoexp.evolution.selection": ("hydra", "pandas", "pinocchio", "matplotlib"),
+    "evoexp.evolution.operators.selection": ("hydra", "pandas", "pinocchio", "matplotlib"),
     "evoexp.paths.redistribution": ("hydra", "pandas", "pinocchio", "matplotlib"),
     "evoexp.batch.replicate": ("hydra", "matplotlib", "pandas"),
 }

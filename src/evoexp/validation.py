@@ -163,7 +163,7 @@ def settings_error(
             path, here = f"{path}[{part}]", here[part] if part < len(here) else {}
         elif isinstance(part, int):  # one value in the place of a list
             continue
-        elif part in _members(here) or part == first["loc"][-1]:
+        elif part in _members(here) or (part == first["loc"][-1] and "[" not in part):
             path, here = _join(path, part), _members(here).get(part, {})
         # else: the tag of a union, which nobody typed
         unknown = first["type"] == "extra_forbidden" and part == first["loc"][-1]

@@ -119,13 +119,12 @@ def prepared(when: str = "fresh", block: int = BLOCK) -> Fitness:
         function(ctypes.addressof(arms), strings.ctypes.data, BLOCK, cost.ctypes.data)
         return cost[:INDIVIDUALS]
 
-    judging = Strings(planner, problem).judging
+    settings = Strings(planner, problem).settings
     lengths = np.empty((ARMS, BLOCK)), np.empty((ARMS, BLOCK))
     terms = StringTerms(*lengths, np.empty(BLOCK), np.empty(BLOCK))
-    slices = problem.arm_slices
 
     def ours() -> FloatArray:
-        judge(strings, slices, judging, terms)
+        judge(strings, settings, terms)
         return terms.cost[:INDIVIDUALS]
 
     def by_planner() -> FloatArray:

@@ -1,16 +1,20 @@
-"""`evoexp new planner` writes a package that is found, runs, and keeps a planner's obligations."""
+"""`evoexp new` writes a package that is found, runs, and keeps its obligations."""
 
 import ast
 import re
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import cast
 
 import pytest
 from command_samples import Evoexp, exit_code
 
+from evoexp.batch.replicate import run_replicate
 from evoexp.configuration.search_path import origin
-from evoexp.testing import CHECKS, Check, conditions
+from evoexp.evolution.operators.operator import Crossover
+from evoexp.registry import component_class
+from evoexp.testing import CHECKS, Check, check_operator, conditions
 from guests import on_path, write_distribution
 from test_house import NUMBER, SOURCE
 
@@ -80,6 +84,29 @@ def test_it_keeps_a_planners_obligations(check: Check, label: str) -> None:
     check(found[label])
 
 
+def test_an_operator_enters_the_planners_of_the_papers(evoexp: Evoexp, tmp_path: Path) -> None:
+    assert exit_code("new", "operator", "half_swap", "--directory", str(tmp_path)) == 0
+    package = tmp_path / "half_swap"
+    for path in (path for path in package.rglob("*") if path.is_file()):
+        assert not re.search("my_operator|MyOperator", f"{path}{path.read_text()}")
+    points = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
+    components = points["evoexp.components"]
+    write_distribution(package / "src", "half_swap", "0.1.0", components=components)
+    with on_path(package / "src"):
+        check_operator(cast(Crossover, component_class("half_swap")()))
+        for experiment in ("rana_planar", "curkovic_methods", "lavoie_7dof"):
+            own, guest = (
+                next(iter(conditions(f"experiment={experiment}", *words).values()))
+                for words in ((), ("ga.crossover={_target_: half_swap, share: 0.25}",))
+            )
+            named = {"_target_": "half_swap", "revision": 1, "share": 0.25}
+            assert guest.planner.canonical()["ga"]["crossover"] == named
+            summaries = [run_replicate(each, 0).summary for each in (own, guest, guest)]
+            assert summaries[0].digest != summaries[1].digest == summaries[2].digest
+        (guest, *_) = conditions("experiment=lavoie_7dof", "ga.crossover=half_swap").values()
+        assert guest.planner.ga.crossover.share == 0.5
+
+
 @pytest.mark.usefixtures("installed")
 def test_its_options_are_found_by_their_folder_too(evoexp: Evoexp, package: Path) -> None:
     conf = package / f"src/{NAME}/conf"
@@ -118,4 +145,4 @@ def test_what_is_there_stays(refused: Refused, tmp_path: Path) -> None:
 
 
 def test_other_kinds_are_refused(refused: Refused) -> None:
-    assert refused("new", "robot", "mine") == "kind: must be one of planner, was 'robot'"
+    assert refused("new", "robot", "mine") == "kind: must be one of planner, operator, was 'robot'"

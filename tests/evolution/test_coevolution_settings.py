@@ -130,3 +130,15 @@ def test_errors_name_the_field(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingError) as error:
         built(**changes)
     assert str(error.value) == message
+
+
+def test_schedule_of_eq_10() -> None:
+    rates = [built().mutation_rate_at(t) for t in range(201)]
+    assert rates[0] == 1.0
+    assert rates[100] == pytest.approx(0.55, rel=1e-15)
+    assert rates[200] == pytest.approx(0.1, rel=1e-15)
+    assert all(later < earlier for earlier, later in zip(rates, rates[1:], strict=False))
+    constant = built(mutation_rate=0.3, mutation_decay=0.0)
+    assert [constant.mutation_rate_at(t) for t in (0, 77, 200)] == [0.3, 0.3, 0.3]
+    assert built(mutation_rate=0.3, mutation_decay=0.3).mutation_rate_at(300) == 0.0
+    assert built(num_generations=0).mutation_rate_at(0) == 1.0

@@ -2,35 +2,28 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+import scipy.stats
 from pydantic import ValidationError
 
-from evoexp.evolution.crossover import (
-    ARITHMETIC,
-    BLX_ALPHA,
-    UNIFORM,
-    cross_genes,
-    num_gene_uniforms,
+from evoexp import testing as drawn
+from evoexp.evolution.bit_coding import decode_bits
+from evoexp.evolution.operators.crossover import ArithmeticCrossover, BlxAlpha, UniformCrossover
+from evoexp.evolution.operators.mutation import (
+    BitFlips,
+    GaussianMutation,
+    NonUniformMutation,
+    UniformReset,
 )
-from evoexp.evolution.mutation import (
-    GAUSSIAN,
-    GENE,
-    INDIVIDUAL,
-    NON_UNIFORM,
-    UNIFORM_RESET,
-    decode_bits,
-    flip_bits,
-    mutate_genes,
-    non_uniform_spread,
-    num_mutation_uniforms,
-)
-from evoexp.evolution.selection import choose_by_tournament, rank_weights, spin_roulette
+from evoexp.evolution.operators.operator import Crossover, Genome, Mutation, Selection
+from evoexp.evolution.operators.selection import LinearRanking, Tournament
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
 from evoexp.records import FloatArray
 
 LIMITS = np.array([[-1.0, 2.0], [0.0, 4.0], [-5.0, -3.0]])
+GENOME = Genome.of(LIMITS)
 COUNT = 4000
+CROSSOVERS = (UniformCrossover(), ArithmeticCrossover(), BlxAlpha())
+each_crossover = pytest.mark.parametrize("operator", CROSSOVERS, ids=lambda each: each.component)
 
 
 def genomes(count: int = COUNT, seed: int = 0) -> FloatArray:
@@ -38,47 +31,35 @@ def genomes(count: int = COUNT, seed: int = 0) -> FloatArray:
     return low[:, None] + (high - low)[:, None] * np.random.default_rng(seed).random((3, count))
 
 
-def crossed(
-    kind: int, rate: float, alpha: float = 0.5, seed: int = 1
-) -> tuple[FloatArray, FloatArray]:
-    parents, out = genomes(), np.empty((3, COUNT))
-    uniforms = np.random.default_rng(seed).random(num_gene_uniforms(3, COUNT // 2))
-    cross_genes(kind, uniforms, parents, np.arange(COUNT), rate, alpha, LIMITS, out)
-    return parents, out
+def crossed(operator: Crossover, rate: float) -> tuple[FloatArray, FloatArray]:
+    parents, rng = genomes(), np.random.default_rng(1)
+    return parents, drawn.crossed(operator, rng, parents, np.arange(COUNT), rate, GENOME)
 
 
-def mutated(
-    kind: int, scope: int, rate: float, spread: float, seed: int = 1
-) -> tuple[FloatArray, FloatArray]:
-    rng, before = np.random.default_rng(seed), genomes()
-    after = before.copy()
-    uniforms = rng.random(num_mutation_uniforms(3, COUNT, scope))
-    mutate_genes(
-        kind, scope, uniforms, rng.standard_normal((3, COUNT)), after, COUNT, rate, spread, LIMITS
-    )
-    return before, after
+def mutated(operator: Mutation, rate: float, progress: float) -> tuple[FloatArray, FloatArray]:
+    before, rng = genomes(), np.random.default_rng(1)
+    return before, drawn.mutated(operator, rng, before, rate, GENOME, progress)
 
 
-@pytest.mark.parametrize("kind", [UNIFORM, ARITHMETIC, BLX_ALPHA])
-def test_crossover_at_rate_0_copies(kind: int) -> None:
-    parents, out = crossed(kind, 0.0)
+@each_crossover
+def test_crossover_at_rate_0_copies(operator: Crossover) -> None:
+    parents, out = crossed(operator, 0.0)
     assert np.array_equal(parents, out)
 
 
-@pytest.mark.parametrize("kind", [UNIFORM, ARITHMETIC, BLX_ALPHA])
-def test_crossover_has_its_rate(kind: int) -> None:
-    parents, out = crossed(kind, 0.3)
+@each_crossover
+def test_crossover_has_its_rate(operator: Crossover) -> None:
+    parents, out = crossed(operator, 0.3)
     changed = (parents != out).any(axis=0).reshape(-1, 2).any(axis=1)
-    rate = 0.3 * (
-        0.875 if kind == UNIFORM else 1.0
-    )  # three genes, none exchanged in one of eight pairs
+    # three genes, none exchanged in one of eight pairs
+    rate = 0.3 * (0.875 if isinstance(operator, UniformCrossover) else 1.0)
     assert changed.mean() == pytest.approx(
         rate, abs=4.0 * np.sqrt(0.3 * 0.7 / len(changed))
     )  # four standard errors
 
 
 def test_uniform_crossover_exchanges_half_of_the_genes() -> None:
-    parents, out = crossed(UNIFORM, 1.0)
+    parents, out = crossed(UniformCrossover(), 1.0)
     swapped = parents[:, ::2] == out[:, 1::2]
     assert np.array_equal(swapped, parents[:, 1::2] == out[:, ::2])
     assert np.array_equal(~swapped, parents[:, ::2] == out[:, ::2])
@@ -86,7 +67,7 @@ def test_uniform_crossover_exchanges_half_of_the_genes() -> None:
 
 
 def test_arithmetic_children_lie_between_their_parents_at_one_share() -> None:
-    parents, out = crossed(ARITHMETIC, 1.0)
+    parents, out = crossed(ArithmeticCrossover(), 1.0)
     x, y, first, second = parents[:, ::2], parents[:, 1::2], out[:, ::2], out[:, 1::2]
     share = (first - y) / (x - y)
     assert np.abs(share - share[0]).max() < 1e-9
@@ -99,7 +80,7 @@ def test_arithmetic_children_lie_between_their_parents_at_one_share() -> None:
 def test_blx_children_lie_at_most_alpha_beyond_their_parents_and_within_limits(
     alpha: float,
 ) -> None:
-    parents, out = crossed(BLX_ALPHA, 1.0, alpha)
+    parents, out = crossed(BlxAlpha(blend_alpha=alpha), 1.0)
     x, y = parents[:, ::2], parents[:, 1::2]
     wide = alpha * np.abs(x - y) + 1e-12
     for child in (out[:, ::2], out[:, 1::2]):
@@ -112,86 +93,78 @@ def test_blx_children_lie_at_most_alpha_beyond_their_parents_and_within_limits(
         assert 0.25 < outside.mean() < 0.5
 
 
-@pytest.mark.parametrize("kind", [NON_UNIFORM, GAUSSIAN, UNIFORM_RESET])
-@pytest.mark.parametrize("scope", [GENE, INDIVIDUAL])
-def test_mutation_has_its_rate_and_keeps_the_limits(kind: int, scope: int) -> None:
-    before, same = mutated(kind, scope, 0.0, 0.7)
+@pytest.mark.parametrize("kind", [NonUniformMutation, GaussianMutation, UniformReset])
+@pytest.mark.parametrize("one_gene", [False, True])
+def test_mutation_has_its_rate_and_keeps_the_limits(kind: type[Mutation], one_gene: bool) -> None:
+    operator = kind(one_gene=one_gene)
+    before, same = mutated(operator, 0.0, 0.1)
     assert np.array_equal(before, same)
-    before, after = mutated(kind, scope, 0.2, 0.7)
+    before, after = mutated(operator, 0.2, 0.1)
     changed = before != after
-    counted = changed if scope == GENE else changed.any(axis=0)
+    counted = changed.any(axis=0) if one_gene else changed
     assert counted.mean() == pytest.approx(
         0.2, abs=4.0 * np.sqrt(0.16 / counted.size)
     )  # four standard errors
-    if scope == INDIVIDUAL:
+    if one_gene:
         assert changed.sum(axis=0).max() == 1
     assert (LIMITS[:, 0] <= after.T).all()
     assert (LIMITS[:, 1] >= after.T).all()
 
 
 def test_amounts_of_mutation() -> None:
-    before, after = mutated(NON_UNIFORM, GENE, 1.0, 0.3)
+    before, after = mutated(NonUniformMutation(mutation_power=1), 1.0, 0.7)
     room = np.where(after > before, LIMITS[:, 1:] - before, before - LIMITS[:, :1])
     share = np.abs(after - before) / room
     assert share.max() <= 0.3 + 1e-12
     assert share.mean() == pytest.approx(0.15, abs=0.005)  # r is uniform
     assert (after > before).mean() == pytest.approx(0.5, abs=0.02)
-    before, after = mutated(UNIFORM_RESET, GENE, 0.5, 0.3)
+    before, after = mutated(UniformReset(), 0.5, 0.3)
     place = ((after - LIMITS[:, :1]) / (LIMITS[:, 1:] - LIMITS[:, :1]))[after != before]
     assert place.mean() == pytest.approx(0.5, abs=0.02)
     assert place.std() == pytest.approx(np.sqrt(1.0 / 12.0), abs=0.01)
-    before, after = mutated(GAUSSIAN, GENE, 1.0, 0.01)
+    before, after = mutated(GaussianMutation(mutation_std=0.01), 1.0, 0.3)
     inside = (LIMITS[:, 0] < after.T) & (LIMITS[:, 1] > after.T)
     steps = ((after - before) / (LIMITS[:, 1:] - LIMITS[:, :1])).T[inside]
     assert steps.std() == pytest.approx(0.01, rel=0.05)
 
 
-def test_the_spread_falls_to_nothing() -> None:
-    assert non_uniform_spread(0, 100, 2) == 1.0
-    assert non_uniform_spread(50, 100, 2) == pytest.approx(0.25)
-    assert non_uniform_spread(100, 100, 2) == 0.0
-    assert non_uniform_spread(30, 100, 0) == 1.0
+@pytest.mark.parametrize(
+    ("progress", "power", "spread"), [(0.0, 2, 1.0), (0.5, 2, 0.25), (1.0, 2, 0.0), (0.3, 0, 1.0)]
+)
+def test_the_spread_falls_to_nothing(progress: float, power: int, spread: float) -> None:
+    before, after = mutated(NonUniformMutation(mutation_power=power), 1.0, progress)
+    room = np.where(after > before, LIMITS[:, 1:] - before, before - LIMITS[:, :1])
+    assert (np.abs(after - before) / room).max() == pytest.approx(spread, rel=1e-3)
+
+
+def shares(operator: Selection, costs: FloatArray) -> FloatArray:
+    """Return how often each individual is among 30,000 parents, as a share."""
+    parents = drawn.selected(operator, np.random.default_rng(0), costs, 30_000)
+    return np.bincount(parents, minlength=len(costs)) / len(parents)
 
 
 def test_a_tournament_prefers_the_better_and_takes_anyone_where_nobody_is_feasible() -> None:
-    uniforms, parents = np.random.default_rng(0).random(60_000), np.empty(30_000, dtype=np.int64)
     costs = np.array([3.0, np.inf, 1.0, 2.0])
-    choose_by_tournament(uniforms, costs, 2, parents)
     # Of 16 ordered draws the best wins 7, the next 5, 3, 1.
     expected = np.array([3, 1, 7, 5]) / 16.0
-    np.testing.assert_allclose(
-        np.bincount(parents, minlength=4) / len(parents), expected, atol=0.012
-    )
-    choose_by_tournament(uniforms, np.full(4, np.inf), 2, parents)
-    np.testing.assert_allclose(np.bincount(parents, minlength=4) / len(parents), 0.25, atol=0.012)
-    choose_by_tournament(uniforms[:30_000], costs, 1, parents)
-    np.testing.assert_allclose(np.bincount(parents, minlength=4) / len(parents), 0.25, atol=0.012)
+    np.testing.assert_allclose(shares(Tournament(), costs), expected, atol=0.012)
+    np.testing.assert_allclose(shares(Tournament(), np.full(4, np.inf)), 0.25, atol=0.012)
+    np.testing.assert_allclose(shares(Tournament(tournament_size=1), costs), 0.25, atol=0.012)
 
 
-@given(
-    st.lists(st.one_of(st.floats(0.0, 9.0), st.just(np.inf)), min_size=1, max_size=30),
-    st.floats(1.0, 2.0),
+@pytest.mark.parametrize("pressure", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize(
+    "costs", [[5.0, 1.0, np.inf, np.inf], [7.0], [2.0, 2.0, 2.0], [4.0, 3.0, 1.0, 3.0, 0.5, np.inf]]
 )
-def test_rank_weights_sum_to_the_population_and_fall_with_cost(
+def test_parents_by_rank_are_as_many_as_their_formula_says(
     costs: list[float], pressure: float
 ) -> None:
-    values, weights = np.array(costs), np.empty(len(costs))
-    rank_weights(values, pressure, weights)
-    assert weights.sum() == pytest.approx(len(costs) if len(costs) > 1 else 2.0 - pressure)
-    order = np.argsort(values, kind="stable")
-    assert (np.diff(weights[order]) <= 1e-12).all()
-    for cost in set(costs):
-        assert np.ptp(weights[values == cost]) == 0.0
-
-
-def test_ranks_of_four() -> None:
-    weights = np.empty(4)
-    rank_weights(np.array([5.0, 1.0, np.inf, np.inf]), 2.0, weights)
-    assert weights == pytest.approx([4.0 / 3.0, 2.0, 1.0 / 3.0, 1.0 / 3.0])
-    parents = np.empty(9, dtype=np.int64)
-    rank_weights(np.array([7.0]), 2.0, weights[:1])
-    spin_roulette(weights[:1], np.random.default_rng(0).random(9), parents)
-    assert (parents == 0).all()
+    """Ranks as scipy counts them: equal costs share the mean of theirs."""
+    ranks = scipy.stats.rankdata(-np.array(costs)) - 1.0
+    weights = 2.0 - pressure + 2.0 * (pressure - 1.0) * ranks / max(len(costs) - 1, 1)
+    weights = weights / weights.sum() if weights.any() else np.ones(len(costs))
+    operator = LinearRanking(rank_pressure=pressure)
+    np.testing.assert_allclose(shares(operator, np.array(costs)), weights, atol=0.012)
 
 
 def test_bits() -> None:
@@ -199,12 +172,11 @@ def test_bits() -> None:
     angles = np.empty((2, 3))
     decode_bits(bits, 3, np.array([[-1.0, 2.0], [0.0, 3.0]]), angles)
     assert angles == pytest.approx(np.array([[-1.0, 2.0, 0.0], [0.0, 3.0, 1.0]]))
-    flipped = np.zeros((20, 500))
-    flip_bits(np.random.default_rng(0).random(10_000), flipped, 500, 0.1)
+    genome, zeros = Genome.of(np.tile([0.0, 1.0], (20, 1))), np.zeros((20, 500))
+    flipped = drawn.mutated(BitFlips(), np.random.default_rng(0), zeros, 0.1, genome)
     assert set(np.unique(flipped)) == {0.0, 1.0}
     assert flipped.mean() == pytest.approx(0.1, abs=0.012)  # four standard errors
-    again = flipped.copy()
-    flip_bits(np.random.default_rng(0).random(10_000), again, 500, 0.0)
+    again = drawn.mutated(BitFlips(), np.random.default_rng(0), flipped, 0.0, genome)
     assert np.array_equal(again, flipped)
 
 

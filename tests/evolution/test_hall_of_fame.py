@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.evolution.best_team import best_team, find_best_team
+from evoexp.evolution.best_team import best_team
 from evoexp.evolution.hall_of_fame import (
     Hall,
     HallRules,
-    Teams,
     gather_teams,
     renew_hall,
 )
@@ -64,16 +63,16 @@ def rules(
     return HallRules(memory or 0, frozen, np.array([p not in shared for p in range(num)]))
 
 
-def form_teams(collisions: np.ndarray, own: np.ndarray, front: np.ndarray) -> Teams:
+def form_teams(collisions: np.ndarray, own: np.ndarray, front: np.ndarray) -> Hall:
     formed = Hall.room(int(front.sum()), len(own))
-    teams = Teams(formed.teams, formed.collisions, formed.costs)
-    gather_teams(collisions, own, front, own.shape[1], teams)
-    return teams
+    gather_teams(collisions, own, front, formed)
+    return formed
 
 
 def with_room(hall: Hall, depth: int) -> Hall:
     copy = Hall.room(depth, hall.teams.shape[1])
-    copy.teams[: hall.num_teams], copy.ages[: hall.num_teams] = hall.teams, hall.ages
+    num_teams = len(hall.teams)
+    copy.teams[:num_teams], copy.ages[:num_teams] = hall.teams, hall.ages
     return copy
 
 
@@ -86,11 +85,11 @@ def update_hall(
     taken: HallRules | None = None,
     best: np.ndarray | None = None,
 ) -> Hall:
-    num, count = own.shape
+    num = len(own)
     best, renewed = np.full(num, -1) if best is None else best, with_room(hall, depth)
     taken = taken or rules(num)
-    held = renew_hall(collisions, own, front, count, renewed, hall.num_teams, best, taken)
-    return renewed.first(held)
+    held = renew_hall(collisions, own, front, renewed, len(hall.teams), best, taken)
+    return Hall(*(array[:held] for array in renewed))
 
 
 def teams_by_definition(w: World) -> list[tuple[int, ...]]:
@@ -154,7 +153,7 @@ def some_hall(seed: int, num: int, size: int, count: int) -> Hall:
     """A hall of disjoint teams that nobody formed."""
     rng = np.random.default_rng(seed)
     teams = np.stack([rng.permutation(size)[:count] for _ in range(num)], axis=1)
-    return Hall.empty(num)._replace(teams=teams, ages=rng.integers(0, 6, size=count))
+    return Hall.room(0, num)._replace(teams=teams, ages=rng.integers(0, 6, size=count))
 
 
 cases = given(st.integers(0, 10_000), st.sampled_from([2, 3, 4]), st.integers(1, 7), st.booleans())
@@ -258,7 +257,7 @@ def test_memory_counts_generations_and_needs_somebody_new() -> None:
     front = np.array(
         [[False, True], [False, False]]
     )  # forms (1, 1) of key (0, 4); in the hall is (0, 0) of (0, 2)
-    hall = Hall.empty(2)._replace(
+    hall = Hall.room(0, 2)._replace(
         teams=np.zeros((1, 2), dtype=np.int64), ages=np.zeros(1, dtype=np.int64)
     )
     firsts = []
@@ -279,7 +278,7 @@ def test_memory_counts_generations_and_needs_somebody_new() -> None:
 def test_equal_keys_keep_the_old_then_the_first_formed() -> None:
     own, collisions = np.ones((2, 4)), np.zeros((1, 4, 4), dtype=np.int16)
     everybody = np.ones((2, 4), dtype=bool)
-    old = Hall.empty(2)._replace(teams=np.array([[3, 2]]), ages=np.array([7]))
+    old = Hall.room(0, 2)._replace(teams=np.array([[3, 2]]), ages=np.array([7]))
     chosen = update_hall(collisions, own, everybody, old, 3)
     assert chosen.teams.tolist() == [
         [3, 2],
@@ -295,38 +294,15 @@ def test_the_best_team_is_taken_even_if_nobody_of_it_is_on_a_front() -> None:
     front = np.array([[True, False], [True, False]])
     best = best_team(collisions, own)
     for offered, expected in ((None, [[0, 0]]), (best.individuals, [[1, 1], [0, 0]])):
-        chosen = update_hall(collisions, own, front, Hall.empty(2), 2, best=offered)
+        chosen = update_hall(collisions, own, front, Hall.room(0, 2), 2, best=offered)
         assert chosen.teams.tolist() == expected
 
 
 def test_individuals_of_a_population_that_may_be_shared_are_in_many_teams() -> None:
     own, collisions = np.ones((2, 4)), np.zeros((1, 4, 4), dtype=np.int16)
     front = np.array([[True] * 4, [True] + [False] * 3])
-    chosen = update_hall(collisions, own, front, Hall.empty(2), 3, rules(2, shared=(1,)))
+    chosen = update_hall(collisions, own, front, Hall.room(0, 2), 3, rules(2, shared=(1,)))
     assert chosen.teams.tolist() == [[0, 0], [1, 0], [2, 0]]
-
-
-@pytest.mark.parametrize("num", [2, 3])
-def test_kernels_ignore_padding(num: int) -> None:
-    w = world(5, num, 13)
-    hall = some_hall(1, num, 13, 3)
-    own, front = np.full((num, 16), -9.0), np.ones((num, 16), dtype=bool)
-    collisions = np.zeros((len(w.collisions), 16, 24), dtype=np.int16)
-    own[:, :13], front[:, :13], collisions[:, :13, :13] = w.own, w.front, w.collisions
-    team = np.empty(num, dtype=np.int64)
-    cost = find_best_team(collisions, own, 13, team)
-    best = best_team(w.collisions, w.own)
-    assert (cost, team.tolist()) == (best.cost, best.individuals.tolist())
-    room = Hall.room(num * 13, num)
-    teams = Teams(room.teams, room.collisions, room.costs)
-    count = gather_teams(collisions, own, front, 13, teams)
-    for mine, theirs in zip(teams, form_teams(*w), strict=True):
-        assert np.array_equal(mine[:count], theirs)
-    renewed = with_room(hall, 6)
-    forgetting, nobody = rules(num, memory=2), np.full(num, -1)
-    held = renew_hall(collisions, own, front, 13, renewed, 3, nobody, forgetting)
-    for mine, theirs in zip(renewed, update_hall(*w, hall, 6, forgetting), strict=True):
-        assert np.array_equal(mine[:held], theirs)
 
 
 def test_nothing_is_random_and_inputs_are_left_alone() -> None:
@@ -335,13 +311,6 @@ def test_nothing_is_random_and_inputs_are_left_alone() -> None:
     first, second = (update_hall(*w, hall, 5, rules(2, memory=2)) for _ in range(2))
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
     assert all(np.array_equal(a, b) for a, b in zip((*w, *hall), copies, strict=True))
-
-
-def test_moved_hall_lies_behind_the_offspring() -> None:
-    hall = some_hall(0, 3, 10, 2).moved(8)
-    assert hall.teams.tolist() == [[8, 8, 8], [9, 9, 9]]
-    assert hall.num_teams == 2
-    assert Hall.empty(3).moved(8).teams.shape == (0, 3)
 
 
 def test_arrays_that_do_not_match_are_errors() -> None:

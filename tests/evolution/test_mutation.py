@@ -5,19 +5,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.mutation import decayed_rate, mutate_allele, num_allele_uniforms
+from evoexp.evolution.operators.mutation import AlleleMutation
+from evoexp.evolution.operators.operator import Genome
+from evoexp.testing import operator_checks as drawn
 
 LIMIT, STEP = np.pi, np.pi / 5.0
 LAST = np.nextafter(1.0, 0.0)  # the largest uniform number there can be
 
 
+def genome_of(genomes: np.ndarray, limit: float = LIMIT) -> Genome:
+    return Genome.of(np.tile([0.0, limit], (len(genomes), 1)))
+
+
 def mutated(
     seed: int, genomes: np.ndarray, rate: float, symmetric: bool, limit: float = LIMIT
 ) -> np.ndarray:
-    out, count = genomes.copy(), genomes.shape[1]
-    uniforms = np.random.default_rng(seed).random(num_allele_uniforms(count))
-    mutate_allele(uniforms, out, count, rate, STEP, limit, symmetric)
-    return out
+    operator, rng = AlleleMutation(step=STEP, symmetric=symmetric), np.random.default_rng(seed)
+    return drawn.mutated(operator, rng, genomes, rate, genome_of(genomes, limit))
+
+
+def mutate_one(gene: float, uniforms: list[float], symmetric: bool) -> float:
+    """Return what becomes of a genome of one gene by three uniform numbers."""
+    genomes, operator = np.full((1, 1), gene), AlleleMutation(step=STEP, symmetric=symmetric)
+    context = drawn.context_of(operator, np.array(uniforms), 1.0, genome_of(genomes))
+    operator.mutate(genomes, 1, context)
+    return genomes.item()
 
 
 def mutated_literally(seed: int, genomes: np.ndarray, rate: float, symmetric: bool) -> np.ndarray:
@@ -66,16 +78,10 @@ def test_a_change_out_of_bounds_is_not_made() -> None:
 
 
 def test_the_ends_of_the_amount_are_as_printed() -> None:
-    for draw, symmetric, expected in ((0.0, False, 1.0 + STEP), (0.0, True, 1.0 - STEP)):
-        genomes = np.ones((1, 1))
-        mutate_allele(np.array([0.0, LAST, draw]), genomes, 1, 1.0, STEP, LIMIT, symmetric)
-        assert genomes[0, 0] == expected
-    genomes = np.zeros((1, 1))
-    mutate_allele(np.array([0.0, 0.0, LAST]), genomes, 1, 1.0, STEP, LIMIT, False)
-    assert 0.0 < genomes[0, 0] < 1e-15  # the amount 0 is excluded
-    genomes = np.zeros((1, 1))
-    mutate_allele(np.array([0.0, 0.0, LAST]), genomes, 1, 1.0, STEP, LIMIT, True)
-    assert STEP - 1e-15 < genomes[0, 0] < STEP
+    assert mutate_one(1.0, [0.0, LAST, 0.0], symmetric=False) == 1.0 + STEP
+    assert mutate_one(1.0, [0.0, LAST, 0.0], symmetric=True) == 1.0 - STEP
+    assert 0.0 < mutate_one(0.0, [0.0, 0.0, LAST], symmetric=False) < 1e-15  # 0 is excluded
+    assert STEP - 1e-15 < mutate_one(0.0, [0.0, 0.0, LAST], symmetric=True) < STEP
 
 
 @given(
@@ -112,23 +118,3 @@ def test_statistics_of_alleles(symmetric: bool, mean: float, std: float) -> None
     assert shares == pytest.approx(np.full(8, 0.125), abs=4.0 * (0.125 * 0.875 / len(genes)) ** 0.5)
     assert amounts.mean() == pytest.approx(mean, abs=4.0 * std / len(amounts) ** 0.5)
     assert amounts.std() == pytest.approx(std, rel=0.03)
-
-
-def test_padding_is_left_alone() -> None:
-    for rate in (0.0, 1.0):
-        genomes, uniforms = np.ones((4, 12)), np.random.default_rng(5).random(21)
-        mutate_allele(uniforms, genomes, 7, rate, STEP, LIMIT, False)
-        assert np.all(genomes[:, 7:] == 1.0)
-        assert np.any(genomes[:, :7] != 1.0, axis=0).sum() == 7 * rate
-
-
-def test_schedule_of_eq_10() -> None:
-    assert decayed_rate(1.0, 0.9, 0, 200) == 1.0
-    assert decayed_rate(1.0, 0.9, 100, 200) == pytest.approx(0.55, rel=1e-15)
-    assert decayed_rate(1.0, 0.9, 200, 200) == pytest.approx(0.1, rel=1e-15)
-    assert [decayed_rate(0.3, 0.0, t, 200) for t in (0, 77, 200)] == [0.3, 0.3, 0.3]
-    assert decayed_rate(0.7, 0.2, 0, 0) == 0.7
-    assert decayed_rate(0.3, 0.3, 200, 200) == 0.0
-    assert decayed_rate(0.3, 0.3, 300, 200) == 0.0
-    rates = [decayed_rate(1.0, 0.9, t, 200) for t in range(201)]
-    assert all(later < earlier for earlier, later in zip(rates, rates[1:], strict=False))

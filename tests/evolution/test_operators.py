@@ -5,12 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evoexp import testing as drawn
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.crossover import cross_at_sites, num_uniforms
 from evoexp.evolution.genetic_settings import GeneticSettings
-from evoexp.evolution.selection import choose_elites
-from evolution.drawn_parents import roulette
+from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.operators.selection import spin_roulette
+from evoexp.evolution.succession import choose_elites
+from evoexp.planners.via_point_ga.string_operators import StringCrossover
 
 ARMS = np.array([[0, 2], [2, 5]])
 
@@ -27,10 +29,13 @@ def crossed(
     strings: np.ndarray,
     segment: bool = False,
 ) -> np.ndarray:
-    out = np.full((*strings.shape[:2], len(parents) + 4), np.nan)
-    uniforms = np.random.default_rng(seed).random(num_uniforms(len(ARMS), len(parents) // 2))
-    cross_at_sites(uniforms, strings, parents, ARMS, rate, distance, segment, out)
-    return out[:, :, : len(parents)]
+    operator = StringCrossover(crossover_distance=distance, exchanges_segment=segment)
+    joints, points, individuals = strings.shape
+    genomes = strings.reshape(joints * points, individuals)
+    genome = Genome(np.zeros((joints * points, 2)), ARMS, points)
+    rng = np.random.default_rng(seed)
+    out = drawn.crossed(operator, rng, genomes, parents, rate, genome)
+    return out.reshape(joints, points, -1)
 
 
 def crossed_literally(
@@ -99,7 +104,7 @@ def test_crossover_exchanges_the_segment_between_its_sites(seed: int, count: int
 def test_crossover_of_rate_zero_or_far_parents_copies() -> None:
     strings, parents = population(1), np.array([3, 4, 5, 6])
     assert np.array_equal(crossed(0, parents, 0.0, 1e9, strings), strings[:, :, parents])
-    assert np.array_equal(crossed(0, parents, 1.0, 0.0, strings), strings[:, :, parents])
+    assert np.array_equal(crossed(0, parents, 1.0, 1e-9, strings), strings[:, :, parents])
     assert not np.array_equal(crossed(0, parents, 1.0, 1e9, strings), strings[:, :, parents])
 
 
@@ -118,6 +123,12 @@ def test_crossover_keeps_the_ends_and_all_material() -> None:
 def test_strings_without_inner_points_are_copied() -> None:
     strings = population(4, points=2)
     assert np.array_equal(crossed(0, np.array([1, 2]), 1.0, 1e9, strings), strings[:, :, [1, 2]])
+
+
+def roulette(rng: np.random.Generator, weights: np.ndarray, count: int) -> np.ndarray:
+    chosen = np.empty(count, dtype=np.int64)
+    spin_roulette(weights, rng.random(count), chosen)
+    return chosen
 
 
 @given(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.pareto import non_dominated, pareto_front
+from evoexp.evolution.pareto import pareto_front
 
 
 def dominates(a: np.ndarray, b: np.ndarray) -> bool:
@@ -65,16 +65,7 @@ def test_whoever_is_off_the_front_is_dominated_by_somebody_on_it() -> None:
         assert any(dominates(criteria[:, j], criteria[:, k]) for j in np.flatnonzero(front))
 
 
-def test_padding_is_neither_read_nor_written() -> None:
-    criteria = np.random.default_rng(1).random((4, 24))
-    criteria[:, 20:] = -1.0  # would dominate all
-    out = np.array([False, True] * 12)
-    non_dominated(criteria, 20, out)
-    assert np.array_equal(out[:20], front_by_definition(criteria[:, :20]))
-    assert out[20:].tolist() == [False, True] * 2
-
-
 def test_nobody_and_no_criteria() -> None:
     assert pareto_front(np.empty((4, 0))).tolist() == []
-    with pytest.raises(ValueError, match=r"criteria are \(criteria, individuals\), were \(0, 5\)"):
+    with pytest.raises(ValueError, match="one at least"):
         pareto_front(np.empty((0, 5)))

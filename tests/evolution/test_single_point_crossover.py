@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.crossover import cross_single_point, num_single_point_uniforms
+from evoexp.evolution.operators.crossover import OnePoint
+from evoexp.evolution.operators.operator import Genome
+from evoexp.testing import operator_checks as drawn
 
 
 def population(num_genes: int = 8, individuals: int = 12) -> np.ndarray:
@@ -13,12 +15,13 @@ def population(num_genes: int = 8, individuals: int = 12) -> np.ndarray:
     return np.arange(num_genes * individuals, dtype=float).reshape(num_genes, individuals)
 
 
+def genome_of(genomes: np.ndarray) -> Genome:
+    return Genome.of(np.zeros((len(genomes), 2)))
+
+
 def crossed(seed: int, genomes: np.ndarray, parents: np.ndarray, rate: float) -> np.ndarray:
-    out = np.full((len(genomes), len(parents) + 4), -1.0)
-    uniforms = np.random.default_rng(seed).random(num_single_point_uniforms(len(parents) // 2))
-    cross_single_point(uniforms, genomes, parents, rate, out)
-    assert np.all(out[:, len(parents) :] == -1.0)
-    return out[:, : len(parents)]
+    rng = np.random.default_rng(seed)
+    return drawn.crossed(OnePoint(), rng, genomes, parents, rate, genome_of(genomes))
 
 
 def crossed_literally(
@@ -88,5 +91,7 @@ def test_sites_and_rate_are_drawn_evenly() -> None:
 
 def test_the_last_site_is_the_last_gene_even_for_the_largest_draw() -> None:
     genomes, out = population(), np.empty((8, 2))
-    cross_single_point(np.array([0.0, np.nextafter(1.0, 0.0)]), genomes, np.array([0, 1]), 1.0, out)
+    uniforms = np.array([0.0, np.nextafter(1.0, 0.0)])
+    context = drawn.context_of(OnePoint(), uniforms, 1.0, genome_of(genomes))
+    OnePoint.cross(genomes, np.array([0, 1]), context, out)
     assert (out[:, 0] != genomes[:, 0]).tolist() == [False] * 7 + [True]

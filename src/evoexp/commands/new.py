@@ -1,4 +1,4 @@
-"""`evoexp new`: the first files of a package with a planner of the user's own."""
+"""`evoexp new`: the first files of a package with a planner or an operator of the user's own."""
 
 import argparse
 import keyword
@@ -14,8 +14,13 @@ from evoexp.errors import EvoexpError, SettingError
 from evoexp.registry import COMPONENTS, names
 from evoexp.store.files import write_files
 
-TEMPLATE = "my_planner"  # stands in the files for the name, and `MyPlanner` for the class
-GROUPS = ("experiment", "planner", "ga")  # that the package adds an option to
+# the command that runs what was made; in the files of a kind, `my_…` stands for the name of the
+# package and `My…` for the class
+COMMANDS = {
+    "planner": "evoexp run experiment={name} budget=smoke",
+    "operator": "evoexp run experiment=lavoie_7dof ga.crossover={name} budget=smoke",
+}
+GROUPS = ("experiment", "planner", "ga")  # that the package may add an option to
 
 
 class PackageExists(EvoexpError):
@@ -24,7 +29,7 @@ class PackageExists(EvoexpError):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("kind", choices=("planner",), help="a planner with options and tests")
+    parser.add_argument("kind", choices=tuple(COMMANDS), help="of the component")
     parser.add_argument(
         "name", metavar="NAME", help="of the package: lower-case letters, digits and _"
     )
@@ -42,8 +47,11 @@ def main(arguments: argparse.Namespace) -> int:
     name = arguments.name
     root = arguments.directory / name
     _check(name, root)
-    template = resources.files("evoexp").joinpath("assets/new_planner")
-    files = {root / _named(path, name): _named(text, name) for path, text in _read(template)}
+    kind, template = arguments.kind, resources.files("evoexp").joinpath("assets")
+    files = {
+        root / _named(path, kind, name): _named(text, kind, name)
+        for path, text in _read(template.joinpath(f"new_{kind}"))
+    }
     try:
         for path in files:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -53,7 +61,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise
     print(f"{root}: {len(files)} files")
     print(f"install it: pip install -e {root}")
-    print(f"run it:     evoexp run experiment={name} budget=smoke")
+    print(f"run it:     {COMMANDS[kind].format(name=name)}")
     return 0
 
 
@@ -89,7 +97,7 @@ def _read(directory: Traversable, inside: str = "") -> list[tuple[str, str]]:
     return found
 
 
-def _named(text: str, name: str) -> str:
-    """Return text of the template with the names of a new package."""
+def _named(text: str, kind: str, name: str) -> str:
+    """Return text of the template of a kind with the names of a new package."""
     words = name.replace("_", " ").title().replace(" ", "")
-    return text.replace(TEMPLATE, name).replace("MyPlanner", words)
+    return text.replace(f"my_{kind}", name).replace(f"My{kind.title()}", words)

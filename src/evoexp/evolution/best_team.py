@@ -5,10 +5,10 @@ and every tie is settled by an order.
 
 Arrays that all functions of teams share, for P ≥ 2 populations of N individuals:
 
-- collisions  # (pairs of populations, ≥ N, ≥ N) integers, pairs in the order (0, 1), (0, 2), …, (1,
+- collisions  # (pairs of populations, N, N) integers, pairs in the order (0, 1), (0, 2), …, (1,
   2), …: how often individual i of the first population of a pair collides with individual j of the
   second.
-- own  # (P, ≥ N) cost of an individual whoever its collaborators are; inf is allowed, NaN is not.
+- own  # (P, N) cost of an individual whoever its collaborators are; inf is allowed, NaN is not.
   Summed in the order of the populations.
 """
 
@@ -36,23 +36,6 @@ class BestTeam(NamedTuple):
         return bool(self.cost < np.inf)
 
 
-def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
-    """Search all teams without a collision for the lowest sum of own costs; exact.
-
-    Of teams with the same sum, the one whose indices come first in lexicographic order, population
-    0 leading. A team of infinite cost is none.
-
-    Raises:
-        ValueError: If the shapes contradict each other.
-    """
-    num, count = own.shape
-    enough = collisions.ndim == 3 and min(collisions.shape[1:]) >= count
-    if num < 2 or not enough or len(collisions) != num * (num - 1) // 2:
-        raise ValueError(f"collisions {collisions.shape} and costs {own.shape} do not match")
-    team = np.empty(len(own), dtype=np.int64)
-    return BestTeam(team, float(find_best_team(collisions, own, count, team)))
-
-
 @kernel
 def pair_index(num: int, first: int, second: int) -> int:
     """Return the place of populations first < second of `num` in the order of pairs.
@@ -63,27 +46,33 @@ def pair_index(num: int, first: int, second: int) -> int:
 
 
 @kernel
-def sort_by_cost(own: FloatArray, count: int) -> IntArray:
+def sort_by_cost(own: FloatArray) -> IntArray:
     """Return (P, N) the individuals of each population by own cost, equal ones by index."""
-    order = np.empty((len(own), count), dtype=np.int64)
+    order = np.empty(own.shape, dtype=np.int64)
     for p in range(len(own)):
-        order[p] = np.argsort(own[p, :count], kind="mergesort")  # stable
+        order[p] = np.argsort(own[p], kind="mergesort")  # stable
     return order
 
 
 @kernel
-def find_best_team(
-    collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray
-) -> float:
-    """Write the best team, see `best_team`, of the first `count` individuals; return its cost.
+def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
+    """Search all teams without a collision for the lowest sum of own costs; exact.
+
+    Of teams with the same sum, the one whose indices come first in lexicographic order, population
+    0 leading. A team of infinite cost is none.
 
     Depth first, the cheapest first, with bounds. These are summed in the order of the populations
     like the costs themselves, so rounding cannot make one too high. Where a bound only equals the
     best cost, a branch is worth it if its indices come first in lexicographic order.
+
+    Raises:
+        ValueError: If the shapes contradict each other.
     """
-    num, order = len(own), sort_by_cost(own, count)
+    num, count = own.shape
+    if num < 2 or collisions.shape != (num * (num - 1) // 2, count, count):
+        raise ValueError("collisions and costs do not match")
+    order, team = sort_by_cost(own), np.full(num, -1)
     ranks, trial, partial = np.zeros(num, dtype=np.int64), np.full(num, -1), np.zeros(num + 1)
-    team[:] = -1
     best, level = np.inf, 0
     while level >= 0:
         # the next individual of this level, and the least cost that a team with it can have
@@ -107,7 +96,7 @@ def find_best_team(
             team[:] = trial
         if level >= 0:
             ranks[level] += 1
-    return best
+    return BestTeam(team, best)
 
 
 @kernel

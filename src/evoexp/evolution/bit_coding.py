@@ -11,18 +11,15 @@ from evoexp.records import FloatArray, IntArray
 
 @kernel
 def decode_strings(
-    strings: IntArray, bits: int, gray: bool, limits: FloatArray, out: FloatArray
+    strings: IntArray,  # (genes, individuals)
+    bits: int,  # B
+    # whether they are reflected Gray codes: every bit of n is then the parity of its own Gray bit
+    # and all above it
+    gray: bool,
+    limits: FloatArray,  # (genes, 2) l and h of each gene
+    out: FloatArray,  # (genes, ≥ individuals), written
 ) -> None:
-    """Decode numbers n of B bits: l + (h − l) n / (2^B − 1).
-
-    Args:
-        strings: (genes, individuals).
-        bits: B.
-        gray: Whether they are reflected Gray codes: every bit of n is then the parity of its own
-            Gray bit and all above it.
-        limits: (genes, 2) l and h of each gene.
-        out: (genes, ≥ individuals), written.
-    """
+    """Decode numbers n of B bits: l + (h − l) n / (2^B − 1)."""
     greatest = float((1 << bits) - 1)
     for gene in range(len(strings)):
         low, high = limits[gene, 0], limits[gene, 1]
@@ -36,26 +33,18 @@ def decode_strings(
 
 @kernel
 def cross_strings(
-    uniforms: FloatArray,
-    strings: IntArray,
-    bits: int,
-    parents: IntArray,
-    rate: float,
-    out: IntArray,
+    uniforms: FloatArray,  # (2 × pairs,): decision, site
+    strings: IntArray,  # (genes, individuals)
+    bits: int,  # of a gene
+    parents: IntArray,  # (offspring,) indices of individuals
+    rate: float,  # probability in [0, 1]
+    out: IntArray,  # (genes, ≥ offspring), written
 ) -> None:
     """Cut pairs of parents at one site and exchange their tails (Chen & Zalzala 1995, section 3.2).
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability
     `rate`, before one of the bits 1 … all − 1, each equally likely. A pair that is not cut is
     copied.
-
-    Args:
-        uniforms: (2 × pairs,): decision, site.
-        strings: (genes, individuals).
-        bits: Of a gene.
-        parents: (offspring,) indices of individuals.
-        rate: Probability in [0, 1].
-        out: (genes, ≥ offspring), written.
     """
     genes, count = len(strings), len(parents)
     # copies of the parents
@@ -99,3 +88,26 @@ def flip_strings(draws: Block, strings: IntArray, bits: int, count: int, rate: f
         place += 1 + int(passed)
         individual, bit = place // num, place % num
         strings[bit // bits, individual] ^= 1 << (bits - 1 - bit % bits)
+
+
+@kernel
+def decode_bits(bits: FloatArray, count: int, limits: FloatArray, out: FloatArray) -> None:
+    """Decode plain binary numbers n of B bits, the highest first: l + (h − l) n / (2^B − 1).
+
+    Args:
+        bits: (genes × B, ≥ count) 0.0 or 1.0, gene by gene.
+        count: Individuals.
+        limits: (genes, 2) l and h of each gene.
+        out: (genes, ≥ count), written.
+    """
+    num = len(bits) // len(out)
+    greatest = 0.0
+    for _ in range(num):
+        greatest = 2.0 * greatest + 1.0
+    for gene in range(len(out)):
+        low, high = limits[gene, 0], limits[gene, 1]
+        for k in range(count):
+            number = 0.0
+            for bit in range(num):
+                number = 2.0 * number + bits[gene * num + bit, k]
+            out[gene, k] = low + (high - low) * (number / greatest)

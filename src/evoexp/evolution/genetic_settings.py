@@ -5,13 +5,12 @@ from typing import Annotated, ClassVar, Self
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
+from evoexp.evolution.operators.operator import Crossover, Mutation, Named, Selection
 from evoexp.validation import Component, Count, NonNegativeCount, Rate
 
 
-class GeneticSettings(Component):
+class PopulationSettings(Component):
     """Settings of a generational genetic algorithm; every planner uses the same words."""
-
-    component: ClassVar[str] = "genetic"
 
     population_size: Count  # individuals per generation
     num_generations: NonNegativeCount  # generations after the initial one
@@ -38,7 +37,17 @@ class GeneticSettings(Component):
         return self.population_size + self.num_generations * self.num_offspring
 
 
-class ScaledGenetic(GeneticSettings):
+class GeneticSettings(PopulationSettings):
+    """A genetic algorithm with operators of the planner's paper, or with others in their place."""
+
+    component: ClassVar[str] = "genetic"
+
+    selection: Named[Selection] | None = None  # None: as the planner's paper selects parents
+    crossover: Named[Crossover] | None = None  # None: the paper's
+    mutation: Named[Mutation] | None = None  # None: the paper's
+
+
+class ScaledGenetic(PopulationSettings):
     """A generational genetic algorithm whose parents are chosen as in `scaled_selection`.
 
     Costs are scaled linearly, then parents are drawn by stochastic remainder sampling without

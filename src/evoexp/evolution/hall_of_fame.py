@@ -5,7 +5,7 @@ members' own costs): lower is better. Nothing is random and every tie is settled
 next hall takes candidates by key; among equals the present hall's own come first, in their order,
 then the new ones in the order of `gather_teams`, then the best team of all.
 
-The arrays `collisions` and `own` of P populations are those of `best_team`; `front`  # (P, ≥ N)
+The arrays `collisions` and `own` of P populations are those of `best_team`; `front`  # (P, N)
 bool: the non-dominated individuals of each population.
 """
 
@@ -16,14 +16,6 @@ import numpy as np
 from evoexp.evolution.best_team import CollisionCounts, pair_index, sort_by_cost
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
-
-
-class Teams(NamedTuple):
-    """Teams and their keys."""
-
-    teams: IntArray  # (teams, P) index of the member in each population
-    collisions: IntArray  # (teams,) colliding configurations within each team
-    costs: FloatArray  # (teams,) sum of the members' own costs
 
 
 class Hall(NamedTuple):
@@ -40,27 +32,6 @@ class Hall(NamedTuple):
         ages, collisions = np.empty((2, depth), dtype=np.int64)
         teams = np.empty((depth, num_populations), dtype=np.int64)
         return cls(teams, ages, collisions, np.empty(depth))
-
-    @classmethod
-    def empty(cls, num_populations: int) -> Self:
-        """Return a hall without teams."""
-        return cls.room(0, num_populations)
-
-    @property
-    def num_teams(self) -> int:
-        """Number of teams."""
-        return len(self.teams)
-
-    def first(self, count: int) -> Self:
-        """Return the first `count` teams."""
-        teams, ages, collisions, costs = self
-        return type(self)(teams[:count], ages[:count], collisions[:count], costs[:count])
-
-    def moved(self, first: int) -> Self:
-        """Return the hall in the next populations: the k-th team's members are at first + k."""
-        teams = np.empty_like(self.teams)
-        teams[:] = np.arange(first, first + self.num_teams)[:, np.newaxis]
-        return self._replace(teams=teams)
 
 
 class HallRules(NamedTuple):
@@ -114,7 +85,12 @@ def choose_collaborator(
 
 @kernel
 def gather_teams(
-    collisions: CollisionCounts, own: FloatArray, front: BoolArray, count: int, formed: Teams
+    collisions: CollisionCounts,  # (pairs, N, N)
+    own: FloatArray,  # (P, N)
+    front: BoolArray,  # (P, N) the non-dominated individuals
+    # with room for a team per member of a front; written in the order of the members that teams
+    # were formed around: population by population, index by index
+    formed: Hall,
 ) -> int:
     """Give every member of a front its best collaborators, of the first `count` individuals.
 
@@ -122,19 +98,10 @@ def gather_teams(
     are in the team already, then the lowest own cost, then the lowest index. A team may come up
     several times.
 
-    Args:
-        collisions: (pairs, ≥ N, ≥ N), see `best_team`.
-        own: (P, ≥ N), see `best_team`.
-        front: (P, ≥ N) the non-dominated individuals.
-        count: N.
-        formed: With room for a team per member of a front; written in the order of the members that
-            teams were formed around: population by population, index by index.
-
     Returns:
         How many teams there are.
     """
-    num, filled = len(own), 0
-    order = sort_by_cost(own, count)
+    (num, count), order, filled = own.shape, sort_by_cost(own), 0
     for p in range(num):
         for i in range(count):
             if not front[p, i]:
@@ -151,34 +118,25 @@ def gather_teams(
 
 @kernel
 def renew_hall(
-    collisions: CollisionCounts,
-    own: FloatArray,
-    front: BoolArray,
-    count: int,
+    collisions: CollisionCounts,  # (pairs, N, N); keys of old teams are computed anew
+    own: FloatArray,  # (P, N)
+    front: BoolArray,  # (P, N) the non-dominated individuals
+    # with room for as many teams as it may hold; teams and ages are read up to `num_teams`,
+    # everything is rewritten
     hall: Hall,
-    num_teams: int,
+    num_teams: int,  # of the hall at present
+    # (P,) the best team of all, offered to the hall even if none of its members is on a front; −1:
+    # none is offered
     best: IntArray,
-    rules: HallRules,
+    rules: HallRules,  # which teams the hall takes
 ) -> int:
     """Choose the next hall: the best of its teams and of those formed around the fronts.
-
-    Args:
-        collisions: (pairs, ≥ N, ≥ N), see `best_team`; keys of old teams are computed anew.
-        own: (P, ≥ N), see `best_team`.
-        front: (P, ≥ N) the non-dominated individuals.
-        count: N.
-        hall: With room for as many teams as it may hold; teams and ages are read up to
-            `num_teams`, everything is rewritten.
-        num_teams: Teams of the hall at present.
-        best: (P,) the best team of all, offered to the hall even if none of its members is on a
-            front; −1: none is offered.
-        rules: Which teams the hall takes.
 
     Returns:
         Number of teams that the hall holds then.
     """
     # candidates: the hall's own teams, one per member of a front, the best of all
-    most = num_teams + np.count_nonzero(front[:, :count]) + (1 if best[0] >= 0 else 0)
+    most = num_teams + np.count_nonzero(front) + (1 if best[0] >= 0 else 0)
     pool = np.empty((most, len(own)), dtype=np.int64)
     ages, ranks = np.zeros(most, dtype=np.int64), np.zeros(most, dtype=np.int64)
     hits, costs = np.empty(most, dtype=np.int64), np.empty(most)
@@ -189,8 +147,9 @@ def renew_hall(
             ranks[k] = k - num_teams  # before all new ones, in the order they have
         elif 0 < rules.memory < ages[k]:
             ranks[k] = 1  # behind all new ones
-    new = Teams(pool[num_teams:], hits[num_teams:], costs[num_teams:])
-    gather_teams(collisions, own, front, count, new)
+    first = num_teams
+    new = Hall(pool[first:], ages[first:], hits[first:], costs[first:])
+    gather_teams(collisions, own, front, new)
     if best[0] >= 0:
         pool[most - 1] = best
         hits[most - 1], costs[most - 1] = rate_team(collisions, own, best)

@@ -6,11 +6,15 @@ from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray
 
 
+@kernel
 def pareto_front(criteria: FloatArray) -> BoolArray:
     """Mark the individuals that are not dominated (Curkovic et al. 2013, section 3).
 
     One dominates another if it is no worse in every criterion and better in at least one. Exact
     ties are all kept. An individual with a NaN neither dominates nor is on the front.
+
+    Dominance is transitive, so only those not dominated so far are compared with all. Four criteria
+    per pass stay in registers; where fewer are left, the last is repeated, which changes nothing.
 
     Args:
         criteria: (criteria, individuals), all minimised; ±inf are allowed.
@@ -21,25 +25,9 @@ def pareto_front(criteria: FloatArray) -> BoolArray:
     Raises:
         ValueError: If there is no criterion.
     """
-    if criteria.ndim != 2 or not len(criteria):
-        raise ValueError(f"criteria are (criteria, individuals), were {criteria.shape}")
-    front = np.empty(criteria.shape[1], dtype=np.bool_)
-    non_dominated(criteria, len(front), front)
-    return front
-
-
-@kernel
-def non_dominated(criteria: FloatArray, count: int, out: BoolArray) -> None:
-    """Mark those of the first `count` individuals that are not dominated, see `pareto_front`.
-
-    Dominance is transitive, so only those not dominated so far are compared with all. Four criteria
-    per pass stay in registers; where fewer are left, the last is repeated, which changes nothing.
-
-    Args:
-        criteria: (criteria, ≥ count).
-        count: Individuals.
-        out: (≥ count,) written.
-    """
+    if len(criteria) == 0:
+        raise ValueError("criteria are (criteria, individuals), one at least")
+    count = criteria.shape[1]
     last = len(criteria) - 1
     dominated = np.zeros(count, dtype=np.int64)
     # on i beside j: bit 0 better in some criterion, bit 1 worse in some
@@ -62,5 +50,4 @@ def non_dominated(criteria: FloatArray, count: int, out: BoolArray) -> None:
                 verdicts[i] |= (1 if better else 0) | (2 if worse else 0)
         for i in range(count):
             dominated[i] |= 1 if verdicts[i] == 2 else 0
-    for i in range(count):
-        out[i] = dominated[i] == 0
+    return np.asarray(dominated == 0)

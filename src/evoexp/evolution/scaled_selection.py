@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.random_stream import Block, draw_many, used_up
 from evoexp.records import FloatArray, IntArray
@@ -41,15 +41,12 @@ class SelectionMemory(NamedTuple):
 
 @kernel
 def choose_parents(
-    draws: Block, costs: FloatArray, multiple: float, memory: SelectionMemory
+    draws: Block,  # uniform numbers
+    costs: FloatArray,  # (individuals,)
+    multiple: float,  # copies that the best one expects, in units of the mean
+    memory: SelectionMemory,  # written
 ) -> bool:
     """Choose the elites, and parents by linear scaling and stochastic remainders.
-
-    Args:
-        draws: Uniform numbers.
-        costs: (individuals,).
-        multiple: Copies that the best one expects, in units of the mean.
-        memory: Written.
 
     Returns:
         Whether the draws sufficed; if not, no parents are chosen.
@@ -121,18 +118,14 @@ def num_remainder_uniforms(num: int, count: int) -> int:
 
 @kernel
 def choose_by_remainders(
-    uniforms: FloatArray, expected: FloatArray, order: IntArray, parents: IntArray
+    uniforms: FloatArray,  # (`num_remainder_uniforms`,) in [0, 1)
+    expected: FloatArray,  # (individuals,) ≥ 0, adding up to the number of parents but for rounding
+    order: IntArray,  # (individuals,) scratch: the order of the scan; negative where placed
+    # (parents,) written, in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋
+    # times or once more
+    parents: IntArray,
 ) -> None:
-    """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
-
-    Args:
-        uniforms: (`num_remainder_uniforms`,) in [0, 1).
-        expected: (individuals,) ≥ 0, adding up to the number of parents but for rounding.
-        order: (individuals,) scratch: the random order of the scan; negative where a place was
-            given.
-        parents: (parents,) written, in random order: neighbours are a random pairing; k occurs
-            ⌊expected[k]⌋ times or once more.
-    """
+    """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2)."""
     num, count, filled = len(expected), len(parents), 0
     # whole parts
     for k in range(num):

@@ -44,6 +44,38 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     return cast(Function, numba.njit(**options)(function))
 
 
+class KernelAddress(numba.types.WrapperAddressProtocol):
+    """A kernel that other kernels take as an argument, by its address and the types it takes.
+
+    They are compiled once for all kernels of a signature, and kept; were they handed the kernel
+    itself, numba would compile them anew for each, in every process.
+    """
+
+    def __init__(self, function: Callable[..., Any], signature: Any) -> None:
+        """Compile a kernel, or load it.
+
+        Args:
+            function: Decorated by `kernel`.
+            signature: numba's types of its result and its arguments.
+        """
+        compiled: Any = function
+        compiled.compile(signature.args)
+        result = compiled.get_compile_result(signature)
+        self._address = result.library.get_pointer_to_function(
+            result.fndesc.llvm_cfunc_wrapper_name
+        )
+        self._signature = signature
+        self._numba_type_ = numba.types.FunctionType(signature)  # looked for at every call
+
+    def __wrapper_address__(self) -> int:
+        """Return the address, as numba asks for it."""
+        return int(self._address)
+
+    def signature(self) -> Any:
+        """Return the types, as numba asks for them."""
+        return self._signature
+
+
 def intrinsic(function: Callable[..., Any]) -> Any:
     """Return numba's intrinsic; kernels call it without the typing context that it begins with."""
     return numba.extending.intrinsic(function)

@@ -32,22 +32,14 @@ class MotionCriteria(Component):
 
 @kernel
 def measure_motions(
+    # (configurations, 2, ≥ individuals) absolute link angles, start and goal included [rad]
     angles: FloatArray,
-    points: FloatArray,
-    weights: tuple[float, float, float],
-    criteria: FloatArray,
-    own: FloatArray,
+    points: FloatArray,  # (configurations, 4, ≥ individuals) elbow x, y, end-effector x, y
+    weights: tuple[float, float, float],  # of C2, C3, C4
+    criteria: FloatArray,  # (3, individuals), written: C2, C3, C4
+    own: FloatArray,  # (individuals,), written: their weighted sum
 ) -> None:
-    """Measure C2, C3, C4 of every individual, and their weighted sum.
-
-    Args:
-        angles: (configurations, 2, ≥ individuals) absolute link angles [rad], start and goal
-            included.
-        points: (configurations, 4, ≥ individuals) elbow x, y and the end-effector's x, y.
-        weights: Of C2, C3, C4.
-        criteria: (3, individuals), written: C2, C3, C4.
-        own: (individuals,), written: their weighted sum.
-    """
+    """Measure C2, C3, C4 of every individual, and their weighted sum."""
     count = len(own)
     longest, shortest = np.zeros(count), np.full(count, np.inf)
     criteria[:] = 0.0

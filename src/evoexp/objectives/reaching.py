@@ -28,33 +28,19 @@ class Reaching(Component):
 
 @kernel
 def measure_reach(
-    starts: FloatArray,
-    ends: FloatArray,
-    lanes: IntArray,
+    starts: FloatArray,  # (N, individuals) relative joint angles [rad]
+    ends: FloatArray,  # (N, individuals) [rad]
+    lanes: IntArray,  # (≥ count + LANES) indices of the individuals; behind `count` overwritten
     count: int,
     arm: PlanarArm,
-    target: FloatArray,
-    box: FloatArray,
-    weights: tuple[float, float],
-    cost: FloatArray,
-    error: FloatArray,
-    displacement: FloatArray,
+    target: FloatArray,  # (2,) desired place of the tip [length unit]
+    box: FloatArray,  # least and greatest x, least and greatest y; a tip on its edge is inside
+    weights: tuple[float, float],  # w1, w2
+    cost: FloatArray,  # (individuals,) written: Eq. 4
+    error: FloatArray,  # (individuals,) written: Eq. 1 [length unit]
+    displacement: FloatArray,  # (individuals,) written: Eq. 2 [rad]
 ) -> None:
-    """Write Eqs. 1, 2 and 4 of some individuals without collisions; inf if the tip is outside.
-
-    Args:
-        starts: (N, individuals) relative joint angles [rad].
-        ends: (N, individuals).
-        lanes: (≥ count + LANES) indices of the individuals; entries behind `count` are overwritten.
-        count: Number of individuals.
-        arm: See `planar_ends.block_ends`.
-        target: Desired place of the tip (x, y).
-        box: Least and greatest x, least and greatest y; a tip on its edge is inside.
-        weights: w1, w2.
-        cost: (individuals,) written: Eq. 4.
-        error: (individuals,) written: Eq. 1 [length unit].
-        displacement: (individuals,) written: Eq. 2 [rad].
-    """
+    """Write Eqs. 1, 2 and 4 of some individuals without collisions; inf if the tip is outside."""
     rows = len(starts) * LANES
     begin, end = np.empty(rows), np.empty(rows)
     x, y, found = np.empty(rows + LANES), np.empty(rows + LANES), np.empty(3 * LANES)

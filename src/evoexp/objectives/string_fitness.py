@@ -46,21 +46,13 @@ class StringFitness(Component):
 
 @kernel
 def weigh(
-    weights: tuple[float, float, float],
-    lengths: FloatArray,
-    unevenness: FloatArray,
-    collisions: FloatArray,
-    cost: FloatArray,
+    weights: tuple[float, float, float],  # k1, k2, k3
+    lengths: FloatArray,  # (arms, ≥ individuals) [deg]
+    unevenness: FloatArray,  # (arms, ≥ individuals) [deg]
+    collisions: FloatArray,  # (≥ individuals,) colliding instants
+    cost: FloatArray,  # (individuals,), written
 ) -> None:
-    """Write the bracket of Eq. 7 for every individual.
-
-    Args:
-        weights: k1, k2, k3.
-        lengths: (arms, ≥ individuals) [deg].
-        unevenness: (arms, ≥ individuals) [deg].
-        collisions: (≥ individuals,) colliding instants.
-        cost: (individuals,), written.
-    """
+    """Write the bracket of Eq. 7 for every individual."""
     k1, k2, k3 = weights
     for k in range(len(cost)):
         length, uneven = 0.0, 0.0
@@ -68,14 +60,6 @@ def weigh(
             length += lengths[arm, k]
             uneven += unevenness[arm, k]
         cost[k] = (k1 * length + k2 * uneven) + k3 * collisions[k]
-
-
-@kernel
-def fill_wheel(fitness_offset: float, costs: FloatArray, weights: FloatArray) -> None:
-    """Write the paper's roulette weights max(F, 0) of costs (individuals,)."""
-    for k in range(len(costs)):
-        fitness = fitness_offset - costs[k]
-        weights[k] = fitness if fitness > 0.0 else 0.0
 
 
 @kernel

@@ -7,7 +7,7 @@ alike; everything else a planner writes itself. `evoexp.testing` checks every ob
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,20 +144,6 @@ class Planner(Protocol):
         """
 
 
-class _Budgeted(Protocol):
-    """A planner with a field `ga`, as most have."""
-
-    def num_evaluations(self, index: int) -> int:
-        """Return how many individuals a generation evaluates."""
-
-    def shape(self, problem: Any) -> Shape:
-        """Return the shape of a solution."""
-
-    @property
-    def ga(self) -> Any:
-        """Has `population_size`, `num_offspring` and `num_generations`."""
-
-
 class PlannerDefaults:
     """The usual answers of a planner, to be inherited before `Component`.
 
@@ -172,17 +158,21 @@ class PlannerDefaults:
     goal_is_region: ClassVar[bool] = False
     """Whether a solution that is not `solved` may miss the goal, which `departures` do not tell."""
 
+    if TYPE_CHECKING:
+        ga: Any  # has `population_size`, `num_offspring` and `num_generations`
+        shape: Callable[[Any], Shape]
+
     @property
     def answers_are_proven(self) -> bool:
         """Whether what the search accepts is proven: by its field `acceptance`, if it has one."""
         return getattr(self, "acceptance", "model") != "model"
 
     @property
-    def num_generations(self: _Budgeted) -> int:
+    def num_generations(self) -> int:
         """The generations of `ga`."""
         return int(self.ga.num_generations)
 
-    def num_evaluations(self: _Budgeted, index: int) -> int:
+    def num_evaluations(self, index: int) -> int:
         """Return the population's size at first, then the number of offspring."""
         return int(self.ga.num_offspring if index else self.ga.population_size)
 
@@ -212,7 +202,7 @@ class PlannerDefaults:
         """Return none: every solution of the documented shape is one of the task."""
         return ()
 
-    def memory(self: _Budgeted, problem: Any) -> int:
+    def memory(self, problem: Any) -> int:
         """Return the memory of `COPIES` populations of solutions."""
         individuals = max(self.num_evaluations(0), self.num_evaluations(1))
         return 8 * COPIES * num_values(self.shape(problem)) * individuals

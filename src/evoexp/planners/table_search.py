@@ -6,34 +6,23 @@ time, and a record of each another third.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.genetic_settings import PopulationSettings, ScaledGenetic
+from evoexp.evolution.operators.breeding import Breeding, Operators
+from evoexp.evolution.operators.operator import Genome
 from evoexp.evolution.scaled_selection import SelectionMemory
+from evoexp.numeric.elementary import standard_normal
+from evoexp.numeric.generator_state import state_bytes, states_behind
 from evoexp.numeric.random_stream import Draws
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import Best, Block, FloatArray, IntArray
 
+_NO_NORMALS = np.empty((0, 0))
 SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
-
-
-class Sizes(Protocol):
-    """How many individuals, and how often."""
-
-    @property
-    def population_size(self) -> int:
-        """Individuals that are evaluated at first."""
-
-    @property
-    def num_offspring(self) -> int:
-        """Individuals that are evaluated in every other generation."""
-
-    @property
-    def num_generations(self) -> int:
-        """Generations after the initial one."""
 
 
 def generations_per_call(most: int, size: int, cached: int) -> int:
@@ -67,7 +56,7 @@ class TableSearch(ABC):
     states: list[bytes] | None = None
     queries_each, is_done = 0, False
 
-    def __init__(self, ga: Sizes, per_call: int) -> None:
+    def __init__(self, ga: PopulationSettings, per_call: int) -> None:
         """Begin a run.
 
         Args:
@@ -159,6 +148,60 @@ class TableSearch(ABC):
         """Return the population of a generation of the last call.
 
         That of the run's last generation is hashed. It is empty where it is there no longer.
+        """
+
+
+class GeneticSearch(TableSearch):
+    """A run whose generations are bred by the operators of a configuration.
+
+    Attributes:
+        operators: Their kernels, the first arguments of a kernel that breeds.
+        breeding: Their rules.
+        num_drawn: Uniform numbers of a generation.
+        num_normals: Normal deviates of a generation: genes, offspring.
+        parents: (offspring,) memory.
+        elites: (elites,) memory.
+    """
+
+    def __init__(self, ga: Any, operators: Operators, genome: Genome, per_call: int) -> None:
+        """Begin a run.
+
+        Args:
+            ga: PopulationSettings, rates and generations.
+            operators: By which offspring are made.
+            genome: Of every individual.
+            per_call: Generations computed per call, at most.
+        """
+        # normal deviates take no fixed number of uniform ones: generations are drawn one by one
+        takes_normals, count = operators.mutation.takes_normals, ga.num_offspring
+        super().__init__(ga, 1 if takes_normals else per_call)
+        self.operators = operators.addresses
+        self.breeding = Breeding.of(operators, genome, ga, [count])
+        self.num_drawn = int(self.breeding.sizes.sum())
+        self.num_normals = len(genome.limits) if takes_normals else 0, count
+        self.parents, self.elites = (np.empty(n, np.int64) for n in (count, ga.num_elites))
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+        """Draw the numbers of generations, and compute these."""
+        before, state = rng.bit_generator.state, state_bytes(rng.bit_generator)
+        uniforms = rng.random((last - first, self.num_drawn))
+        normals = standard_normal(rng, self.num_normals) if self.num_normals[0] else _NO_NORMALS
+        reached = self.advance(uniforms, normals, first)
+        if reached < last:  # the generator goes on behind the last generation computed
+            rng.bit_generator.state = before
+            rng.random((reached - first) * self.num_drawn)
+        behind = states_behind(state, [self.num_drawn] * (reached - first - 1))
+        self.states = [*behind, state_bytes(rng.bit_generator)]
+        return reached
+
+    @abstractmethod
+    def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
+        """Compute the generations behind one with their numbers; return the last one computed.
+
+        Args:
+            uniforms: (generations, `num_drawn`) in [0, 1).
+            normals: (genes, offspring) normal deviates, for one generation; or none.
+            first: The present generation.
         """
 
 

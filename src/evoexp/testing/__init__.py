@@ -12,12 +12,24 @@ A test file of a package needs these lines only:
     def test_a_planner_keeps_its_obligations(check: Check, label: str) -> None:
         check(CONDITIONS[label])
 
-A check that fails raises `ContractBroken`, whose message says what a planner must do and what this
-planner did.
+Operators have `check_operator`, and `selected`, `crossed` and `mutated`, which call their kernels.
+A check that fails raises `ContractBroken`, whose message says what a planner or an
+operator must do, and what this one did.
 """
 
 from evoexp.testing.contract import CHECKS, Check, check_planner
 from evoexp.testing.evolution_record import ContractBroken
+from evoexp.testing.operator_checks import check_operator, crossed, mutated, selected
 from evoexp.testing.small_conditions import conditions
 
-__all__ = ["CHECKS", "Check", "ContractBroken", "check_planner", "conditions"]
+__all__ = [
+    "CHECKS",
+    "Check",
+    "ContractBroken",
+    "check_operator",
+    "check_planner",
+    "conditions",
+    "crossed",
+    "mutated",
+    "selected",
+]

@@ -15,7 +15,7 @@ from evoexp.store.log import Finished
 
 
 class ContractBroken(AssertionError):
-    """A planner that does not keep one of its obligations."""
+    """A planner or an operator that does not keep one of its obligations."""
 
 
 class Watched(NamedTuple):

@@ -11,14 +11,16 @@ import numpy as np
 
 from evoexp.evolution.best_team import BestTeam
 from evoexp.evolution.hall_of_fame import Hall, HallRules
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select
+from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.coevolution.kernels import (
+    HALF_TURN,
     Heredity,
-    breed,
+    LineTask,
+    breed_robots,
     evaluate_lines,
-    num_uniforms,
     renew,
 )
 from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem
@@ -53,11 +55,13 @@ class Table(NamedTuple):
 
 @kernel
 def evolve(
+    select: Select,
+    cross: Cross,
+    mutate: Mutate,
     uniforms: FloatArray,  # numbers for all of them, in the order in which they are used
     rates: FloatArray,  # (generations,) of mutation, on the way to each of them
     first: int,  # the present generation
-    # see `evaluate_lines`: from `starts` to `collision_weight`
-    task: tuple[FloatArray, FloatArray, FloatArray, tuple[float, float, float], float],
+    task: LineTask,
     heredity: Heredity,
     table: Table,  # see `Table`, written
     num_teams: IntArray,  # (1,) teams that the hall holds, changed
@@ -70,16 +74,16 @@ def evolve(
         False if a coordinate is not finite.
     """
     table, summaries, taken = borrowed((table, summaries, taken))
-    starts, goals, arms, weights, collision_weight = task
     populations, places, begin = table.populations, len(summaries), 0
     for step in range(len(rates)):
-        own, other = (first + step) % places, (first + step + 1) % places
-        taken[step] = follow(uniforms[begin:], rates[step], heredity, table, own, other, num_teams)
+        other = (first + step + 1) % places
+        numbers, index = uniforms[begin:], first + step
+        taken[step] = follow(
+            select, cross, mutate, numbers, index, rates[step], heredity, table, num_teams
+        )
         begin += taken[step]
         found = at_place(table.judged, other)
-        if not evaluate_lines(
-            populations[other], starts, goals, arms, weights, collision_weight, found
-        ):
+        if not evaluate_lines(populations[other], task, found):
             return False
         table.team_costs[other] = survey(found, table.teams[other], summaries[other])
     return True
@@ -99,12 +103,14 @@ def at_place(judged: Evaluated, place: int) -> Evaluated:
 
 @kernel
 def follow(
+    select: Select,
+    cross: Cross,
+    mutate: Mutate,
     uniforms: FloatArray,  # at least as many as it takes
+    index: int,  # the present generation
     rate: float,  # of mutation
-    heredity: Heredity,  # what follows
-    table: Table,  # of generations
-    own: int,  # place of the present one
-    other: int,  # place of the next one, written
+    heredity: Heredity,  # the rules
+    table: Table,  # generations, of which the next one is written
     num_teams: IntArray,  # (1,) changed
 ) -> int:
     """Renew the hall of fame, and breed the generation that follows one.
@@ -112,6 +118,7 @@ def follow(
     Returns:
         How many numbers it took.
     """
+    own, other = index % len(table.team_costs), (index + 1) % len(table.team_costs)
     hall, before, judged = heredity.hall, table.populations[own], table.judged
     if len(hall.teams):
         num_teams[0] = renew(
@@ -126,10 +133,12 @@ def follow(
     moving = 0
     for robot in range(len(before)):
         moving += heredity.moving[robot]
-    numbers = num_uniforms(before.shape[2] - heredity.num_elites - num_teams[0])
-    given, teams = uniforms[: moving * numbers], hall.teams[: num_teams[0]]
-    given = given.reshape((moving, numbers))
-    breed(given, rate, before, judged.costs[own], teams, heredity, table.populations[other])
+    numbers, teams = np.sum(heredity.breeding.sizes[num_teams[0]]), hall.teams[: num_teams[0]]
+    draws = uniforms[: moving * numbers].reshape((moving, numbers))
+    costs, following = judged.costs[own], table.populations[other]
+    breed_robots(
+        select, cross, mutate, draws, index, rate, before, costs, teams, heredity, following
+    )
     return int(moving * numbers)
 
 
@@ -158,13 +167,14 @@ class TeamSearch(TableSearch):
             self.num_places, robots, 2 * planner.num_configurations, self._size
         )
         self.costs, self._waiting = self._table.judged.costs, 0
-        by_genome = ga.hall_distinct == "genome"
+        by_genome, operators = ga.hall_distinct == "genome", ga.operators
+        num_genes, free = 2 * planner.num_configurations, self._size - ga.num_elites
+        genome = Genome.of(np.repeat([[0.0, HALF_TURN]], num_genes, axis=0))
+        counts = [free - teams for teams in range(ga.num_hall_teams + 1)]
+        self._operators = operators.addresses
         self._heredity = Heredity(
             ga.num_elites,
-            ga.selection == "inverse",
-            ga.crossover_rate,
-            DEGREE * ga.mutation_step,
-            ga.mutation_direction == "symmetric",
+            Breeding.of(operators, genome, ga, counts),
             problem.moving,
             Hall.room(ga.num_hall_teams, robots),
             HallRules(
@@ -180,7 +190,8 @@ class TeamSearch(TableSearch):
         """Draw and judge the initial populations."""
         self._table.populations[0] = self._planner.sample(self._problem, rng, self._size)
         self._judge(0)
-        most = int(np.count_nonzero(self._problem.moving)) * num_uniforms(self._size)
+        most = int(np.count_nonzero(self._problem.moving))
+        most *= int(self._heredity.breeding.sizes.sum(axis=1).max())
         self._ahead = DrawnAhead(rng, max(most, self._table.populations[0].size))
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
@@ -193,22 +204,23 @@ class TeamSearch(TableSearch):
             taken[0] = self._follow(uniforms, float(rates[0]), first)
             self._judge(last % self.num_places)
         else:
-            task = self._planner.task(self._problem)
-            if not evolve(uniforms, rates, first, task, *arguments, self.summaries, taken):
+            task, (select, cross, mutate) = self._planner.task(self._problem), self._operators
+            given = task, *arguments, self.summaries, taken
+            if not evolve(select, cross, mutate, uniforms, rates, first, *given):
                 raise ValueError(NOT_FINITE)
         self.states = self._ahead.take(taken.tolist())
         return last
 
     def _follow(self, uniforms: FloatArray, rate: float, index: int) -> int:
         """Breed the generation behind one, or begin anew; return how many numbers that took."""
-        places = index % self.num_places, (index + 1) % self.num_places
         self._waiting = 0 if self.keeper.best.solved else self._waiting + 1
         patience = self._planner.ga.restart_after
         if patience is None or self._waiting < patience:
-            taken = follow(uniforms, rate, self._heredity, self._table, *places, self._num_teams)
-            return int(taken)
+            rules = self._heredity, self._table, self._num_teams
+            select, cross, mutate = self._operators
+            return int(follow(select, cross, mutate, uniforms, index, rate, *rules))
         # "If no convergence has occurred, …, the algorithm generates new populations" (section 3)
-        populations = self._table.populations[places[1]]
+        populations = self._table.populations[(index + 1) % self.num_places]
         own = uniforms[: populations.size].reshape(populations.shape)
         populations[:] = self._planner.populations_of(self._problem, own)
         self._waiting = self._num_teams[0] = 0

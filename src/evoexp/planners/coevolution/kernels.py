@@ -7,16 +7,10 @@ import numpy as np
 from evoexp.collision.planar.arm_pairs import LARGEST, count_pairs
 from evoexp.collision.planar.planar_arms import Arm, tolerance_of, write_outlines
 from evoexp.evolution.best_team import CollisionCounts
-from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
-from evoexp.evolution.mutation import mutate_allele
-from evoexp.evolution.pareto import non_dominated
-from evoexp.evolution.selection import (
-    choose_elites,
-    difference_weights,
-    inverse_weights,
-    spin_roulette,
-)
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
+from evoexp.evolution.pareto import pareto_front
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import measure_motions
@@ -30,10 +24,7 @@ class Heredity(NamedTuple):
     """The rules by which one generation follows another."""
 
     num_elites: int  # individuals copied untouched
-    inverse: bool  # whether weights on the wheel are inverse costs; else differences to the highest
-    crossover_rate: float  # probability that a pair is crossed
-    mutation_step: float  # largest change of an allele (Eq. 9) [rad].
-    symmetric: bool  # whether alleles may decrease, too
+    breeding: Breeding  # rules of the operators
     moving: BoolArray  # (robots,) false for robots that stand still
     hall: Hall  # with room for as many teams as it may hold
     rules: HallRules  # which teams it takes
@@ -42,20 +33,25 @@ class Heredity(NamedTuple):
     by_genome: bool
 
 
+class LineTask(NamedTuple):
+    """Robots and the weights of their criteria."""
+
+    starts: FloatArray  # (robots, 2) link angles [rad]
+    goals: FloatArray  # (robots, 2) [rad]
+    arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
+    weights: tuple[float, float, float]  # of C2, C3, C4
+    collision_weight: float  # of C1
+
+
 @kernel
-def num_uniforms(count: int) -> int:
-    """Return how many numbers `breed` takes for so many offspring of a robot.
-
-    One for each parent, two for each pair that may be crossed, three for each mutation.
-    """
-    return count + 2 * (count // 2) + 3 * count
-
-
-@kernel
-def breed(
+def breed_robots(
+    select: Select,
+    cross: Cross,
+    mutate: Mutate,
     # (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation
     uniforms: FloatArray,
-    mutation_rate: float,  # probability that an allele of an individual is mutated (Eq. 10).
+    index: int,  # of the present generation
+    rate: float,  # probability that an allele of an individual is mutated (Eq. 10)
     populations: FloatArray,  # (robots, genes, individuals)
     costs: FloatArray,  # (robots, individuals)
     # (teams, robots) members of the hall; written: their places in the next populations
@@ -64,50 +60,25 @@ def breed(
     bred: FloatArray,  # like populations, written
 ) -> None:
     """Write the next populations: offspring, then elites, then members of the hall, unchanged."""
-    size, num_elites = populations.shape[2], heredity.num_elites
-    count = size - num_elites - len(teams)
-    last = count + 2 * (count // 2)  # behind the numbers of cross-over
-    weights, parents = np.empty(size), np.empty(count, dtype=np.int64)
-    elites = np.empty(num_elites, dtype=np.int64)
-    row = 0
+    num_elites = heredity.num_elites
+    count = populations.shape[2] - num_elites - len(teams)
+    parents, elites = np.empty(count, dtype=np.int64), np.empty(num_elites, dtype=np.int64)
+    rules, normals, row = heredity.breeding, np.empty((0, 0)), 0
     for robot in range(len(populations)):
         if not heredity.moving[robot]:
             bred[robot] = populations[robot]
             continue
         draws, genes, before = uniforms[row], bred[robot], populations[robot]
-        row += 1
-        # parents by roulette
-        if heredity.inverse:
-            inverse_weights(costs[robot], weights)
-        else:
-            difference_weights(costs[robot], weights)
-        spin_roulette(weights, draws[:count], parents)
-        # single-point cross-over of neighbours
-        cross_single_point(draws[count:last], before, parents, heredity.crossover_rate, genes)
-        # mutation of one allele (Eq. 9)
-        mutate_allele(
-            draws[last:],
-            genes,
-            count,
-            mutation_rate,
-            heredity.mutation_step,
-            HALF_TURN,
-            heredity.symmetric,
+        own, row = costs[robot], row + 1
+        breed(
+            select, cross, mutate, draws, normals, index, rate, rules, own, before, parents, genes
         )
         # elites and members of the hall, untouched
-        choose_elites(costs[robot], elites)
+        choose_elites(own, elites)
         copy_members(before, elites, genes, count)
         copy_members(before, teams[:, robot], genes, count + num_elites)
     for k in range(len(teams)):
         teams[k] = count + num_elites + k
-
-
-@kernel
-def copy_members(before: FloatArray, members: IntArray, genes: FloatArray, first: int) -> None:
-    """Copy some individuals of a population (genes, individuals) to places from `first` on."""
-    for gene in range(len(genes)):
-        for k in range(len(members)):
-            genes[gene, first + k] = before[gene, members[k]]
 
 
 @kernel
@@ -129,18 +100,17 @@ def renew(
     Returns:
         Number of teams that the hall holds then.
     """
-    hall, count = heredity.hall, populations.shape[2]
-    fronts = np.empty((len(populations), count), dtype=np.bool_)
+    hall = heredity.hall
+    fronts = np.empty(own.shape, dtype=np.bool_)
     for robot in range(len(populations)):
-        non_dominated(criteria[robot], count, fronts[robot])
+        fronts[robot] = pareto_front(criteria[robot])
     if heredity.by_genome:
         merge_copies(populations, criteria[:, 1], hall.teams[:num_teams], fronts)
         offered = best
     else:
         drop_copies(populations, hall.teams[:num_teams], fronts)
         offered = np.full(len(populations), -1)
-    rules = heredity.rules
-    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, offered, rules))
+    return int(renew_hall(collisions, own, fronts, hall, num_teams, offered, heredity.rules))
 
 
 @kernel
@@ -218,10 +188,7 @@ def same_genome(genes: FloatArray, one: int, other: int) -> bool:
 @kernel
 def measure(
     populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
-    starts: FloatArray,  # (robots, 2) [rad]
-    goals: FloatArray,  # (robots, 2) [rad]
-    arms: FloatArray,  # (robots, 4) base x, base y, lengths of both links [length unit]
-    weights: tuple[float, float, float],  # of C2, C3, C4
+    task: LineTask,
     # (robots, K + 2, 2, individuals) written: link angles, start and goal included
     paths: FloatArray,
     points: FloatArray,  # (robots, K + 2, 4, individuals) written: elbow x, y, tip x, y
@@ -229,7 +196,7 @@ def measure(
     own: FloatArray,  # (robots, individuals) written: their weighted sum
 ) -> None:
     """Lay out all paths, and measure their costs whoever their collaborators are."""
-    last = paths.shape[1] - 1
+    starts, goals, last = task.starts, task.goals, paths.shape[1] - 1
     for r in range(len(populations)):
         path, genes = paths[r], populations[r]
         # start, genes, goal
@@ -238,30 +205,26 @@ def measure(
             for k in range(1, last):
                 path[k, link] = genes[2 * (k - 1) + link]
         # where the links are (Eq. 11), then Eqs. 6–8
-        write_outlines(path, line_arm(arms, r), points[r])
-        measure_motions(path, points[r], weights, criteria[r, 1:], own[r])
+        write_outlines(path, line_arm(task.arms, r), points[r])
+        measure_motions(path, points[r], task.weights, criteria[r, 1:], own[r])
 
 
 @kernel
 def line_arm(arms: FloatArray, robot: int) -> Arm:
-    """Return a robot's arm without an envelope; arms as of `measure`."""
+    """Return a robot's arm without an envelope; arms as of `LineTask`."""
     return Arm((arms[robot, 0], arms[robot, 1]), (arms[robot, 2], arms[robot, 3]), 0.0, 0.0)
 
 
 @kernel
 def evaluate_lines(
     populations: FloatArray,  # (robots, 2 K, individuals) link angles [rad]
-    starts: FloatArray,  # (robots, 2) [rad]
-    goals: FloatArray,  # (robots, 2) [rad]
-    arms: FloatArray,  # (robots, 4) base x, base y, lengths of both links [length unit]
-    weights: tuple[float, float, float],  # of C2, C3, C4
-    collision_weight: float,  # of C1
+    task: LineTask,
     found: Evaluated,  # written, all but `blocked`: there are no obstacles
 ) -> bool:
     """Evaluate everybody against everybody of the other robots, where robots are lines (Eq. 4).
 
     One call does what `Coevolution.evaluated` does step by step with other models; between the
-    steps Python would take a third of the time. The first arguments are those of `measure`.
+    steps Python would take a third of the time.
 
     Returns:
         False if a coordinate is not finite.
@@ -271,13 +234,13 @@ def evaluate_lines(
     last = genes // 2 + 1
     paths, points = np.empty((robots, last + 1, 2, count)), np.empty((robots, last + 1, 4, count))
     # C2 … C4 (Eqs. 6–8)
-    measure(populations, starts, goals, arms, weights, paths, points, criteria, own)
+    measure(populations, task, paths, points, criteria, own)
     # C1 (Eqs. 4, 5) at the configurations between start and goal
     rows, columns = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     sums, pair = np.zeros((robots, count), dtype=np.int64), 0
     for a in range(robots):
         for b in range(a + 1, robots):
-            one, two = line_arm(arms, a), line_arm(arms, b)
+            one, two = line_arm(task.arms, a), line_arm(task.arms, b)
             first, second, near = points[a][1:last], points[b][1:last], tolerance_of(one, two)
             count_pairs(one, first, two, second, near, None, collisions[pair], rows, columns)
             for k in range(count):
@@ -289,5 +252,5 @@ def evaluate_lines(
             if not abs(own[r, k]) < LARGEST:
                 return False
             criteria[r, 0, k] = sums[r, k]
-            costs[r, k] = collision_weight * sums[r, k] + own[r, k]
+            costs[r, k] = task.collision_weight * sums[r, k] + own[r, k]
     return True

@@ -26,7 +26,7 @@ from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.answers import of_limits, of_place
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.generations import TeamSearch
-from evoexp.planners.coevolution.kernels import HALF_TURN, evaluate_lines, measure
+from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, evaluate_lines, measure
 from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem, check_ends
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
@@ -133,14 +133,14 @@ class Coevolution(PlannerDefaults, Component):
         robots, _, count = populations.shape
         if collision.is_lines:
             lined = Evaluated.room(robots, count)
-            if not evaluate_lines(populations, *self.task(problem), lined):
+            if not evaluate_lines(populations, self.task(problem), lined):
                 raise ValueError(NOT_FINITE)
             return lined
         # paths, and C2 … C4 (Eqs. 6–8)
         criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
         paths = np.empty((robots, self.num_configurations + 2, 2, count))
         points = np.empty((robots, self.num_configurations + 2, 4, count))
-        measure(populations, *self.task(problem)[:4], paths, points, criteria, own)
+        measure(populations, self.task(problem), paths, points, criteria, own)
         # C1 (Eqs. 4, 5): an obstacle is in the way whoever the collaborator is
         tested = [collision.tested(path) for path in paths]
         blocked = np.array([collision.with_obstacles(r, tested[r]) for r in range(robots)])
@@ -154,12 +154,10 @@ class Coevolution(PlannerDefaults, Component):
         costs = objective.collision_weight * sums + own
         return Evaluated(costs, criteria, own, np.array(hits), blocked)
 
-    def task(
-        self, problem: Problem
-    ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[float, float, float], float]:
-        """Return starts, goals, arms, weights of C2 … C4 and of C1; see `evaluate_lines`."""
+    def task(self, problem: Problem) -> LineTask:
+        """Return the robots and the weights of their criteria, as kernels take them."""
         weights = self.objective.own_weights, self.objective.collision_weight
-        return problem.start, problem.goal, problem.arms, *weights
+        return LineTask(problem.start, problem.goal, problem.arms, *weights)
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

@@ -1,38 +1,37 @@
 """The hyperparameters of co-evolving populations."""
 
 import math
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
 from evoexp.errors import SettingError
-from evoexp.evolution.mutation import decayed_rate
-from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
+from evoexp.evolution.genetic_settings import PopulationSettings
+from evoexp.evolution.operators.breeding import Operators
+from evoexp.evolution.operators.crossover import OnePoint
+from evoexp.evolution.operators.mutation import AlleleMutation
+from evoexp.evolution.operators.operator import Crossover, Mutation, Named, Selection
+from evoexp.evolution.operators.selection import DifferenceRoulette, InverseRoulette
+from evoexp.numeric.elementary import DEGREE
+from evoexp.validation import Count, Positive, Rate
 
 _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
-class CoevolutionSettings(Component):
+class CoevolutionSettings(PopulationSettings):
     """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3)."""
 
     component: ClassVar[str] = "coevolutionary"
 
-    population_size: Count  # individuals per population and generation [-]
-    num_generations: NonNegativeCount  # generations after the initial one [-]
-    crossover_rate: Rate  # probability that a pair of parents is crossed [-]
-    # probability that one allele of an individual is mutated, at the first generation [-]
-    mutation_rate: Rate
-    # difference of `mutation_rate` between the first and the last generation (Eq. 10) [-]; 0:
-    # it is constant
+    # difference of `mutation_rate`, that of one allele of an individual, between the first and the
+    # last generation (Eq. 10) [-]; 0: it is constant
     mutation_decay: Rate
     mutation_step: Positive  # largest change of an allele (Eq. 9) [deg]
     # `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`
     mutation_direction: Literal["one_sided", "symmetric"]
     # weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the
     # highest
-    selection: Literal["inverse", "difference"]
-    # best individuals of each population copied untouched into the next generation [-]
-    num_elites: NonNegativeCount
+    selection: Literal["inverse", "difference"] | Named[Selection]
     hall_depth: Rate  # share of a population that the hall of fame may hold [-]; 0: no hall
     # generations after which a team of the hall gives way to any new one [-]; None: never
     hall_memory: Count | None
@@ -45,6 +44,9 @@ class CoevolutionSettings(Component):
     # offered again. Runs by index are bit for bit those of revision 1 of `coevolution`,
     # unless a link's angle is exactly a multiple of 90°
     hall_distinct: Literal["genome", "index"] = "genome"
+
+    crossover: Named[Crossover] | None = None  # None: at one point
+    mutation: Named[Mutation] | None = None  # None: of one allele (Eq. 9)
 
     @model_validator(mode="after")
     def _settings_agree(self) -> Self:
@@ -74,14 +76,14 @@ class CoevolutionSettings(Component):
                 "null where the hall is frozen (hall_frozen)",
             ),
             (
-                self.num_elites > self.population_size,
-                "num_elites",
-                f"at most population_size ({self.population_size})",
-            ),
-            (
                 self.num_offspring < 0,
                 "num_elites",
                 f"at most population_size less the hall's teams ({most})",
+            ),
+            (
+                self.mutation is not None and self.mutation.takes_normals,
+                "mutation",
+                "one that takes uniform numbers only",
             ),
         ):
             if wrong:
@@ -98,6 +100,18 @@ class CoevolutionSettings(Component):
         """Individuals of a population that are new beside the elites and a full hall."""
         return self.population_size - self.num_elites - self.num_hall_teams
 
+    @property
+    def operators(self) -> Operators:
+        """The paper's operators, where the settings name no others."""
+        named: dict[Any, Any] = {"inverse": InverseRoulette(), "difference": DifferenceRoulette()}
+        step, symmetric = DEGREE * self.mutation_step, self.mutation_direction == "symmetric"
+        return Operators(
+            named.get(self.selection, self.selection),
+            self.crossover or OnePoint(),
+            self.mutation or AlleleMutation(step=step, symmetric=symmetric),
+        )
+
     def mutation_rate_at(self, index: int) -> float:
-        """Return the rate on the way to a generation (Eq. 10)."""
-        return decayed_rate(self.mutation_rate, self.mutation_decay, index, self.num_generations)
+        """Return the rate on the way to a generation (Eq. 10: 1 − 0.9 t/G)."""
+        share = index / self.num_generations if self.num_generations > 0 else 0.0
+        return min(max(self.mutation_rate - self.mutation_decay * share, 0.0), 1.0)

@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from evoexp.evolution.best_team import CollisionCounts, best_team, find_best_team, pair_index
+from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
@@ -122,10 +122,11 @@ def survey(found: Evaluated, team: IntArray, summary: FloatArray) -> float:
     population.
     """
     teamable = teamable_costs(found.own, found.blocked)
-    cost = find_best_team(found.collisions, teamable, teamable.shape[1], team)
+    best = best_team(found.collisions, teamable)
+    team[:] = best.individuals
     summary[0], summary[1], summary[2] = cost_statistics(found.costs.reshape(-1))
     summary[3] = count_partnered(found.collisions, found.blocked)
-    return float(cost)
+    return best.cost
 
 
 @kernel

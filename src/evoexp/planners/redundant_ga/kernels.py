@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.planar.ellipse_kernels import PathChecks, prepare_checks
+from evoexp.evolution.bit_coding import decode_bits
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.mutation import NON_UNIFORM, decode_bits, non_uniform_spread
-from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.operators.breeding import Breeding, Cross, Mutate, Select, breed
+from evoexp.evolution.succession import choose_elites, copy_members
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.planners.redundant_ga.breeding import Breeding, Draws, breed
 from evoexp.planners.redundant_ga.sub_path_costs import (
     RESULTS,
     Judging,
@@ -24,160 +24,116 @@ from evoexp.planners.redundant_ga.sub_path_costs import (
 )
 from evoexp.records import BoolArray, FloatArray, IntArray
 
-SUMMARY = 4  # of a population: see `summarise_costs`
 
+class SubPath(NamedTuple):
+    """A sub-path that is searched, and arrays that a generation writes on its way."""
 
-class Generations(NamedTuple):
-    """Some generations; number g is at place g modulo the number of places."""
-
-    tables: FloatArray  # (places, rows, individuals, filled up to whole vectors)
-    summaries: FloatArray  # (places, SUMMARY)
-
-
-class Memory(NamedTuple):
-    """Arrays that a generation writes on its way."""
-
-    parents: IntArray  # (offspring,) indices of individuals
+    num_genes: int
+    binary: bool  # whether genes are bits
+    limits: FloatArray  # (joints, 2) of the joint angles [rad]
+    parents: IntArray  # (offspring,) indices of individuals, scratch
     elites: IntArray  # (elites,) likewise
     lanes: IntArray  # (individuals + LANES,) scratch
     hit: BoolArray  # (individuals,) scratch
-    num_choosing: int  # uniform numbers for the choice of parents
-    num_crossing: int  # the same for crossover
+    starts: FloatArray  # (joints, ≥ individuals) start of the sub-path, the same for all [rad]
+    judging: Judging
 
 
 @kernel
 def evolve(
+    select: Select,
+    cross: Cross,
+    mutate: Mutate,
     uniforms: FloatArray,  # (generations, numbers) of those to be computed
-    normals: FloatArray,  # normal deviates, of one generation only; see `Draws`
+    normals: FloatArray,  # normal deviates, of one generation only; see `breed`
     first: int,  # the present generation
     stop_cost: float,  # the first generation whose best costs less ends the search
     # whether generations are bred; if not, each is drawn as the initial one is, as many individuals
     # as would be bred
     evolving: bool,
-    breeding: Breeding,
-    judging: Judging,
-    starts: FloatArray,  # (joints, ≥ individuals) start of the sub-path, the same for all [rad]
-    generations: Generations,
-    memory: Memory,
+    rules: Breeding,
+    sub_path: SubPath,
+    # (places, rows, individuals, filled up to whole vectors): generation g is at place g modulo the
+    # number of places
+    tables: FloatArray,
+    summaries: FloatArray,  # (places, 4) see `summarise_costs`
 ) -> int:
     """Compute the generations behind one up to another, or up to the first that is good enough.
 
     Returns:
         The last generation that was computed.
     """
-    uniforms, normals, starts, breeding, judging, generations, memory = borrowed(
-        (uniforms, normals, starts, breeding, judging, generations, memory)
-    )
-    tables, summaries = generations
-    count, last = len(memory.parents), first + len(uniforms)
-    checks = prepare_checks(len(starts), tables.shape[2])
-    for index in range(first, last):
-        own, other = index % len(tables), (index + 1) % len(tables)
-        following = tables[other]
-        costs = following[len(following) - RESULTS]
+    uniforms, normals, rules, sub_path = borrowed((uniforms, normals, rules, sub_path))
+    tables, summaries = borrowed((tables, summaries))
+    num_genes, parents, size = sub_path.num_genes, sub_path.parents, len(sub_path.hit)
+    rate, last = rules.mutation_rate, first + len(uniforms)
+    checks = prepare_checks(len(sub_path.starts), tables.shape[2])
+    for t in range(first, last):
+        population, following = tables[t % len(tables)], tables[(t + 1) % len(tables)]
+        draws, summary, num_new = uniforms[t - first], summaries[(t + 1) % len(tables)], size
         if evolving:
-            draws = _drawn(uniforms[index - first], normals, memory)
-            advance(draws, index, breeding, judging, starts, tables[own], following, memory, checks)
+            # elites, and offspring of genomes
+            costs = population[len(population) - RESULTS, :size]
+            choose_elites(costs, sub_path.elites)
+            genes, out = population[:num_genes], following[:num_genes]
+            breed(select, cross, mutate, draws, normals, t, rate, rules, costs, genes, parents, out)
+            succeed(sub_path, population, following, checks)
         else:
-            numbers = uniforms[index - first]
-            draw(numbers, count, breeding, judging, starts, following, memory, checks)
-            costs = costs[:count]
-        costs = costs[: len(memory.hit)]
-        summarise_costs(costs, summaries[other])
-        if costs[int(summaries[other, 0])] < stop_cost:
-            return index + 1
+            num_new = len(parents)
+            draw(draws, num_new, sub_path, following, checks)
+        new_costs = following[len(following) - RESULTS, :num_new]
+        summarise_costs(new_costs, summary)
+        if new_costs[int(summary[0])] < stop_cost:
+            return t + 1
     return last
 
 
 @kernel
 def begin(
-    uniforms: FloatArray,  # (genes · individuals,)
-    breeding: Breeding,
-    judging: Judging,
-    starts: FloatArray,
-    generations: Generations,
-    memory: Memory,
+    uniforms: FloatArray, sub_path: SubPath, tables: FloatArray, summaries: FloatArray
 ) -> None:
-    """Draw and judge the initial population, at place 0; see `evolve`."""
-    (tables, summaries), size = generations, len(memory.hit)
-    checks = prepare_checks(len(starts), tables.shape[2])
-    draw(uniforms, size, breeding, judging, starts, tables[0], memory, checks)
+    """Draw and judge the initial population by (genes · individuals,) numbers; see `evolve`."""
+    size = len(sub_path.hit)
+    checks = prepare_checks(len(sub_path.starts), tables.shape[2])
+    draw(uniforms, size, sub_path, tables[0], checks)
     summarise_costs(tables[0, len(tables[0]) - RESULTS, :size], summaries[0])
 
 
 @kernel
-def _drawn(uniforms: FloatArray, normals: FloatArray, memory: Memory) -> Draws:
-    """Return the random numbers of a generation, by their use."""
-    chosen, crossed = memory.num_choosing, memory.num_choosing + memory.num_crossing
-    return Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
-
-
-@kernel
 def draw(
-    uniforms: FloatArray,  # (genes · count,)
-    count: int,
-    breeding: Breeding,
-    judging: Judging,
-    starts: FloatArray,
-    table: FloatArray,
-    memory: Memory,
-    checks: PathChecks,
+    uniforms: FloatArray, count: int, sub_path: SubPath, table: FloatArray, checks: PathChecks
 ) -> None:
-    """Draw and judge the first `count` individuals, uniform within the limits or bit by bit."""
-    num_genes, limits = breeding.num_genes, breeding.limits
+    """Draw and judge the first `count` individuals, uniform within the limits or bit by bit.
+
+    Args:
+        uniforms: (genes · count,) in [0, 1).
+        table: A population, written.
+    """
+    num_genes, limits, lanes = sub_path.num_genes, sub_path.limits, sub_path.lanes
     for gene in range(num_genes):
         row, numbers = table[gene], uniforms[gene * count : (gene + 1) * count]
-        if breeding.binary:
+        if sub_path.binary:
             for k in range(count):
                 row[k] = np.floor(2.0 * numbers[k])
         else:
             low, wide = limits[gene, 0], limits[gene, 1] - limits[gene, 0]
             for k in range(count):
                 row[k] = low + wide * numbers[k]
-    angles = _angles(table, count, breeding, len(starts))
+    starts, judging, angles = sub_path.starts, sub_path.judging, _angles(table, count, sub_path)
     measure(starts, angles, count, judging, table)
-    lanes, left = memory.lanes, list_inside(table, count, memory.lanes)
-    drop_collisions(starts, angles, lanes, left, judging, table, memory.hit, checks)
+    num_inside = list_inside(table, count, lanes)
+    drop_collisions(starts, angles, lanes, num_inside, judging, table, sub_path.hit, checks)
 
 
 @kernel
-def _angles(table: FloatArray, count: int, breeding: Breeding, num_joints: int) -> FloatArray:
+def _angles(table: FloatArray, count: int, sub_path: SubPath) -> FloatArray:
     """Return the rows of the joint angles of a table; those of the first `count` are decoded."""
-    first = breeding.num_genes if breeding.binary else 0
+    num_genes, num_joints = sub_path.num_genes, len(sub_path.limits)
+    first = num_genes if sub_path.binary else 0
     angles = table[first : first + num_joints]
-    if breeding.binary:
-        decode_bits(table[: breeding.num_genes], count, breeding.limits, angles)
+    if sub_path.binary:
+        decode_bits(table[:num_genes], count, sub_path.limits, angles)
     return angles
-
-
-@kernel
-def advance(
-    draws: Draws,
-    index: int,
-    breeding: Breeding,
-    judging: Judging,
-    starts: FloatArray,
-    population: FloatArray,
-    following: FloatArray,
-    memory: Memory,
-    checks: PathChecks,
-) -> None:
-    """Write the population that follows generation `index`: offspring, then elites, best first."""
-    elites, count, num_genes = memory.elites, len(memory.parents), breeding.num_genes
-    costs = population[len(population) - RESULTS, : len(memory.hit)]
-    choose_elites(costs, elites)
-    # offspring, decoded and judged
-    spread = breeding.mutation_std
-    if breeding.mutation == NON_UNIFORM:
-        spread = non_uniform_spread(index, breeding.num_generations, breeding.mutation_power)
-    genomes, children = population[:num_genes], following[:num_genes]
-    breed(draws, spread, breeding, costs, genomes, memory.parents, children)
-    angles = _angles(following, count, breeding, len(starts))
-    judge_children(starts, angles, num_genes, judging, population, following, memory, checks)
-    # succession
-    for row in range(len(population)):
-        for k in range(len(elites)):
-            following[row, count + k] = population[row, elites[k]]
 
 
 @kernel
@@ -191,38 +147,28 @@ def summarise_costs(costs: FloatArray, out: FloatArray) -> None:
 
 
 @kernel
-def judge_children(
-    starts: FloatArray,
-    angles: FloatArray,
-    num_genes: int,
-    judging: Judging,
-    population: FloatArray,
-    following: FloatArray,
-    memory: Memory,
-    checks: PathChecks,
+def succeed(
+    sub_path: SubPath, population: FloatArray, following: FloatArray, checks: PathChecks
 ) -> None:
-    """Write Eq. 4 and its parts for all offspring.
+    """Judge the offspring in the population that follows another; put the elites behind them.
 
-    A child that ends outside the box, or is its own parent, is not tested for collisions.
-
-    The first `num_genes` rows make a child its own parent if they are equal; it then costs as much.
+    A child that ends outside the box, or is its own parent, is not tested for collisions. One with
+    all genes of a parent costs as much.
     """
-    row, count, parents, lanes = (
-        len(population) - RESULTS,
-        len(memory.parents),
-        memory.parents,
-        memory.lanes,
-    )
+    starts, judging, lanes = sub_path.starts, sub_path.judging, sub_path.lanes
+    row, count, num_genes = len(population) - RESULTS, len(sub_path.parents), sub_path.num_genes
+    angles = _angles(following, count, sub_path)
     measure(starts, angles, count, judging, following)
     # children inside the box that differ from their parents
-    left, cost = 0, following[row]
+    num_open, cost = 0, following[row]
     for n in range(list_inside(following, count, lanes)):
         child = lanes[n]
-        parent, gene = parents[child], 0
+        parent, gene = sub_path.parents[child], 0
         while gene < num_genes and following[gene, child] == population[gene, parent]:
             gene += 1
         if gene == num_genes:
             cost[child] = population[row, parent]
-        lanes[left] = child
-        left += gene < num_genes
-    drop_collisions(starts, angles, lanes, left, judging, following, memory.hit, checks)
+        lanes[num_open] = child
+        num_open += gene < num_genes
+    drop_collisions(starts, angles, lanes, num_open, judging, following, sub_path.hit, checks)
+    copy_members(population, sub_path.elites, following, count)

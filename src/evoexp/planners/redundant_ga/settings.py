@@ -1,23 +1,49 @@
 """Hyperparameters of genetic algorithms whose operators can be chosen."""
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from evoexp.evolution.crossover import Crossover
-from evoexp.evolution.genetic_settings import GeneticSettings
-from evoexp.evolution.mutation import Mutation, Scope
+from evoexp.evolution.genetic_settings import PopulationSettings
+from evoexp.evolution.operators.breeding import Operators
+from evoexp.evolution.operators.crossover import (
+    ArithmeticCrossover,
+    BlxAlpha,
+    OnePoint,
+    UniformCrossover,
+)
+from evoexp.evolution.operators.mutation import (
+    BitFlips,
+    GaussianMutation,
+    NonUniformMutation,
+    UniformReset,
+)
+from evoexp.evolution.operators.operator import Crossover, Mutation, Named, Selection
+from evoexp.evolution.operators.selection import InverseRoulette, LinearRanking, Tournament
 from evoexp.validation import Count, NonNegative, NonNegativeCount, Positive
 
 
-class SelectiveSettings(GeneticSettings):
-    """Settings of real and of binary coding; `RealGenetic` and `BinaryGenetic` add their own."""
+class SelectiveSettings(PopulationSettings):
+    """Settings of real and of binary coding; `RealGenetic` and `BinaryGenetic` add their own.
+
+    An operator is another component, or one of these words; its settings are then those below.
+    """
 
     # `tournament`; `roulette` with weights 1/cost; `rank`: roulette with linear weights
-    selection: Literal["tournament", "roulette", "rank"]
+    selection: Literal["tournament", "roulette", "rank"] | Named[Selection]
     tournament_size: Count  # individuals per tournament [-]
     # offspring expected of the best one, in linear ranking [-]
     rank_pressure: Annotated[float, Field(ge=1.0, le=2.0)]
+
+    @property
+    def selection_operator(self) -> Selection:
+        """The selection that `selection` stands for."""
+        if isinstance(self.selection, Selection):
+            return self.selection
+        if self.selection == "tournament":
+            return Tournament(tournament_size=self.tournament_size)
+        is_ranked = self.selection == "rank"
+        return LinearRanking(rank_pressure=self.rank_pressure) if is_ranked else InverseRoulette()
 
 
 class RealGenetic(SelectiveSettings):
@@ -25,18 +51,35 @@ class RealGenetic(SelectiveSettings):
 
     component: ClassVar[str] = "real_genetic"
 
-    # `one_point`, `uniform`, `arithmetic`, `blx_alpha`; of a pair, with probability
-    # `crossover_rate`
-    crossover: Crossover
+    # of a pair, with probability `crossover_rate`
+    crossover: Literal["one_point", "uniform", "arithmetic", "blx_alpha"] | Named[Crossover]
     # α of BLX-α: how far beyond the parents children may lie, in units of their distance [-]
     blend_alpha: NonNegative
-    mutation: Mutation  # `non_uniform`, `gaussian`, `uniform_reset`
+    mutation: Literal["non_uniform", "gaussian", "uniform_reset"] | Named[Mutation]
     # whether `mutation_rate` is the probability of every `gene`, or of one gene of an
     # `individual`
-    mutation_scope: Scope
+    mutation_scope: Literal["gene", "individual"]
     mutation_power: NonNegativeCount  # b of non-uniform mutation [-]
     # standard deviation of Gaussian mutation, in units of a gene's range [-]
     mutation_std: Positive
+
+    @property
+    def operators(self) -> Operators:
+        """The operators of a search."""
+        one_gene = self.mutation_scope == "individual"
+        named: dict[Any, Any] = {
+            "one_point": OnePoint(),
+            "uniform": UniformCrossover(),
+            "arithmetic": ArithmeticCrossover(),
+            "blx_alpha": BlxAlpha(blend_alpha=self.blend_alpha),
+            "non_uniform": NonUniformMutation(
+                one_gene=one_gene, mutation_power=self.mutation_power
+            ),
+            "gaussian": GaussianMutation(one_gene=one_gene, mutation_std=self.mutation_std),
+            "uniform_reset": UniformReset(one_gene=one_gene),
+        }
+        crossover, mutation = (named.get(own, own) for own in (self.crossover, self.mutation))
+        return Operators(self.selection_operator, crossover, mutation)
 
 
 class BinaryGenetic(SelectiveSettings):
@@ -49,3 +92,8 @@ class BinaryGenetic(SelectiveSettings):
 
     # B; a gene takes 2^B values, its limits included [-]
     bits_per_gene: Annotated[int, Field(ge=1, le=52)]
+
+    @property
+    def operators(self) -> Operators:
+        """The operators of a search."""
+        return Operators(self.selection_operator, OnePoint(), BitFlips())

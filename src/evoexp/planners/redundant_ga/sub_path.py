@@ -8,32 +8,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.crossover import (
-    CROSSOVERS,
-    ONE_POINT,
-    num_gene_uniforms,
-    num_single_point_uniforms,
-)
-from evoexp.evolution.mutation import (
-    GAUSSIAN,
-    GENE,
-    MUTATIONS,
-    NON_UNIFORM,
-    SCOPES,
-    num_mutation_uniforms,
-)
-from evoexp.numeric.elementary import standard_normal
-from evoexp.numeric.generator_state import state_bytes, states_behind
+from evoexp.evolution.operators.operator import Genome
+from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.breeding import Breeding
-from evoexp.planners.redundant_ga.kernels import Generations, Memory
-from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
+from evoexp.planners.redundant_ga.kernels import SubPath
+from evoexp.planners.redundant_ga.settings import BinaryGenetic
 from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
-from evoexp.planners.table_search import TableSearch, generations_per_call
+from evoexp.planners.table_search import GeneticSearch, generations_per_call
 from evoexp.records import Best, Block, FloatArray, IntArray
 
 TERMS = tuple(
@@ -41,7 +26,6 @@ TERMS = tuple(
     for path in (1, 2)
     for name, unit in (("of", ""), ("position_error", ""), ("joint_displacement", "_rad"))
 )  # of both sub-paths, with unit
-SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
 STRETCH = 8  # generations computed per call, at most,
 MEMORY = 2**20  # [B] whose tables should not take more than this
 
@@ -54,7 +38,7 @@ class BestEnd(NamedTuple):
     terms: FloatArray  # (3,) cost, position error, joint displacement
 
 
-class Search(TableSearch):
+class Search(GeneticSearch):
     """One run: searches for the ends of SP1 and SP2 in turn, in the same memory.
 
     Attributes:
@@ -72,30 +56,22 @@ class Search(TableSearch):
             rng: Source of all random numbers.
         """
         ga, limits = planner.ga, problem.joint_limits
-        breeding, size, count = _breeding(ga, limits), ga.population_size, ga.num_offspring
-        first = breeding.num_genes if breeding.binary else 0
+        size, bits = ga.population_size, ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 0
+        genome = Genome.of(np.repeat([[0.0, 1.0]], bits * len(limits), axis=0) if bits else limits)
+        num_genes = len(genome.limits)
+        first = num_genes if bits else 0
         rows, filled = first + len(limits) + RESULTS, -(-size // LANES) * LANES
         per_call = generations_per_call(STRETCH, 8 * rows * filled, MEMORY)
-        # normal deviates take no fixed number of uniform ones: generations are drawn one by one
-        one_by_one = planner.answers_are_proven or breeding.mutation == GAUSSIAN
-        super().__init__(ga, 1 if one_by_one else per_call)
-        self._planner, self._problem, self._breeding = planner, problem, breeding
+        one_by_one = planner.answers_are_proven
+        super().__init__(ga, ga.operators, genome, 1 if one_by_one else per_call)
+        if not self.evolving:
+            self.num_drawn, self.num_normals = num_genes * ga.num_offspring, (0, 0)
+        self._planner, self._problem = planner, problem
         self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
-        self._rng, tables = rng, np.zeros((self.num_places, rows, filled))
-        self._generations = Generations(tables, self.summaries)
-        choosing, crossing, mutating = _num_uniforms(ga, breeding)
-        bred, drawn = choosing + crossing + mutating, breeding.num_genes * count
-        self._num_drawn = bred if self.evolving else drawn  # uniform numbers of a generation
-        self._num_normals = breeding.num_genes if breeding.mutation == GAUSSIAN else 0, count
-        self._memory = Memory(
-            np.empty(count, dtype=np.int64),
-            np.empty(ga.num_elites, dtype=np.int64),
-            np.empty(size + LANES, dtype=np.int64),
-            np.zeros(size, dtype=np.bool_),
-            choosing,
-            crossing,
-        )
-        self._tables, self.queries_each = self._generations.tables, problem.collision.queries
+        self._rng, self._tables = rng, np.zeros((self.num_places, rows, filled))
+        lanes, hit = np.empty(size + LANES, dtype=np.int64), np.zeros(size, dtype=np.bool_)
+        self._fixed = num_genes, bits > 0, limits, self.parents, self.elites, lanes, hit
+        self._num_genes, self.queries_each = num_genes, problem.collision.queries
         self._angles = self._tables[:, first:-RESULTS]
         self._attempts, self._path = 0, 0
         self._via_cost = np.inf  # of the posture A that takes the place of a plan
@@ -111,10 +87,10 @@ class Search(TableSearch):
             self._attempts += 1
         else:
             self._via = self.end
-        self._judging = self._planner.judging(self._problem, self._path)
-        self._starts = np.repeat(postures[-1][:, None], self._ga.population_size, axis=1)
-        self.costs = self._tables[:, None, -RESULTS, : self._ga.population_size]
-        self._shown = np.empty((self._breeding.num_genes, self._ga.population_size))
+        size, judging = self._ga.population_size, self._planner.judging(self._problem, self._path)
+        self._sub_path = SubPath(*self._fixed, np.repeat(postures[-1][:, None], size, 1), judging)
+        self.costs = self._tables[:, None, -RESULTS, :size]
+        self._shown = np.empty((self._num_genes, size))
         best = self.keeper.best
         self.keeper.best = best._replace(terms=best.terms | self._counts)
         yield from self.blocks(self._rng)
@@ -135,37 +111,17 @@ class Search(TableSearch):
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        uniforms = rng.random(self._breeding.num_genes * self._ga.population_size)
-        arguments = self._breeding, self._judging, self._starts, self._generations, self._memory
-        kernels.begin(uniforms, *arguments)
+        uniforms = rng.random(self._num_genes * self._ga.population_size)
+        kernels.begin(uniforms, self._sub_path, self._tables, self.summaries)
         self.states = [state_bytes(rng.bit_generator)]
         self._prove(0)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+    def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Compute generations, as far as the best end is not good enough."""
-        before, num_drawn = rng.bit_generator.state, self._num_drawn
-        state = state_bytes(rng.bit_generator)
-        uniforms = rng.random((last - first, num_drawn))
-        normals = np.empty((0, 0))
-        if self.evolving and self._num_normals[0]:
-            normals = standard_normal(rng, self._num_normals)
-        reached = kernels.evolve(
-            uniforms,
-            normals,
-            first,
-            self._stop_cost,
-            self.evolving,
-            self._breeding,
-            self._judging,
-            self._starts,
-            self._generations,
-            self._memory,
-        )
-        if reached < last:  # the generator goes on behind the last generation computed
-            rng.bit_generator.state = before
-            rng.random((reached - first) * num_drawn)
-        states = states_behind(state, [num_drawn] * (reached - first - 1))
-        self.states = [*states, state_bytes(rng.bit_generator)]
+        (select, cross, mutate), stop_cost = self.operators, self._stop_cost
+        numbers = uniforms, normals, first, stop_cost, self.evolving
+        rules = self.breeding, self._sub_path, self._tables, self.summaries
+        reached = kernels.evolve(select, cross, mutate, *numbers, *rules)
         self._prove(reached % self.num_places)
         return int(reached)
 
@@ -226,9 +182,9 @@ class Search(TableSearch):
 
     def population(self, index: int) -> FloatArray:
         """Return the genomes of a generation, in the same array for all of a search."""
-        count, genes = self.costs.shape[2], self._breeding.num_genes
+        count = self.costs.shape[2]
         shown = self._shown[:, :count]
-        np.copyto(shown, self._tables[index % self.num_places, :genes, :count])
+        np.copyto(shown, self._tables[index % self.num_places, : self._num_genes, :count])
         return shown
 
 
@@ -251,49 +207,11 @@ class DrawnSearch(Search):
         super().begin(rng)
         self.end = super()._best_end(0)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
+    def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
         """Draw generations; see `Search`."""
         self.costs = self.costs[:, :, : self._ga.num_offspring]
-        return super().go_on(rng, first, last)
+        return super().advance(uniforms, normals, first)
 
     def _best_end(self, place: int) -> BestEnd:
         drawn = super()._best_end(place)
         return drawn if drawn.cost < self.end.cost else self.end
-
-
-def _num_uniforms(ga: SelectiveSettings, breeding: Breeding) -> tuple[int, int, int]:
-    """Count the uniform numbers of a generation: for choice, crossover and mutation."""
-    count, genes = ga.num_offspring, breeding.num_genes
-    pairs, one_point = count // 2, breeding.crossover == ONE_POINT
-    return (
-        count * (ga.tournament_size if ga.selection == "tournament" else 1),
-        num_single_point_uniforms(pairs) if one_point else num_gene_uniforms(genes, pairs),
-        num_mutation_uniforms(genes, count, breeding.mutation_scope),
-    )
-
-
-def _breeding(ga: SelectiveSettings, limits: FloatArray) -> Breeding:
-    """Return the settings of the operators as the kernels take them."""
-    binary = isinstance(ga, BinaryGenetic)
-    crossover, alpha, mutation, scope, std, power = ONE_POINT, 0.0, NON_UNIFORM, GENE, 0.0, 0
-    if isinstance(ga, RealGenetic):
-        crossover, alpha = CROSSOVERS.index(ga.crossover), ga.blend_alpha
-        mutation, scope = MUTATIONS.index(ga.mutation), SCOPES.index(ga.mutation_scope)
-        std, power = ga.mutation_std, ga.mutation_power
-    return Breeding(
-        num_genes=len(limits) * (ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 1),
-        binary=binary,
-        selection=SELECTIONS.index(ga.selection),
-        tournament_size=ga.tournament_size,
-        rank_pressure=ga.rank_pressure,
-        crossover=crossover,
-        crossover_rate=ga.crossover_rate,
-        blend_alpha=alpha,
-        mutation=mutation,
-        mutation_scope=scope,
-        mutation_rate=ga.mutation_rate,
-        mutation_std=std,
-        mutation_power=power,
-        num_generations=ga.num_generations,
-        limits=limits,
-    )

@@ -1,20 +1,19 @@
 """Strings of via-points of robots whose bodies are covered: they keep within the joints' limits.
 
-A generation goes through the same steps as one of `strings`, between kernels of their own: what
-covered bodies are tested for takes far longer than what Python does between the steps.
+A generation goes through the same steps as one of `strings`, each a call of its own: testing
+covered bodies takes far longer than Python takes between the steps.
 """
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
-from evoexp.evolution.selection import choose_elites
-from evoexp.numeric.elementary import DEGREE
+from evoexp.evolution.operators.breeding import breed
+from evoexp.evolution.succession import choose_elites
 from evoexp.objectives.string_fitness import count_collisions, weigh
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
-from evoexp.planners.arm_tasks import UNLIMITED
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
@@ -30,9 +29,7 @@ class CoveredStrings(Strings):
         super().__init__(planner, problem)
         assert isinstance(problem.collision, CoveredCollision)
         self.collision = problem.collision
-        model = problem.assembly.model
-        limits = np.array([model.lowerPositionLimit, model.upperPositionLimit])
-        low, high = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
+        low, high = problem.limits.T
         # ends that lie on a limit lie within it, whatever the last bit of the conversion is
         self.low = np.minimum(low, np.minimum(problem.start, problem.goal))[:, None, None]
         self.high = np.maximum(high, np.maximum(problem.start, problem.goal))[:, None, None]
@@ -54,36 +51,29 @@ class CoveredStrings(Strings):
         self._judge(strings, judged)
         return judged
 
-    def evolver(
-        self, table: kernels.Population, summaries: FloatArray
-    ) -> Callable[[FloatArray, int], None]:
-        """Return a function that goes on from a generation to those behind it; see `Strings`."""
-        scratch, counts, places = self.scratch(), self.counts, len(summaries)
-        judged = Judgement(scratch.terms.cost, scratch.terms, 0)
-
-        def go_on(uniforms: FloatArray, first: int) -> None:
-            for step, drawn in enumerate(uniforms, start=first):
-                population, following = (
-                    kernels.Population(*(array[g % places] for array in table))
-                    for g in (step, step + 1)
-                )
-                strings, costs, _ = population
-                choose_elites(costs, scratch.elites)
-                slices, offspring = self.problem.arm_slices, scratch.offspring
-                kernels.breed(drawn, counts, slices, self.breeding, strings, costs, offspring)
-                self.smooth(offspring, counts.offspring)
-                self._judge(offspring, judged)
-                kernels.follow(population, scratch, counts.offspring, following)
-                kernels.summarise_strings(*following[1:], summaries[(step + 1) % places])
-
-        return go_on
+    def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+        """Go on from a generation to the next one; see `Strings`."""
+        (offspring, terms, elites, parents), rules = run.scratch, run.breeding
+        here, there = first % len(run.summaries), (first + 1) % len(run.summaries)
+        before, after = (
+            kernels.Population(*(array[place] for array in run.table)) for place in (here, there)
+        )
+        choose_elites(before.costs, elites)
+        (select, cross, mutate), rate = run.operators, rules.mutation_rate
+        genomes, out = kernels.by_gene(before.strings), kernels.by_gene(offspring)
+        rest = first, rate, rules, before.costs, genomes, parents, out
+        breed(select, cross, mutate, uniforms[0], normals, *rest)
+        self.smooth(offspring, len(parents))
+        self._judge(offspring, Judgement(terms.cost, terms, 0))
+        kernels.follow(before, run.scratch, after)
+        kernels.summarise_strings(*after[1:], run.summaries[there])
 
     def _judge(self, strings: FloatArray, judged: Judgement) -> None:
         """Write the terms of strings (Eqs. 2–7)."""
-        terms, count, substeps = judged.terms, len(judged.cost), self.judging.substeps
+        terms, count, substeps = judged.terms, len(judged.cost), self.settings.substeps
         measure_paths(strings, self.problem.arm_slices, terms.lengths, terms.unevenness)
         between = interpolate_linear(np.ascontiguousarray(strings[:, :, :count]), substeps)
         collides = self.collision.collides(between.reshape(len(between), -1))
         hits = np.where(collides, -1.0, 1.0).reshape(1, -1, substeps, count)
         count_collisions(hits, terms.collisions[:count])
-        weigh(self.judging.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)
+        weigh(self.settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

@@ -23,7 +23,6 @@ from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import CoverShape, joint_names, of_limits, of_place
 from evoexp.planners.arm_tasks import (
-    UNLIMITED,
     ArmTask,
     arm_problem,
     cover_notes,
@@ -140,14 +139,12 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
         """Compare start and goal of every arm with the task's, and angles with their limits."""
-        strings, model, found = self._strings_of(problem, solution), problem.assembly.model, []
+        strings, found = self._strings_of(problem, solution), []
         for arm, (a, b) in enumerate(problem.arm_slices):
             for end, column, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
                 name = f"the {end} of arm {arm + 1}"
                 found += of_place(name, strings[a:b, column], wanted[a:b], "deg")
-        limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
-        finite = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
-        return found + of_limits(joint_names(len(strings)), strings, finite, "deg")
+        return found + of_limits(joint_names(len(strings)), strings, problem.limits, "deg")
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the circles or spheres on the links."""

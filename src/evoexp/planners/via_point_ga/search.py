@@ -4,16 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.table_search import TableSearch
+from evoexp.planners.table_search import GeneticSearch
 from evoexp.planners.via_point_ga import kernels
+from evoexp.planners.via_point_ga.kernels import Scratch
 from evoexp.planners.via_point_ga.strings import Problem, Strings
 from evoexp.records import Best, FloatArray, IntArray
 
 
-class Search(TableSearch):
+class Search(GeneticSearch):
     """One run, and memory for its generations."""
 
     def __init__(
@@ -26,32 +26,31 @@ class Search(TableSearch):
             strings: Its steps on this problem.
             per_call: Generations computed at once; None: as many as is best.
         """
-        super().__init__(planner.ga, per_call or strings.generations_per_call)
+        ga, operators = planner.ga, planner.operators
+        super().__init__(ga, operators, strings.genome, per_call or strings.generations_per_call)
         self._planner, self._problem, self._strings = planner, problem, strings
-        self._table = strings.table(self.num_places)
-        self._evolve = strings.evolver(self._table, self.summaries)
-        self.costs, self._shown = self._table.costs, np.empty(self._table.strings.shape[1:])
+        self.table, offspring = strings.table(self.num_places), strings.empty(ga.num_offspring)
+        terms = strings.unjudged(offspring, ga.num_offspring).terms
+        self.scratch = Scratch(offspring, terms, self.elites, self.parents)
+        self.costs, self._shown = self.table.costs, np.empty(self.table.strings.shape[1:])
         self.queries_each = planner.num_via_points * planner.collision.collision_substeps
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
         strings, size = self._strings, self.costs.shape[1]
-        self._table.strings[:] = strings.drawn(rng, size)
-        _, terms, _ = strings.judge(self._table.strings[0], size)
-        self.costs[0], self._table.collisions[0] = terms.cost, terms.collisions[:size]
+        self.table.strings[:] = strings.drawn(rng, size)
+        _, terms, _ = strings.judge(self.table.strings[0], size)
+        self.costs[0], self.table.collisions[0] = terms.cost, terms.collisions[:size]
         self._summarise(0)
-        self._ahead = DrawnAhead(rng, strings.num_drawn)
 
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Compute generations with numbers that are drawn ahead."""
-        count, each = last - first, self._strings.num_drawn
-        self._evolve(self._ahead.draw(count).reshape(count, each), first)
-        self.states = self._ahead.take([each] * count)
-        return last
+    def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
+        """Compute generations."""
+        self._strings.evolve(self, uniforms, normals, first)
+        return first + len(uniforms)
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return a string and its terms, judged once more by itself."""
-        own = self._table.strings[place, :, :, individual, None]
+        own = self.table.strings[place, :, :, individual, None]
         terms = self._strings.judge(self._strings.padded(own), 1).named_terms(0)
         solution = self._planner.solution(self._problem, own, 0)
         return Candidate(solution, terms, terms["collisions"] == 0.0)
@@ -61,11 +60,11 @@ class Search(TableSearch):
 
         So the digest of a run that its budget ends is that of the first generation beyond it.
         """
-        np.copyto(self._shown, self._table.strings[index % self.num_places])
+        np.copyto(self._shown, self.table.strings[index % self.num_places])
         return self._shown
 
     def _summarise(self, place: int) -> None:
-        costs, collisions = self.costs[place], self._table.collisions[place]
+        costs, collisions = self.costs[place], self.table.collisions[place]
         kernels.summarise_strings(costs, collisions, self.summaries[place])
 
 
@@ -80,7 +79,7 @@ class ProvenSearch(Search):
     def improve(self, places: IntArray) -> list[Best]:
         """Keep a proven string that costs less than the one kept, if the generation has one."""
         (place,), keeper = places.tolist(), self.keeper
-        strings, costs, hits = (array[place] for array in self._table)
+        strings, costs, hits = (array[place] for array in self.table)
         k = settle(self._proofs, strings, costs, hits, keeper.cost)
         proven = np.zeros(len(costs), bool)
         if k is not None:

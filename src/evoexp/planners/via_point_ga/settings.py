@@ -8,8 +8,11 @@ from evoexp.collision.bodies.covered_bodies import CoveredBodies
 from evoexp.collision.bodies.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
+from evoexp.evolution.operators.breeding import Operators
+from evoexp.evolution.operators.selection import FitnessRoulette
 from evoexp.objectives.string_fitness import StringFitness
 from evoexp.planners.proofs import Acceptance
+from evoexp.planners.via_point_ga.string_operators import NewTrajectories, StringCrossover
 from evoexp.validation import Count, LayoutCount, NonNegativeCount, Positive, Rate, Settings
 
 SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
@@ -42,6 +45,25 @@ class ViaPointSettings(Settings):
     # all instants (`certified`), or also free by the task's margins (`margin`). A string that
     # is refuted counts as colliding at one instant more
     acceptance: Acceptance = "model"
+
+    @property
+    def operators(self) -> Operators:
+        """The paper's operators (section 3.4 a, b, d), where `ga` names no others."""
+        ga = self.ga
+        return Operators(
+            ga.selection or FitnessRoulette(fitness_offset=self.objective.fitness_offset),
+            ga.crossover
+            or StringCrossover(
+                crossover_distance=self.crossover_distance,
+                exchanges_segment=self.crossover_reading == "segment",
+            ),
+            ga.mutation
+            or NewTrajectories(
+                num_new_trajectories=self.num_new_trajectories,
+                walk_step=self.walk_step,
+                max_turn=self.max_turn,
+            ),
+        )
 
     @model_validator(mode="after")
     def _samples_halve(self) -> Self:

@@ -1,14 +1,13 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.bodies.touching_spheres import SphereCollision
-from evoexp.evolution import crossover
+from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk_strings
@@ -104,31 +103,17 @@ class Strings:
     """The population-wide steps of one planner on one problem."""
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
-        self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
-        self.num_arms, max_turn = len(problem.arm_slices), DEGREE * planner.max_turn
+        self.planner, self.problem, spline = planner, problem, problem.spline
+        self.num_arms = len(problem.arm_slices)
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
-        pair_uniforms = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
-        self.counts = kernels.Counts(ga.num_offspring, pair_uniforms, planner.num_new_trajectories)
-        self.breeding = kernels.Breeding(
-            fitness_offset=planner.objective.fitness_offset,
-            crossover_rate=ga.crossover_rate,
-            crossover_distance=planner.crossover_distance,
-            exchanges_segment=planner.crossover_reading == "segment",
-            mutation_rate=ga.mutation_rate,
-            walk_step=planner.walk_step,
-            max_turn=max_turn,
-            start=problem.start,
-            goal=problem.goal,
-        )
-        self.smoothing = kernels.Smoothing(
+        self.settings = kernels.Settings(
+            arm_slices=problem.arm_slices,
             redistribution=planner.redistribution,
             samples=spline.samples_per_segment,
             pivots=spline.pivots,
             floats=spline.floats,
             integers=spline.integers,
             relaxation_step=planner.relaxation_step,
-        )
-        self.judging = kernels.Judging(
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,
             tables=getattr(problem.collision, "tables", ()),
@@ -142,9 +127,13 @@ class Strings:
         )
 
     @property
-    def num_drawn(self) -> int:
-        """Uniform numbers that a generation takes."""
-        return sum(self.counts) + self.counts.new * (1 + self.num_uniforms)
+    def genome(self) -> Genome:
+        """The coordinates of via-points as operators see them; the ends of a string are fixed."""
+        problem, shape = self.problem, (len(self.problem.start), self.planner.num_via_points + 1)
+        limits = np.empty((*shape, 2))
+        limits[...] = problem.limits[:, None]
+        limits[:, 0], limits[:, -1] = problem.start[:, None], problem.goal[:, None]
+        return Genome(limits.reshape(-1, 2), problem.arm_slices, shape[1])
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
@@ -168,7 +157,7 @@ class Strings:
         """Return new random walks from start to goal (section 3.3), smoothed and padded."""
         problem, strings = self.problem, self.empty(count)
         uniforms, lanes = rng.random((count, self.num_uniforms)), np.arange(count)
-        step, max_turn = self.breeding.walk_step, self.breeding.max_turn
+        step, max_turn = self.planner.walk_step, DEGREE * self.planner.max_turn
         ends = problem.start, problem.goal
         walk_strings(strings, lanes, uniforms, *ends, problem.arm_slices, step, max_turn)
         self.smooth(strings, count)
@@ -176,12 +165,12 @@ class Strings:
 
     def smooth(self, strings: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings."""
-        kernels.smooth(strings, count, self.problem.arm_slices, self.smoothing)
+        kernels.smooth(strings, count, self.settings)
 
     def judge(self, strings: FloatArray, count: int) -> Judgement:
         """Judge the first `count` strings; the arrays of terms keep the padding."""
         judged = self.unjudged(strings, count)
-        kernels.judge(strings, self.problem.arm_slices, self.judging, judged.terms)
+        kernels.judge(strings, self.settings, judged.terms)
         return judged
 
     def table(self, places: int) -> kernels.Population:
@@ -190,33 +179,22 @@ class Strings:
         costs, collisions = np.empty((2, places, size))
         return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
 
-    def scratch(self) -> kernels.Scratch:
-        """Return memory that `evolve` takes."""
-        count, elites = self.counts.offspring, np.empty(self.planner.ga.num_elites, int)
-        offspring = self.empty(count)
-        return kernels.Scratch(offspring, self.unjudged(offspring, count).terms, elites)
-
-    def evolver(
-        self, table: kernels.Population, summaries: FloatArray
-    ) -> Callable[[FloatArray, int], None]:
-        """Return a function that goes on from a generation to those behind it (section 3.4).
+    def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+        """Go on from a generation to those behind it (section 3.4).
 
         Args:
-            table: Of the populations of some generations, written.
-            summaries: (places, 4) written; see `kernels.summarise_strings`.
-
-        Returns:
-            It takes the numbers (generations, `num_drawn`) and the present generation.
+            run: A `Search`, whose operators breed and whose generations are written.
+            uniforms: (generations, numbers) in [0, 1).
+            normals: Normal deviates, see `breed`.
+            first: The present generation.
         """
-        settings = kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging)
-        scratch, slices = self.scratch(), self.problem.arm_slices
-        return lambda uniforms, first: kernels.evolve(
-            uniforms, first, slices, settings, table, scratch, summaries
-        )
+        arguments = run.breeding, self.settings, run.table, run.scratch, run.summaries
+        select, cross, mutate = run.operators
+        kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
 
     def unjudged(self, strings: FloatArray, count: int) -> Judgement:
         """Return memory for a judgement."""
         lengths, unevenness = np.empty((2, self.num_arms, strings.shape[2]))
         terms = StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))
-        tested = self.planner.num_via_points * self.judging.substeps
+        tested = self.planner.num_via_points * self.settings.substeps
         return Judgement(terms.cost, terms, tested * count)

@@ -1,0 +1,1 @@
+"""A crossover for evoexp."""

@@ -1,0 +1,1 @@
+"""Operators of evolution: components that a configuration names, each with one kernel."""

@@ -1,0 +1,139 @@
+"""Operators of strings of via-points (Rana & Zalzala 1995, section 3.4 b and d).
+
+"Double cross-over" of a string p : q can be read in two ways:
+
+- tails: either arm's path is cut in two, and what follows the site is exchanged, arm by arm;
+- segment: the whole string is cut at both sites, and what lies between them is exchanged: the end
+  of the first arm's path and the beginning of the second arm's. With more arms every second piece
+  of the string is exchanged.
+"""
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from evoexp.evolution.operators.operator import Context, Crossover, Genome, Mutation
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE
+from evoexp.paths.walk import num_uniforms, walk_strings
+from evoexp.records import FloatArray, IntArray
+from evoexp.validation import NonNegativeCount, Positive
+
+
+class StringCrossover(Crossover):
+    """Crosses strings at one site per arm, where the parents are close (section 3.4 b).
+
+    A pair is crossed only if at the sites chosen in all arms' portions the two parents' via-points
+    are closer than a distance.
+    """
+
+    component: ClassVar[str] = "string_crossover"
+
+    crossover_distance: Positive  # Euclidean [deg]
+    # whether the segment between the sites is exchanged, instead of the tails
+    exchanges_segment: bool = False
+
+    def num_uniforms(self, genome: Genome, count: int) -> int:
+        """Return per pair one for the decision, and one for the site of every arm."""
+        return count // 2 * (1 + len(genome.arms))
+
+    @staticmethod
+    @kernel
+    def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
+        """Write offspring; see `Crossover`."""
+        arms, num_points = context.genome.arms, context.genome.num_points
+        max_distance, segment = context.settings[0], context.settings[1] != 0.0
+        num_arms, num_offspring = len(arms), len(parents)
+        # mates and sites of every pair; who is not crossed is its own mate
+        mates = parents.copy()
+        sites = np.full((num_arms, num_offspring), num_points)
+        for pair in range(num_offspring // 2):
+            draw = context.uniforms[pair * (1 + num_arms) :]
+            first, second = parents[2 * pair], parents[2 * pair + 1]
+            if num_points < 3 or not draw[0] < context.rate:
+                continue
+            close = True
+            for arm in range(num_arms):
+                site = 1 + min(int(draw[1 + arm] * (num_points - 2)), num_points - 3)  # 1 … N − 1
+                squared = 0.0
+                for j in range(arms[arm, 0], arms[arm, 1]):
+                    gene = j * num_points + site
+                    step = genomes[gene, first] - genomes[gene, second]
+                    squared += step * step
+                close = close and np.sqrt(squared) < max_distance
+                sites[arm, 2 * pair] = site
+                sites[arm, 2 * pair + 1] = site
+            if close:
+                mates[2 * pair], mates[2 * pair + 1] = second, first
+        # every child: its own parent before the site, the mate from the site on; where a segment
+        # is exchanged, the other way round for every second arm
+        source = np.empty(num_offspring, dtype=np.uint64)  # not to be counted from the end
+        for arm in range(num_arms):
+            site = sites[arm]
+            heads, tails = (mates, parents) if segment and arm % 2 == 1 else (parents, mates)
+            for i in range(num_points):
+                for k in range(num_offspring):
+                    source[k] = heads[k] if i < site[k] else tails[k]
+                for j in range(arms[arm, 0], arms[arm, 1]):
+                    before, after = genomes[j * num_points + i], out[j * num_points + i]
+                    for k in range(num_offspring):
+                        after[k] = before[source[k]]
+
+
+@kernel
+def shuffle_head(uniforms: FloatArray, slots: IntArray) -> None:
+    """Draw distinct indices in random order: the head of a Fisher–Yates shuffle.
+
+    Args:
+        uniforms: (draws,) in [0, 1), at most as many as there are indices.
+        slots: (indices,) 0, 1, 2, … at first, changed: its head is the draw.
+    """
+    num = len(slots)
+    for k in range(len(uniforms)):
+        other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
+        slots[k], slots[other] = slots[other], slots[k]
+
+
+class NewTrajectories(Mutation):
+    """Replaces offspring by new random walks (section 3.4 d).
+
+    They take distinct places, each with the rate as probability.
+    """
+
+    component: ClassVar[str] = "new_trajectories"
+
+    num_new_trajectories: NonNegativeCount  # offspring that may be replaced
+    walk_step: Positive  # step of a new trajectory, in units of its straight distance over N
+    # largest random turn of a step away from the direction of the goal [deg]
+    max_turn: Annotated[float, Field(ge=0.0, le=180.0)]
+
+    def num_uniforms(self, genome: Genome, count: int) -> int:
+        """Return per new trajectory one for the place, one for the decision, then the walk's."""
+        walk = num_uniforms(genome.arms, genome.num_points - 1)
+        return self.num_new_trajectories * (2 + walk)
+
+    @staticmethod
+    @kernel
+    def mutate(genomes: FloatArray, count: int, context: Context) -> None:
+        """Change offspring; see `Mutation`."""
+        arms, num_points = context.genome.arms, context.genome.num_points
+        uniforms = context.uniforms
+        new, step, max_turn = int(context.settings[0]), context.settings[1], context.settings[2]
+        if new == 0:
+            return
+        # distinct places, each with the mutation's probability
+        slots, num = np.arange(count), 0
+        shuffle_head(uniforms[: min(new, count)], slots)
+        walks = uniforms[2 * new :].reshape((new, -1))
+        for k in range(min(new, count)):
+            if uniforms[new + k] < context.rate:
+                slots[num] = slots[k]
+                for j in range(walks.shape[1]):  # assigning rows compiles numba's message on shapes
+                    walks[num, j] = walks[k, j]
+                num += 1
+        # all strings have the same ends
+        strings = genomes.reshape((-1, num_points, genomes.shape[1]))
+        start, goal = strings[:, 0, 0].copy(), strings[:, num_points - 1, 0].copy()
+        turn = DEGREE * max_turn
+        walk_strings(strings, slots[:num], walks[:num], start, goal, arms, step, turn)

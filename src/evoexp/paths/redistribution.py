@@ -44,7 +44,6 @@ from evoexp.paths.spline import fit_splines, write_rows
 from evoexp.paths.workspace import (
     U0,
     U1,
-    U2,
     U4,
     VECTOR,
     Layout,

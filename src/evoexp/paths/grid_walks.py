@@ -145,8 +145,7 @@ def walk_all(
     """Write random paths between the same two nodes, each as `walk` does, by half words.
 
     A step must wait for the step before it, which names the row to read; so `LANES` walkers take
-    their steps in turns. The lower half of word i is that of walker 2 i, the upper half that of
-    walker 2 i + 1, and so on. A walker that arrives begins the next path.
+    turns, 2 i by the lower half of word i, 2 i + 1 by its upper half. Who arrives begins anew.
 
     Returns:
         The number of words drawn, a rest included that nobody took; −1 if there are not as many.
@@ -160,8 +159,7 @@ def walk_all(
     place = np.empty(nodes, dtype=np.int32)
     begun, complete, taken, drawn = LANES, 0, 0, num_words
     while complete < len(paths):
-        if taken == drawn:
-            drawn += more_words
+        drawn += more_words if taken == drawn else 0
         if drawn > len(words):
             return -1
         # a step of every walker
@@ -170,13 +168,12 @@ def walk_all(
             word, node = words[taken + (walker >> 1)], here[walker]
             bits = word >> HALF if walker & 1 else word & LOW
             move = drawn_move(SHARE * np.float64(bits), sums[node])
-            following = np.uint64(neighbours[node, move])
+            following = here[walker] = np.uint64(neighbours[node, move])
             if erase:
                 trails[walker, node] = following
             else:
                 counts[walker] += 1
                 trails[walker, counts[walker]] = following
-            here[walker] = following
             has_arrived |= following == target
         taken += WORDS
         # who has arrived begins the next path

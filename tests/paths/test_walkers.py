@@ -4,7 +4,6 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.paths.grid_choices import choice_table
 from evoexp.paths.grid_walks import LANES, WORDS, walk_all
 from matrix import num_cases
 from paths.walked_worlds import SEEDS, SHAPES, World, as_path, nodes_of
@@ -53,7 +52,8 @@ def test_many_walks_are_those_of_walkers_that_take_turns(
 ) -> None:
     world = World(shape, share, seed, (1.0, 1.0 + step))
     words, paths = random_words(seed, 40_000), table(world, count)
-    taken = walk_all(words, WORDS, WORDS, choice_table(world.moves), world.ends, erase, paths)
+    own = world.grid.neighbours, world.sums, world.ends, erase
+    taken = walk_all(words, WORDS, WORDS, *own, paths)
     trails, expected = plain_trails(world, words, count)
     assert taken == expected
     assert [nodes_of(path) for path in paths] == [
@@ -67,11 +67,12 @@ def test_words_are_drawn_in_whole_portions_as_far_as_there_are_as_many(
     shape: tuple[int, ...], erase: bool, first: int, more: int, seed: int
 ) -> None:
     world = World(shape, 0.3, seed, (1.0, 3.0))
-    words, choices = random_words(seed, 40_000), choice_table(world.moves)
+    words = random_words(seed, 40_000)
+    own = world.grid.neighbours, world.sums, world.ends, erase
     one_by_one, portioned = table(world, 2 * LANES + 1), table(world, 2 * LANES + 1)
-    taken = walk_all(words, WORDS, WORDS, choices, world.ends, erase, one_by_one)
+    taken = walk_all(words, WORDS, WORDS, *own, one_by_one)
     counts = WORDS * first, WORDS * more
-    drawn = walk_all(words, *counts, choices, world.ends, erase, portioned)
+    drawn = walk_all(words, *counts, *own, portioned)
     assert np.array_equal(one_by_one, portioned)
     assert drawn == counts[0] + counts[1] * max(0, -(-(taken - counts[0]) // counts[1]))
-    assert walk_all(words[: drawn - 1], *counts, choices, world.ends, erase, portioned) == -1
+    assert walk_all(words[: drawn - 1], *counts, *own, portioned) == -1

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from hypothesis import strategies as st
 
-from evoexp.paths.grid_choices import Choices
+from evoexp.paths.grid_walks import weigh_all
 from evoexp.paths.grids import UNREACHED, Grid, Moves, front, grid
 
 SEEDS = st.integers(0, 2**32)
@@ -34,9 +34,7 @@ class World:
             [0.0, *(one + (two - one) * k for k in range(self.grid.num_nodes))]
         )
         self.moves = Moves(self.grid.neighbours, self.potentials, self.steps)
-        self.no_choices = Choices(
-            np.empty((0, self.grid.num_nodes), dtype=np.uint32), np.zeros(1, dtype=np.int16)
-        )
+        self.sums = weigh_all(self.moves).astype(np.uint16)
 
     def weights(self, node: int) -> dict[int, float]:
         """Where moves lead to, in their order, and what they weigh.

@@ -189,15 +189,15 @@ def test_walks_whose_moves_weigh_no_whole_numbers_take_the_longer_way() -> None:
     fields = PotentialFields(**(FIELDS | {"goal_potentials": (0.5, 1.75)}))
     own = planner(collision=fields)
     problem = solvable((9, 9), 0.3, 4, own)
-    assert len(problem.choices[0]) == 0
+    assert len(problem.sums) == len(problem.world.sums) == 0
     for path in own.sample(problem, rng(2), 200):
         assert faults(problem, path, revisits=False) == []
 
 
-def test_large_grids_work_out_fronts_as_they_go() -> None:
+def test_large_grids_work_out_weights_as_they_go() -> None:
     own = planner(population_size=6, mutation_rate=1.0, num_generations=2)
     problem = own.prepare(robot(), scenario(np.zeros((50, 50), dtype=bool)))
-    assert len(problem.world.fronts) == 0
+    assert len(problem.world.sums) == 0
     last = list(generations(own.evolve(problem, rng(0))))[-1]
     assert all(faults(problem, path, revisits=False) == [] for path in last.population)
 

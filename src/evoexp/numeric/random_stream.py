@@ -5,8 +5,7 @@ then repeats the step that took them, from the same place of a longer block. So 
 not depend on where blocks end.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,30 +50,23 @@ class Draws:
 
 
 class DrawnAhead:
-    """Random numbers for several steps at once; what they leave is for the next steps."""
+    """Uniform numbers for several steps at once; what they leave is for the next steps."""
 
-    def __init__(
-        self,
-        rng: np.random.Generator,
-        most: int,
-        draw: Callable[[int], NDArray[Any]] | None = None,
-    ) -> None:
+    def __init__(self, rng: np.random.Generator, most: int) -> None:
         """Begin where a generator is.
 
         Args:
             rng: The generator, a PCG64.
             most: Numbers that a step takes at most, as far as the caller knows.
-            draw: Draws so many numbers, each by one step of the generator: uniform in [0, 1) if
-                nothing else is asked for.
         """
-        self._draw, self._most, self._left = draw or rng.random, most, np.empty(0)
+        self._rng, self._most, self._left = rng, most, np.empty(0)
         self._state = state_bytes(rng.bit_generator)
 
-    def draw(self, steps: int) -> NDArray[Any]:
-        """Return at least as many numbers as the next steps may take."""
+    def draw(self, steps: int) -> NDArray[np.float64]:
+        """Return at least as many numbers, uniform in [0, 1), as the next steps may take."""
         missing = steps * self._most - len(self._left)
         if missing > 0:
-            fresh = self._draw(missing)
+            fresh = self._rng.random(missing)
             self._left = np.concatenate([self._left, fresh]) if len(self._left) else fresh
         return self._left
 

@@ -91,8 +91,6 @@ def write_speeds(
         p1, p2 = load(w, ahead - VECTOR), load(w, ahead - U2 * VECTOR)
         store(w, ahead, v)
         store(w, ahead + VECTOR, 3.0 * (v - p1) + p2)
-    elif joints == U2 and h == 0.125:  # a segment is a block: constants instead of broadcasts
-        store_eight(w, ahead, speeds_of_two(w, segment * PAIR, at, 0.0, 0.125))
     elif joints == U2:
         store_eight(w, ahead, speeds_of_two(w, segment * PAIR, at, u, h))
     else:

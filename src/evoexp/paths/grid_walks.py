@@ -1,57 +1,101 @@
-"""Paths over a grid: random walks toward a target, loop erasure.
+"""Paths over a grid: random walks toward a target, loop erasure, length and unsafeness.
 
 A path is written into one row of a table: its number of nodes, then their indices. Its first node
 is the start, its last the goal. `place` (nodes,) tells the nodes of a path: a node belongs to it if
 the path has that node at its place; so nothing needs to be cleared between paths.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block
-from evoexp.paths.grid_choices import SHIFT, TOTAL, Choices
 from evoexp.paths.grids import Moves, NodeArray
+from evoexp.records import FloatArray
 
 LANES = 4  # walkers of `walk_all`
 WORDS = LANES // 2  # of 64 random bits for a step of each
 HALF, LOW = np.uint64(32), np.uint64(2**32 - 1)
+SHARE = 2.0**-32  # that half a word is of its greatest number and one
+
+SumArray = NDArray[np.unsignedinteger[Any]]
+
+
+@kernel
+def weigh_moves(moves: Moves, node: int, sums: FloatArray) -> None:
+    """Write the running sums (moves,) of the weights of a node's moves.
+
+    A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the
+    neighbours (Chen & Zalzala 1995, section 2.3: "a neighbouring node which has a lower distance
+    value to the goal, has more chance"). A move that is not permitted weighs nothing.
+    """
+    neighbours, potentials, steps = moves.neighbours, moves.potentials, moves.steps
+    greatest, total = 0.0, 0.0
+    for move in range(len(sums)):
+        other = neighbours[node, move]
+        if other >= 0:
+            greatest = max(greatest, potentials[steps[other]])
+    for move in range(len(sums)):
+        other = neighbours[node, move]
+        if other >= 0:
+            total += greatest - potentials[steps[other]] + 1.0
+        sums[move] = total
+
+
+@kernel
+def weigh_all(moves: Moves) -> FloatArray:
+    """Return the running sums of the weights of all moves, (nodes, moves)."""
+    sums = np.empty(moves.neighbours.shape)
+    for node in range(len(sums)):
+        weigh_moves(moves, node, sums[node])
+    return sums
+
+
+@inlined
+def drawn_move(uniform: float, sums: NDArray[Any]) -> int:
+    """Return the move at which the running sum of weights (moves,) passes the uniform part."""
+    last = len(sums) - 1
+    part, move = uniform * sums[last], 0
+    for other in range(last):  # without a branch, which no processor could foresee
+        move += sums[other] <= part
+    return move
 
 
 @kernel
 def walk(
     draws: Block,
     moves: Moves,
-    choices: Choices,
+    sums: SumArray,
     ends: tuple[int, int],
     erase: bool,
     path: NodeArray,
     place: NodeArray,
 ) -> None:
-    """Write a random path: every step draws one of the permitted moves, weighted toward the target.
-
-    A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the
-    neighbours (Chen & Zalzala 1995, section 2.3: "a neighbouring node which has a lower distance
-    value to the goal, has more chance").
+    """Write a random path: every step draws one of the permitted moves, weighted by `weigh_moves`.
 
     Args:
         draws: One number is taken per step; if they are used up, the walk breaks off.
-        moves: The moves and their weights.
-        choices: The same as a table, one row toward the target; without rows: there is none.
+        moves: The moves and their potentials; with a table of sums the potentials are not read.
+        sums: (1, nodes, moves) of `weigh_all`; (0, nodes, moves): worked out as the walk goes.
         ends: Indices of the node it starts at and of the target, which the front must reach.
         erase: Whether loops are erased.
         path: (≥ nodes + 1,), written; see above.
         place: (nodes,) scratch.
     """
-    uniforms, taken = draws.uniforms, draws.taken
-    node, target = np.uint64(ends[0]), np.uint64(ends[1])
-    at, num, count, is_table = taken[0], len(uniforms), 1, len(choices.entries) > 0
+    uniforms, taken, neighbours = draws.uniforms, draws.taken, moves.neighbours
+    node, target = ends
+    at, num, count, is_table = taken[0], len(uniforms), 1, len(sums) > 0
+    own = np.empty(neighbours.shape[1])
     path[1] = node
     while node != target and at < num:
         if is_table:
-            following = chosen_node(uniforms[at], choices, node)
+            move = drawn_move(uniforms[at], sums[0, node])
         else:
-            following = np.uint64(_weighed_node(uniforms[at], moves, int(np.int64(node))))
+            weigh_moves(moves, node, own)
+            move = drawn_move(uniforms[at], own)
+        following = neighbours[node, move]
         if erase:
             place[node] = following
         else:
@@ -67,14 +111,6 @@ def walk(
         path[0] = count
     elif node == target:
         follow_exits(place, ends, path)
-
-
-@inlined
-def chosen_node(uniform: float, choices: Choices, node: np.uint64) -> np.uint64:
-    """Return where a uniform number leads by a table of choices; a node is an index, unsigned."""
-    entry = choices.entries[0, node]
-    part = np.uint64(uniform * np.float64(entry & TOTAL))
-    return np.uint64(np.int64(node) + choices.slots[np.uint64(entry >> SHIFT) + part])
 
 
 @kernel
@@ -100,7 +136,8 @@ def walk_all(
     words: NDArray[np.uint64],  # (any,) random
     num_words: int,  # words that are drawn at first, for a step of every walker each `WORDS`
     more_words: int,  # words that are drawn whenever these do not suffice
-    choices: Choices,  # of one target, see `grid_choices.choice_table`
+    neighbours: NodeArray,  # (nodes, moves), see `grids.Grid`
+    sums: SumArray,  # (nodes, moves) of `weigh_all`, toward the target
     ends: tuple[int, int],  # indices of two nodes, start and target
     erase: bool,  # whether loops are erased
     paths: NodeArray,  # (paths, nodes + 1) written
@@ -108,14 +145,13 @@ def walk_all(
     """Write random paths between the same two nodes, each as `walk` does, by half words.
 
     A step must wait for the step before it, which names the row to read; so `LANES` walkers take
-    their steps in turns. The lower half of word i is that of walker 2 i, the upper half that of
-    walker 2 i + 1, and so on. A walker that arrives begins the next path.
+    turns, 2 i by the lower half of word i, 2 i + 1 by its upper half. Who arrives begins anew.
 
     Returns:
         The number of words drawn, a rest included that nobody took; −1 if there are not as many.
     """
-    words, choices, paths = borrowed((words, choices, paths))
-    nodes, target = choices.entries.shape[1], np.uint64(ends[1])
+    words, neighbours, sums, paths = borrowed((words, neighbours, sums, paths))
+    nodes, target = len(neighbours), np.uint64(ends[1])
     here, rows = np.full(LANES, np.uint64(ends[0])), np.arange(LANES)
     # of each walker its last exit from each node; where loops are kept its nodes, from index 1 on
     trails, counts = np.empty((LANES, nodes + 1), dtype=np.int32), np.ones(LANES, dtype=np.int64)
@@ -123,21 +159,21 @@ def walk_all(
     place = np.empty(nodes, dtype=np.int32)
     begun, complete, taken, drawn = LANES, 0, 0, num_words
     while complete < len(paths):
-        if taken == drawn:
-            drawn += more_words
+        drawn += more_words if taken == drawn else 0
         if drawn > len(words):
             return -1
         # a step of every walker
         has_arrived = False
         for walker in range(LANES):
             word, node = words[taken + (walker >> 1)], here[walker]
-            following = _node_of_bits(choices, node, word >> HALF if walker & 1 else word & LOW)
+            bits = word >> HALF if walker & 1 else word & LOW
+            move = drawn_move(SHARE * np.float64(bits), sums[node])
+            following = here[walker] = np.uint64(neighbours[node, move])
             if erase:
                 trails[walker, node] = following
             else:
                 counts[walker] += 1
                 trails[walker, counts[walker]] = following
-            here[walker] = following
             has_arrived |= following == target
         taken += WORDS
         # who has arrived begins the next path
@@ -158,42 +194,6 @@ def walk_all(
     return drawn
 
 
-@inlined
-def _node_of_bits(choices: Choices, node: np.uint64, bits: np.uint64) -> np.uint64:
-    """Return where 32 random bits lead by a table of choices; a node is an index, unsigned."""
-    entry = choices.entries[0, node]
-    part = bits * np.uint64(entry & TOTAL) >> HALF
-    return np.uint64(np.int64(node) + choices.slots[np.uint64(entry >> SHIFT) + part])
-
-
-@kernel
-def _weighed_node(uniform: float, moves: Moves, node: int) -> int:
-    """Choose one of a node's neighbours by a uniform number; the node itself if it has none.
-
-    All moves are looked at without a branch, because no processor can foresee the permitted and the
-    chosen ones.
-    """
-    neighbours, potentials, steps = moves.neighbours, moves.potentials, moves.steps
-    # greatest potential, sum and number of the permitted neighbours
-    greatest, total, count = 0.0, 0.0, 0
-    for move in range(neighbours.shape[1]):
-        other = neighbours[node, move]
-        permitted = other >= 0
-        potential = potentials[steps[other if permitted else node]]
-        greatest = max(greatest, potential if permitted else 0.0)
-        total += potential if permitted else 0.0
-        count += permitted
-    # the neighbour at which the sum of weights passes the uniform part
-    left, chosen = uniform * (count * (greatest + 1.0) - total), node
-    for move in range(neighbours.shape[1]):
-        other = neighbours[node, move]
-        permitted = other >= 0
-        weight = greatest - potentials[steps[other if permitted else node]] + 1.0
-        chosen = other if permitted & (left >= 0.0) else chosen
-        left -= weight if permitted else 0.0
-    return chosen
-
-
 @kernel
 def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
     """Write a path without its loops: the nodes between two visits of a node are left out.
@@ -206,10 +206,38 @@ def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray)
     """
     for k in range(1, count + 1):
         place[nodes[k]] = k
-    kept, k = 0, 1
+    num_left, k = 0, 1
     while k <= count:  # from the last place of a node the path never comes back to it
         node = nodes[k]
-        kept += 1
-        path[kept] = node
+        num_left += 1
+        path[num_left] = node
         k = place[node] + 1
-    path[0] = kept
+    path[0] = num_left
+
+
+@kernel
+def measure_path(path: NodeArray, kinds: NodeArray, unsafeness: FloatArray) -> tuple[float, float]:
+    """Return length and mean unsafeness of a path (Chen & Zalzala 1995, Eqs. 2 and 3).
+
+    Moves of each kind are counted, so the length does not depend on their order.
+
+    Args:
+        kinds: See `grids.Grid`.
+        unsafeness: (nodes,).
+
+    Returns:
+        D [cell] and S [-].
+    """
+    count = path[0]
+    diagonal, spatial = 0, 0
+    before = path[1]
+    total = unsafeness[before]
+    for k in range(2, count + 1):
+        node = path[k]
+        kind = kinds[abs(node - before)]
+        diagonal += kind == 2
+        spatial += kind == 3
+        total += unsafeness[node]
+        before = node
+    lateral = count - 1 - diagonal - spatial
+    return lateral + diagonal * np.sqrt(2.0) + spatial * np.sqrt(3.0), total / count

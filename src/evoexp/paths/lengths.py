@@ -22,30 +22,8 @@ def measure_paths(
         unevenness: (arms, lanes), written: the sum of |d_i − their mean| (Eqs. 4, 5).
     """
     num, pitch = np.uint64(via_points.shape[1] - 1), np.uint64(via_points.shape[2])
-    steps = np.empty(num * VECTOR)
-    _measure(
-        via_points.reshape(-1),
-        num,
-        pitch,
-        arm_slices,
-        lengths.reshape(-1),
-        unevenness.reshape(-1),
-        steps,
-    )
-
-
-@kernel
-def _measure(
-    points: FloatArray,
-    num: np.uint64,
-    pitch: np.uint64,
-    arm_slices: IntArray,
-    lengths: FloatArray,
-    unevenness: FloatArray,
-    steps: FloatArray,
-) -> None:
-    """Measure eight paths at a time, in given memory."""
-    points, lengths, unevenness, steps = borrowed((points, lengths, unevenness, steps))
+    points, steps = borrowed(via_points.reshape(-1)), np.empty(num * VECTOR)
+    lengths_of_arms, unevenness_of_arms = borrowed((lengths.reshape(-1), unevenness.reshape(-1)))
     for arm in range(len(arm_slices)):
         first, stop = np.uint64(arm_slices[arm, 0]), np.uint64(arm_slices[arm, 1])
         for lane in range(np.uint64(0), pitch, VECTOR):
@@ -64,5 +42,5 @@ def _measure(
             mean, uneven = length / np.float64(num), spread(0.0)
             for i in range(num):
                 uneven = uneven + magnitude(load(steps, i * VECTOR) - mean)
-            store(lengths, np.uint64(arm) * pitch + lane, length)
-            store(unevenness, np.uint64(arm) * pitch + lane, uneven)
+            store(lengths_of_arms, np.uint64(arm) * pitch + lane, length)
+            store(unevenness_of_arms, np.uint64(arm) * pitch + lane, uneven)

@@ -14,10 +14,7 @@ spacing, 100 paths of 21 points in the plane, fresh walks and populations just c
     16 chords               0.8e-3 … 1.1e-3   (0.4e-2 … 0.5e-2)
 
 Gauss's rule with a polynomial inverse needs as many roots for that: near a cusp, which crossed-over
-paths have, the speed is hardly smooth. The speeds and their integral are half of the time; a
-quarter is finding the targets' samples and a fifth the points there, whose numbers stand at another
-place in every path. The square roots hide behind the rest: without them it took 9 % less (Zen 4),
-and moving points while the next paths' roots are on their way took a fifth more.
+paths have, the speed is hardly smooth.
 """
 
 import numpy as np
@@ -47,7 +44,6 @@ from evoexp.paths.spline import fit_splines, write_rows
 from evoexp.paths.workspace import (
     U0,
     U1,
-    U2,
     U4,
     VECTOR,
     Layout,
@@ -181,21 +177,16 @@ def move_points(
         lengths = load_pairs(w, places, at.samples + own, at.lengths)
         target, sample = load(w, at.targets + own), load(w, at.found + own)
         store(w, at.found + own, parameter(target, sample, speeds, lengths) * h)
-    # the splines there, of two joints at a time; a last one goes with itself
-    for joint in range(U0, joints, U2):
-        other = joint + (U1 if joint + U1 < joints else U0)
-        rows, rows2 = at.rows + joint * at.joint, at.rows + other * at.joint
-        start, start2 = first + joint * (N + U1) * pitch, first + other * (N + U1) * pitch
+    # the splines there
+    for joint in range(joints):
+        start, rows = first + joint * (N + U1) * pitch, at.rows + joint * at.joint
         for i in range(U1, N):
-            own, place, place2 = i * VECTOR, start + i * pitch, start2 + i * pitch
+            own, place = i * VECTOR, start + i * pitch
             u = load(w, at.found + own)
             x = spline_point(load_quads(w, places, at.knots + own, rows), u)
-            x2 = spline_point(load_quads(w, places, at.knots + own, rows2), u)
             if any_stays:
                 x = select(moves < 1.0, load(via_points, place), x)
-                x2 = select(moves < 1.0, load(via_points, place2), x2)
             store(via_points, place, x)
-            store(via_points, place2, x2)
 
 
 @inlined

@@ -38,34 +38,24 @@ def fit_splines(
         at: Places in it.
     """
     to_joint = (N + U1) * pitch
-    # two joints at a time: neither waits for results of the other; a last one goes with itself
-    for joint in range(U0, joints, U2):
-        other = joint + (U1 if joint + U1 < joints else U0)
-        source, source2 = first + joint * to_joint, first + other * to_joint
-        knot, knot2 = joint * at.joint * VECTOR, other * at.joint * VECTOR
-        before, before2 = load(via_points, source), load(via_points, source2)
-        here, here2 = load(via_points, source + pitch), load(via_points, source2 + pitch)
-        m, m2 = (here - before) * pivots[0], (here2 - before2) * pivots[0]
+    for joint in range(joints):
+        source, knot = first + joint * to_joint, joint * at.joint * VECTOR
+        before, here = load(via_points, source), load(via_points, source + pitch)
+        # forward: the equations of `spline_pivots`, each freed of the unknown before
+        m = (here - before) * pivots[0]
         store_knot(w, knot, before, m)
-        store_knot(w, knot2, before2, m2)
         for i in range(U1, N):
             after = load(via_points, source + (i + U1) * pitch)
-            after2 = load(via_points, source2 + (i + U1) * pitch)
             m = ((before - here) + (after - here) - m) * pivots[i]
-            m2 = ((before2 - here2) + (after2 - here2) - m2) * pivots[i]
             store_knot(w, knot + i * PAIR, here, m)
-            store_knot(w, knot2 + i * PAIR, here2, m2)
-            before, here, before2, here2 = here, after, here2, after2
-        m, m2 = ((before - here) - m) * pivots[N], ((before2 - here2) - m2) * pivots[N]
+            before, here = here, after
+        m = ((before - here) - m) * pivots[N]
         store_knot(w, knot + N * PAIR, here, m)
-        store_knot(w, knot2 + N * PAIR, here2, m2)
+        # backward: the unknowns
         for back in range(N):
-            k = N - U1 - back
-            own, own2 = knot + k * PAIR + VECTOR, knot2 + k * PAIR + VECTOR
-            old, old2 = load(w, own), load(w, own2)
-            m, m2 = old - m * pivots[k], old2 - m2 * pivots[k]
-            store(w, own, m)
-            store(w, own2, m2)
+            place = knot + (N - U1 - back) * PAIR + VECTOR
+            m = load(w, place) - m * pivots[N - U1 - back]
+            store(w, place, m)
 
 
 @inlined

@@ -5,7 +5,7 @@ time, and a record of each another third.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -213,29 +213,30 @@ class ScaledSearch(TableSearch):
     digest.
 
     Attributes:
+        draws: Uniform numbers.
         chosen: Memory of the selection.
-        arguments: All that `evolve` takes behind the draws and the first and the last generation.
     """
 
-    arguments: tuple[Any, ...]
-
-    def __init__(
-        self, ga: ScaledGenetic, evolve: Callable[..., int], per_call: int, num_drawn: int
-    ) -> None:
+    def __init__(self, ga: ScaledGenetic, per_call: int, num_drawn: int) -> None:
         """Begin a run.
 
         Args:
-            evolve: Kernel that computes the generations after one up to another, as far as the
-                draws suffice, and returns the last generation that was computed.
             per_call: Generations computed per call, at most.
             num_drawn: Uniform numbers drawn at once, at least.
         """
         super().__init__(ga, per_call)
         self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
-        self._evolve, self._draws = evolve, Draws(num_drawn)
+        self.draws = Draws(num_drawn)
+
+    @abstractmethod
+    def breed(self, generation: int) -> bool:
+        """Compute the generation behind one; return whether the draws sufficed."""
 
     def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Compute generations; draw more numbers whenever they do not suffice."""
-        while (first := self._evolve(self._draws.block, first, last, *self.arguments)) < last:
-            self._draws.extend(rng)
+        """Compute generations, each anew with more numbers if these did not suffice."""
+        for generation in range(first, last):
+            before = self.draws.block.taken.item(0)
+            while not self.breed(generation):
+                self.draws.block.taken[0], before = before, 0
+                self.draws.extend(rng)
         return last

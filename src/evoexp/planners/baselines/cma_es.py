@@ -5,17 +5,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.planners.baselines.real_vectors import check_real_coded, real_vectors
-from evoexp.planners.planner import COPIES, Keeper, Reproducibility, num_values
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.baselines.real_vectors import RealVectorControl, real_vectors
+from evoexp.planners.planner import Keeper, Reproducibility
 from evoexp.records import Block, FloatArray
-from evoexp.validation import Count, Positive
+from evoexp.validation import Positive
 
 SEEDS = 2**32  # of numpy's older generators
-ROOM = 12  # arrays (variables, variables): of the covariance, its parts, and of an update
 
 
-class CmaEs(WrappedPlanner):
+class CmaEs(RealVectorControl):
     """Adapts mean and covariance of a normal distribution of individuals to what costs least.
 
     It begins with mean and covariance of individuals drawn as the planner draws its own first ones,
@@ -29,26 +27,16 @@ class CmaEs(WrappedPlanner):
 
     Attributes:
         sigma: First standard deviation, in those of the drawn individuals [-].
-        num_drawn: Individuals drawn for the first mean and covariance; they are not judged.
         improves: Whether individuals go through the planner's local operator before judgement.
         planner: The planner whose coding, cost and budget are used.
     """
 
     component: ClassVar[str] = "cma_es"
     reproducibility: ClassVar[Reproducibility] = "environment"
+    matrices: ClassVar[int] = 12  # the covariance, its parts, and those of an update
 
     sigma: Positive
-    num_drawn: Count
     improves: bool
-
-    def prepare(self, robot: Any, scenario: Any) -> Any:
-        """Prepare the wrapped planner's problem.
-
-        Raises:
-            SettingError: If the planner's individuals are no real vectors.
-        """
-        check_real_coded(self.planner, self.component)
-        return super().prepare(robot, scenario)
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation after the other, of one distribution or of several in turn."""
@@ -77,11 +65,6 @@ class CmaEs(WrappedPlanner):
     def num_evaluations(self, index: int) -> int:
         """Return the planner's evaluations of a later generation, at least five."""
         return max(5, self.planner.num_evaluations(max(1, index)))
-
-    def memory(self, problem: Any) -> int:
-        """Return the planner's estimate, and that of the drawn individuals and the covariance."""
-        values = num_values(self.shape(problem))
-        return self.planner.memory(problem) + 8 * values * (COPIES * self.num_drawn + ROOM * values)
 
     def _improved(
         self, problem: Any, population: FloatArray, rng: np.random.Generator

@@ -7,17 +7,15 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError, nearest
-from evoexp.planners.baselines.real_vectors import check_real_coded, real_vectors
-from evoexp.planners.planner import COPIES, Judgement, Keeper, Reproducibility, num_values
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.baselines.real_vectors import RealVectorControl, real_vectors
+from evoexp.planners.planner import Judgement, Keeper, Reproducibility
 from evoexp.records import Block, FloatArray
-from evoexp.validation import Component, Count
 
 SEEDS = 2**32  # of numpy's older generators
 ENDLESS = 10**9  # generations: this planner counts them itself
 
 
-class Nsga2(WrappedPlanner, Component):
+class Nsga2(RealVectorControl):
     """Evolves a front: individuals that no other surpasses in all objectives at once.
 
     Objectives are terms of the planner's own judgement; the answer is the individual of the least
@@ -30,8 +28,6 @@ class Nsga2(WrappedPlanner, Component):
     Attributes:
         objectives: Names of terms, to be minimised; a name stands for the sum of all terms that
             begin with it, as `length` does for the lengths of all arms.
-        num_drawn: Individuals drawn for the box and the first population; those that are not in
-            that population are not judged.
         planner: The planner whose coding, terms, cost and budget are used.
     """
 
@@ -39,7 +35,6 @@ class Nsga2(WrappedPlanner, Component):
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     objectives: Annotated[tuple[str, ...], Field(min_length=2)]
-    num_drawn: Count
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem.
@@ -47,7 +42,6 @@ class Nsga2(WrappedPlanner, Component):
         Raises:
             SettingError: If the planner's individuals are no real vectors, or it has no such terms.
         """
-        check_real_coded(self.planner, self.component)
         problem = super().prepare(robot, scenario)
         one = self.planner.sample(problem, np.random.Generator(np.random.PCG64(0)), 1)
         names = tuple(self.planner.cost(problem, one).named_terms(0))
@@ -86,11 +80,6 @@ class Nsga2(WrappedPlanner, Component):
     def num_evaluations(self, index: int) -> int:
         """Return the planner's evaluations of a later generation, at least four."""
         return max(4, self.planner.num_evaluations(max(1, index)))
-
-    def memory(self, problem: Any) -> int:
-        """Return the planner's estimate, and that of the drawn individuals and their covariance."""
-        values = num_values(self.shape(problem))
-        return self.planner.memory(problem) + 8 * values * (COPIES * self.num_drawn + values)
 
     def _values(self, judged: Judgement) -> FloatArray:
         """Return the objectives of judged individuals, (individuals, objectives)."""

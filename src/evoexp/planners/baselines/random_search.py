@@ -1,21 +1,13 @@
 """Random search: the best of as many samples as a planner evaluates, without any evolution."""
 
 from collections.abc import Iterator
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 import numpy as np
 
 from evoexp.planners.planner import judged_samples
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Block
-
-
-@runtime_checkable
-class DrawsBlocks(Protocol):
-    """A planner whose kernels draw many generations of samples per call."""
-
-    def random_blocks(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
-        """Yield the generations of `judged_samples`, in blocks."""
 
 
 class RandomSearch(WrappedPlanner):
@@ -32,7 +24,4 @@ class RandomSearch(WrappedPlanner):
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation of new samples after the other."""
-        planner = self.planner
-        if isinstance(planner, DrawsBlocks):
-            return planner.random_blocks(problem, rng)
-        return judged_samples(planner, problem, rng)
+        return judged_samples(self.planner, problem, rng)

@@ -1,13 +1,15 @@
 """Individuals of a real-coded planner as vectors, and where a search among them may begin."""
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.numeric.compilation import kernel
-from evoexp.planners.planner import Planner
+from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.planners.planner import COPIES, Planner, num_values
+from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import BoolArray, FloatArray
+from evoexp.validation import Count
 
 SHRINKAGE = 0.1  # [-] share of a drawn covariance that is replaced by its diagonal
 LEAST = 1e-6  # [-] of the mean variance: directions in which drawn individuals do not differ
@@ -36,18 +38,30 @@ class RealVectors(NamedTuple):
         return np.asarray(np.minimum(np.maximum(found, low), high))
 
 
-def check_real_coded(planner: Planner, name: str) -> None:
-    """Refuse a planner whose individuals are no real vectors.
+class RealVectorControl(WrappedPlanner):
+    """Base of the controls that search among the real vectors of a planner's individuals."""
 
-    Args:
-        planner: The planner beside which a control stands.
+    matrices: ClassVar[int] = 1  # of (variables, variables) that a search keeps
 
-    Raises:
-        SettingError: If it is one.
-    """
-    if not getattr(planner, "is_real_coded", False):
-        must = f"left out: individuals of {planner.component} are no vectors of real numbers"
-        raise SettingError("control", must, name)
+    num_drawn: Count  # individuals drawn for the first vectors and their covariance; not judged
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem.
+
+        Raises:
+            SettingError: If the planner's individuals are no real vectors.
+        """
+        if not getattr(self.planner, "is_real_coded", False):
+            of = self.planner.component
+            must = f"left out: individuals of {of} are no vectors of real numbers"
+            raise SettingError("control", must, self.component)
+        return super().prepare(robot, scenario)
+
+    def memory(self, problem: Any) -> int:
+        """Return the planner's estimate, and that of the drawn individuals and of matrices."""
+        values = num_values(self.shape(problem))
+        own = 8 * values * (COPIES * self.num_drawn + self.matrices * values)
+        return self.planner.memory(problem) + own
 
 
 def real_vectors(planner: Planner, problem: Any, drawn: FloatArray) -> RealVectors:
@@ -66,97 +80,29 @@ def real_vectors(planner: Planner, problem: Any, drawn: FloatArray) -> RealVecto
     if not vectors.size:
         must = "one whose first individuals differ"
         raise SettingError("planner", must, planner.component)
-    mean, covariance = moments(vectors)
-    variance = float(trace(covariance)) / len(covariance)
-    shrink(covariance, variance)
+    count, diagonal = vectors.shape[1], np.eye(len(vectors), dtype=bool)
+    mean = matrix_product(vectors, np.ones(count)) / count
+    apart = vectors - mean[:, None]
+    covariance = matrix_product(apart, np.ascontiguousarray(apart.T)) / count
+    # shrunk towards its diagonal, and divided by the mean variance
+    own = np.diag(covariance).copy()
+    variance = float(matrix_product(own, np.ones(len(own)))) / len(own)
+    covariance *= 1.0 - SHRINKAGE
+    least = np.maximum(own, LEAST * variance)
+    covariance[diagonal] = (1.0 - SHRINKAGE) * own + SHRINKAGE * least
+    covariance /= variance
     bounds = planner.bounds(problem)  # type: ignore[attr-defined]  # real-coded ones have them
     return RealVectors(template, changes, mean, covariance, float(np.sqrt(variance)), bounds)
 
 
-@kernel
-def moments(vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean (variables,) and covariance (variables, variables) of (variables, individuals).
-
-    Sums run over individuals in their order.
-    """
-    variables, count = vectors.shape
-    mean, covariance = np.zeros(variables), np.zeros((variables, variables))
-    for i in range(variables):
-        for k in range(count):
-            mean[i] += vectors[i, k]
-        mean[i] /= count
-    apart = np.empty((count, variables))
-    for i in range(variables):
-        for k in range(count):
-            apart[k, i] = vectors[i, k] - mean[i]
-    for k in range(count):
-        for i in range(variables):
-            own = apart[k, i]
-            for j in range(variables):
-                covariance[i, j] += own * apart[k, j]
-    for i in range(variables):
-        for j in range(variables):
-            covariance[i, j] /= count
-    return mean, covariance
-
-
-@kernel
-def trace(matrix: FloatArray) -> float:
-    """Return the sum of the diagonal of a matrix (n, n)."""
-    total = 0.0
-    for i in range(len(matrix)):
-        total += matrix[i, i]
-    return total
-
-
-@kernel
-def shrink(covariance: FloatArray, variance: float) -> None:
-    """Shrink a covariance (n, n) towards its diagonal, and divide it by the mean variance."""
-    for i in range(len(covariance)):
-        for j in range(len(covariance)):
-            if i == j:
-                least = max(covariance[i, i], LEAST * variance)
-                covariance[i, i] = (1.0 - SHRINKAGE) * covariance[i, i] + SHRINKAGE * least
-            else:
-                covariance[i, j] *= 1.0 - SHRINKAGE
-            covariance[i, j] /= variance
-
-
-@kernel
 def transposed_root(matrix: FloatArray) -> FloatArray:
-    """Return Lᵀ of the Cholesky factor L of a positive definite matrix (n, n)."""
-    n = len(matrix)
-    root = np.zeros((n, n))  # rows are columns of L
-    for k in range(n):
-        for j in range(k, n):
-            root[k, j] = matrix[k, j]
-        for i in range(k):
-            own = root[i, k]
-            for j in range(k, n):
-                root[k, j] -= own * root[i, j]
-        pivot = np.sqrt(root[k, k])
-        for j in range(k, n):
-            root[k, j] /= pivot
-    return root
+    """Return Lᵀ of the Cholesky factor L of a positive definite matrix (n, n).
 
-
-@kernel
-def correlated(root: FloatArray, normals: FloatArray, scale: float) -> FloatArray:
-    """Return scale · L z for each row z of normals.
-
-    Args:
-        root: (n, n) of `transposed_root`.
-        normals: (individuals, n).
-        scale: A factor.
-
-    Returns:
-        (individuals, n).
+    LAPACK's has other bits on other processors.
     """
-    count, n = normals.shape
-    out = np.zeros((count, n))
-    for k in range(count):
-        for i in range(n):
-            own = scale * normals[k, i]
-            for j in range(i, n):
-                out[k, j] += own * root[i, j]
-    return out
+    root = np.triu(matrix)  # rows are columns of L
+    for k in range(len(root)):
+        for i in range(k):
+            root[k, k:] -= root[i, k] * root[i, k:]
+        root[k, k:] /= np.sqrt(root[k, k])
+    return root

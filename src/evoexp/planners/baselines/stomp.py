@@ -9,18 +9,16 @@ import numpy as np
 from evoexp.numeric.elementary import exp, standard_normal
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.planners.baselines.real_vectors import (
-    check_real_coded,
-    correlated,
+    RealVectorControl,
     real_vectors,
     transposed_root,
 )
-from evoexp.planners.planner import COPIES, Keeper, num_values
-from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.planners.planner import Keeper
 from evoexp.records import Block, FloatArray
 from evoexp.validation import Count, Positive, Rate
 
 
-class Stomp(WrappedPlanner):
+class Stomp(RealVectorControl):
     """Moves one trajectory by the weighted mean of noisy ones (Kalakrishnan et al. 2011).
 
     Noise is as smooth as the individuals that the planner draws at first are: it has their
@@ -35,26 +33,16 @@ class Stomp(WrappedPlanner):
         shrinkage: Share of the noise that is left after a generation [-].
         sensitivity: h, the weight's decay from the least cost to the largest [-].
         patience: Generations without a better trajectory until it starts anew.
-        num_drawn: Individuals drawn for the noise's covariance; they are not judged.
         planner: The planner whose coding, cost and budget are used.
     """
 
     component: ClassVar[str] = "stomp"
+    matrices: ClassVar[int] = 4  # the covariance, its root, and those of its factorisation
 
     sigma: Positive
     shrinkage: Rate
     sensitivity: Positive
     patience: Count
-    num_drawn: Count
-
-    def prepare(self, robot: Any, scenario: Any) -> Any:
-        """Prepare the wrapped planner's problem.
-
-        Raises:
-            SettingError: If the planner's individuals are no real vectors.
-        """
-        check_real_coded(self.planner, self.component)
-        return super().prepare(robot, scenario)
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield one generation of noisy trajectories after the other, the middle one first."""
@@ -68,7 +56,7 @@ class Stomp(WrappedPlanner):
                 sigma, least, idle = self.sigma, np.inf, 0
             normals = standard_normal(rng, (self.num_evaluations(index), len(middle)))
             normals[0] = 0.0
-            noise = correlated(root, normals, sigma * scale)
+            noise = matrix_product(sigma * scale * normals, root)
             population = vectors.population(middle + noise)
             judged = planner.cost(problem, population)
             yield keeper.record_judged(planner, problem, population, judged)
@@ -93,8 +81,3 @@ class Stomp(WrappedPlanner):
     def num_evaluations(self, index: int) -> int:
         """Return the planner's evaluations of a later generation, at least two."""
         return max(2, self.planner.num_evaluations(max(1, index)))
-
-    def memory(self, problem: Any) -> int:
-        """Return the planner's estimate, and that of the drawn individuals and their covariance."""
-        values = num_values(self.shape(problem))
-        return self.planner.memory(problem) + 8 * values * (COPIES * self.num_drawn + 4 * values)

@@ -6,15 +6,12 @@ A path is a row of a table, see `paths.grid_walks`.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
-from evoexp.paths.grid_choices import Choices
-from evoexp.paths.grid_measures import measure_by_tolls, measure_path
-from evoexp.paths.grid_walks import walk_all
+from evoexp.paths.grid_walks import measure_path
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,
@@ -26,7 +23,7 @@ from evoexp.planners.grid_path_ga.path_operators import (
 )
 from evoexp.planners.planner import Candidate
 from evoexp.planners.table_search import TableSearch
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import FloatArray
 
 RESULTS = 3
 DISTANCE, UNSAFENESS, COST = range(RESULTS)
@@ -80,10 +77,7 @@ def measure(
     path: NodeArray, world: World, weights: tuple[float, float], results: FloatArray, k: int
 ) -> None:
     """Write D, S and C = ε D + λ S of a path (Eqs. 1 to 3) into column k of `results`."""
-    if len(world.tolls.of_node) > 0:
-        distance, mean = measure_by_tolls(path, world.tolls)
-    else:
-        distance, mean = measure_path(path, world.kinds, world.unsafeness)
+    distance, mean = measure_path(path, world.kinds, world.unsafeness)
     results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
     results[COST, k] = weights[0] * distance + weights[1] * mean
 
@@ -99,70 +93,36 @@ def measure_all(
 
 
 @kernel
-def evolve(
-    draws: Block,  # uniform numbers
-    first: int,  # the present generation
-    last: int,  # the generation to reach
-    world: World,  # grid and fields
-    weights: tuple[float, float],  # ε and λ of Eq. 1.
-    breeding: Breeding,  # settings of the operators
-    # two generations or more; number g is at place g modulo the number of places
-    table: Population,
-    chosen: SelectionMemory,  # parents and elites, written
-    scratch: Scratch,  # of the operators
-    # what is recorded of some generations, see `note`; likewise at places of its own
-    found: Population,
-    summaries: FloatArray,  # (places, 4) likewise
-) -> int:
-    """Go on from one generation to another.
-
-    Returns:
-        The generation reached: an earlier one if the draws did not suffice. Then it is to go on
-        there with more.
-    """
-    draws, world, table, chosen, scratch = borrowed((draws, world, table, chosen, scratch))
-    found, summaries = borrowed((found, summaries))
-    paths, results = table.paths, table.results
-    for generation in range(first, last):
-        before, own = draws.taken[0], generation % len(paths)
-        other = (generation + 1) % len(paths)
-        population = Population(paths[own], results[own])
-        following = Population(paths[other], results[other])
-        if not advance(draws, world, weights, breeding, population, following, chosen, scratch):
-            draws.taken[0] = before
-            return generation
-        note(following, (generation + 1) % len(summaries), found, summaries)
-    return last
-
-
-@kernel
-def note(population: Population, place: int, found: Population, summaries: FloatArray) -> None:
+def note(population: Population, place: int, recorded: Population, summaries: FloatArray) -> None:
     """Write to a place what is recorded of a generation.
 
     These are the results of all paths, the best path alone, and the summary: all paths are valid.
     """
-    results, own = population.results, summaries[place]
-    found.results[place] = results
-    own[0], own[1], own[2] = cost_statistics(results[COST])
-    own[3] = results.shape[1]
-    copy_path(population.paths[int(own[0])], found.paths[place])
+    results, summary = population.results, summaries[place]
+    recorded.results[place] = results
+    summary[0], summary[1], summary[2] = cost_statistics(results[COST])
+    summary[3] = results.shape[1]
+    copy_path(population.paths[int(summary[0])], recorded.paths[place])
 
 
 @kernel
 def advance(
-    draws: Block,
-    world: World,
-    weights: tuple[float, float],
-    breeding: Breeding,
+    draws: Block,  # uniform numbers
+    world: World,  # grid and fields
+    weights: tuple[float, float],  # ε and λ of Eq. 1.
+    breeding: Breeding,  # settings of the operators
     population: Population,
-    following: Population,
-    chosen: SelectionMemory,
-    scratch: Scratch,
+    following: Population,  # written
+    chosen: SelectionMemory,  # parents and elites, written
+    scratch: Scratch,  # of the operators
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
     Returns whether the draws sufficed; if not, what is written is not complete.
     """
+    draws, world, population, following, chosen, scratch = borrowed(
+        (draws, world, population, following, chosen, scratch)
+    )
     (paths, results), (children, values) = population, following
     parents, elites, count = chosen.parents, chosen.elites, len(chosen.parents)
     if not choose_parents(draws, results[COST], breeding.multiple, chosen):
@@ -201,77 +161,34 @@ def advance(
 def climb(
     draws: Block,  # uniform numbers
     trial: int,  # number of the first trial: trial k changes path k modulo the number of paths
-    first: int,  # the present generation
-    last: int,  # the generation to reach
-    num_trials: int,  # of each generation
+    last: int,  # the trial behind the last one
     world: World,  # grid and fields
     weights: tuple[float, float],  # ε and λ of Eq. 1.
     erase: bool,  # whether loops are erased
     population: Population,  # paths and their results, changed
     candidate: Population,  # scratch of one path
     scratch: Scratch,  # of the operators
-    found: Population,  # see `evolve`, as for `summaries`
-    summaries: FloatArray,
 ) -> int:
     """Regenerate a piece of one path after the other as mutation does; keep what costs no more.
 
     Returns:
-        The number of the next trial: one of an earlier generation if the draws did not suffice.
+        The number of the next trial: an earlier one than `last` if the draws did not suffice.
     """
     draws, world, population, candidate, scratch = borrowed(
         (draws, world, population, candidate, scratch)
     )
-    found, summaries = borrowed((found, summaries))
     paths, results = population
     path, values = candidate.paths[0], candidate.results
-    for generation in range(first + 1, last + 1):
-        for own in range(trial, generation * num_trials):
-            before, k = draws.taken[0], own % len(paths)
-            copy_path(paths[k], path)
-            mutate(draws, world, erase, path, scratch)
-            if used_up(draws):
-                draws.taken[0] = before
-                return own
-            measure(path, world, weights, values, 0)
-            if values[COST, 0] <= results[COST, k]:
-                copy_path(path, paths[k])
-                for row in range(RESULTS):
-                    results[row, k] = values[row, 0]
-        trial = generation * num_trials
-        note(population, generation % len(summaries), found, summaries)
-    return trial
-
-
-@kernel
-def draw_generations(
-    words: NDArray[np.uint64],  # random
-    first: int,  # the generation drawn last
-    last: int,  # the generation to reach
-    num_words: int,  # see `walk_all`, as for `more_words`
-    more_words: int,
-    choices: Choices,  # of the goal
-    ends: tuple[int, int],  # indices of start and goal
-    erase: bool,  # whether loops are erased
-    world: World,  # grid and fields
-    weights: tuple[float, float],  # ε and λ of Eq. 1.
-    population: Population,  # written: the generation drawn last
-    counts: IntArray,  # (≥ last − first,) written: words of each generation
-    found: Population,  # see `evolve`, as for `summaries`
-    summaries: FloatArray,
-) -> int:
-    """Draw and measure generations of random paths, each independent of the others.
-
-    Returns:
-        The generation reached: an earlier one if the words did not suffice.
-    """
-    words, choices, world, population = borrowed((words, choices, world, population))
-    found, summaries, at = *borrowed((found, summaries)), 0
-    for generation in range(first + 1, last + 1):
-        count = walk_all(words[at:], num_words, more_words, choices, ends, erase, population.paths)
-        if count < 0:
-            return generation - 1
-        at += count
-        counts[generation - first - 1] = count
-        measure_all(population.paths, world, weights, population.results)
-        note(population, generation % len(summaries), found, summaries)
+    for own in range(trial, last):
+        before, k = draws.taken[0], own % len(paths)
+        copy_path(paths[k], path)
+        mutate(draws, world, erase, path, scratch)
+        if used_up(draws):
+            draws.taken[0] = before
+            return own
+        measure(path, world, weights, values, 0)
+        if values[COST, 0] <= results[COST, k]:
+            copy_path(path, paths[k])
+            for row in range(RESULTS):
+                results[row, k] = values[row, 0]
     return last

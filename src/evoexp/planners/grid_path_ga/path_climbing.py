@@ -70,7 +70,7 @@ class _Climbing(PathTable):
     def __init__(self, planner: GridPathGa, problem: Problem, num_paths: int) -> None:
         super().__init__(planner.ga, PER_CALL)
         self.make_table(problem.world, num_paths)
-        self._draws, self._trial, self._is_used_up = Draws(BLOCK), 0, True
+        self._draws = Draws(BLOCK)
         self._planner, self._problem, self._num_paths = planner, problem, num_paths
         width = problem.fields.grid.num_nodes + 1
         candidate = Population(np.empty((1, width), dtype=np.int32), np.empty((RESULTS, 1)))
@@ -91,27 +91,16 @@ class _Climbing(PathTable):
         """Make the trials of generations; draw more numbers whenever they do not suffice."""
         self.states, num_trials = [], self._ga.num_offspring
         task = self._problem.world, self._planner.objective.weights, not self._planner.revisits
-        candidate, scratch = self._scratch
-        while first < last:
-            if self._is_used_up:
-                self._draws.extend(rng)
-            self._trial = kernels.climb(
-                self._draws.block,
-                self._trial,
-                first,
-                last,
-                num_trials,
-                *task,
-                self._paths,
-                candidate,
-                scratch,
-                self.recorded,
-                self.summaries,
-            )
-            is_complete = self._trial == last * num_trials
-            reached = last if is_complete else self._trial // num_trials
-            self.states += [state_bytes(rng.bit_generator)] * (reached - first)
-            first, self._is_used_up = reached, not is_complete
+        for generation in range(first, last):
+            trial, stop = generation * num_trials, (generation + 1) * num_trials
+            while trial < stop:
+                block = self._draws.block
+                trial = kernels.climb(block, trial, stop, *task, self._paths, *self._scratch)
+                if trial < stop:
+                    self._draws.extend(rng)
+            place = (generation + 1) % self.num_places
+            kernels.note(self._paths, place, self.recorded, self.summaries)
+            self.states.append(state_bytes(rng.bit_generator))
         return last
 
     def population(self, index: int) -> NodeArray:

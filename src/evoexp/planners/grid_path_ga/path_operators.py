@@ -9,10 +9,8 @@ import numpy as np
 
 from evoexp.numeric.compilation import copy_part, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
-from evoexp.paths.grid_choices import Choices
-from evoexp.paths.grid_measures import Tolls
-from evoexp.paths.grid_walks import erase_loops, walk
-from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
+from evoexp.paths.grid_walks import SumArray, erase_loops, walk
+from evoexp.paths.grids import Moves, NodeArray, spread_front
 from evoexp.records import FloatArray, IntArray
 
 NOT_CONNECTED, CONNECTED = -1, -2
@@ -28,11 +26,10 @@ class World(NamedTuple):
     coordinates: NodeArray  # (nodes, dimensions)
     kinds: NodeArray
     unsafeness: FloatArray  # (nodes,)
-    tolls: Tolls  # the same two in whole numbers, whose sums are exact in any order
     potentials: FloatArray  # (≥ greatest number of steps + 1,) toward a target after so many steps
-    # (nodes, nodes) steps to every node from every other; (0, nodes) on large grids
-    fronts: StepArray
-    choices: Choices  # of walks to all nodes; without rows where they do not fit
+    # (targets, nodes, moves) of `weigh_all` toward every node; (0, nodes, moves) on large grids and
+    # where they are no small whole numbers
+    sums: SumArray
 
 
 class Breeding(NamedTuple):
@@ -289,7 +286,7 @@ def connection(draws: Block, neighbours: NodeArray, one: int, two: int) -> int:
 @kernel
 def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Scratch) -> None:
     """Replace the piece between two nodes of a path, drawn at random, by a random walk."""
-    neighbours, potentials, fronts = world.neighbours, world.potentials, world.fronts
+    neighbours, steps = world.neighbours, scratch.steps
     joined, walked, place = scratch.joined, scratch.walked, scratch.place
     # two different nodes
     count = path[0]
@@ -299,17 +296,10 @@ def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Sc
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
     # a walk from one to the other
-    target = np.int64(ends[1])
-    choices = Choices(world.choices.entries[target : target + 1], world.choices.slots)
-    if len(choices.entries) == 0 and len(fronts) > 0:
-        moves = Moves(neighbours, potentials, fronts[target])
-        walk(draws, moves, choices, ends, erase, walked, place)
-    else:
-        if len(choices.entries) == 0:
-            sources = path[high : high + 1]
-            spread_front(neighbours, world.num_moves, sources, scratch.steps, scratch.queue)
-        near = Moves(neighbours, potentials, scratch.steps)
-        walk(draws, near, choices, ends, erase, walked, place)
+    sums = world.sums[ends[1] : ends[1] + 1]
+    if len(sums) == 0:
+        spread_front(neighbours, world.num_moves, path[high : high + 1], steps, scratch.queue)
+    walk(draws, Moves(neighbours, world.potentials, steps), sums, ends, erase, walked, place)
     if used_up(draws):
         return
     # head, walk and tail

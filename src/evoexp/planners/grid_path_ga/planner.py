@@ -20,12 +20,10 @@ from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.random_stream import DrawnAhead, Draws, used_up
+from evoexp.numeric.random_stream import Draws, used_up
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_choices import Choices, choice_table, choices_of
-from evoexp.paths.grid_measures import Tolls
-from evoexp.paths.grid_walks import LANES, WORDS, walk, walk_all
-from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
+from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all
+from evoexp.paths.grids import UNREACHED, Moves, NodeArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
@@ -40,7 +38,7 @@ from evoexp.planners.grid_path_ga.kernels import (
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
-from evoexp.planners.planner import JudgementArrays, PlannerDefaults, judged_samples
+from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.planners.table_search import ScaledSearch
 from evoexp.records import Block, FloatArray
@@ -48,15 +46,14 @@ from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
-FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out once: at most 8 MB
-FEWER_NODES = 1200  # and the choices of walks between them: at most 6 MB
-MOST_PATTERNS = 4096  # of their weights
+FEW_NODES = 1200  # weights of moves toward all nodes of smaller grids are kept: 12 MB of a floor
+MOST_NODES = 2**15  # of a grid whose first paths walkers draw in turns
+MOST_WEIGHT = 256  # of the moves of a node of such a grid
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 KEPT = 2  # generations whose paths are in memory
 PER_CALL = 8  # generations; see `ScaledSearch`: another number needs another revision
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
 MORE_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
-DRAWN_PER_CALL = 16  # generations of random search, whose words take less than a megabyte
 BLOCK = 16384  # uniform numbers drawn at once, at least
 
 
@@ -65,7 +62,7 @@ class Problem(NamedTuple):
 
     fields: Fields  # grid, unsafeness, potentials
     moves: Moves  # the moves of walks to the goal, and their weights
-    choices: Choices  # the same as a table, see `grid_choices.choice_table`
+    sums: SumArray  # (nodes, moves) of these weights; (0, moves) where walkers do not take turns
     ends: tuple[int, int]  # indices of start and goal
     world: World  # grid and fields, as the kernels take them
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
@@ -111,16 +108,10 @@ class GridPathGa(PlannerDefaults, Component):
         """Yield the population of random paths, then every generation."""
         return _Search(self, problem).blocks(rng)
 
-    def random_blocks(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
-        """Yield generations of random paths as `random_search` does, many per call of a kernel."""
-        if len(problem.choices.entries) and self.ga.num_offspring:
-            return _RandomPaths(self, problem).blocks(rng)
-        return judged_samples(self, problem, rng)
-
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
-        if len(problem.choices.entries):
+        if len(problem.sums):
             self._fill(problem, rng, paths)
         else:
             self._fill_one_by_one(problem, rng, paths)
@@ -128,18 +119,18 @@ class GridPathGa(PlannerDefaults, Component):
 
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths, from the start with more words if some lack."""
-        counts = problem.num_words(len(paths)), MORE_WORDS
-        ends, erases = problem.ends, not self.revisits
-        words = rng.bit_generator.random_raw(counts[0])
-        while walk_all(words, *counts, problem.choices, ends, erases, paths) < 0:
+        first, moves, ends = problem.num_words(len(paths)), problem.moves, problem.ends
+        walks = first, MORE_WORDS, moves.neighbours, problem.sums, ends, not self.revisits
+        words = rng.bit_generator.random_raw(first)
+        while walk_all(words, *walks, paths) < 0:
             words = np.concatenate([words, rng.bit_generator.random_raw(MORE_WORDS)])
 
     def _fill_one_by_one(
         self, problem: Problem, rng: np.random.Generator, paths: NodeArray
     ) -> None:
-        """Fill a table of paths where the weights of moves allow no table of choices."""
+        """Fill a table of paths where walkers do not take turns."""
         draws, place = Draws(BLOCK), np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
-        task = problem.moves, problem.choices, problem.ends, not self.revisits
+        task = problem.moves, problem.world.sums[:0], problem.ends, not self.revisits
         for path in paths:
             before = draws.block.taken.item(0)
             walk(draws.block, *task, path, place)
@@ -236,7 +227,7 @@ class _Search(PathTable, ScaledSearch):
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
-        ScaledSearch.__init__(self, ga, kernels.evolve, PER_CALL, BLOCK)
+        ScaledSearch.__init__(self, ga, PER_CALL, BLOCK)
         self.make_table(problem.world, size)
         self._planner, self._problem = planner, problem
         self._table = Population(
@@ -249,8 +240,7 @@ class _Search(PathTable, ScaledSearch):
             planner.crossover_reach,
             ga.mutation_rate,
         )
-        world, records = (problem.world, planner.objective.weights), (self.recorded, self.summaries)
-        self.arguments = *world, breeding, self._table, self.chosen, Scratch.of(nodes), *records
+        self._settings, self._scratch = (planner.objective.weights, breeding), Scratch.of(nodes)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
@@ -260,58 +250,25 @@ class _Search(PathTable, ScaledSearch):
         results[:] = self._planner.measured(self._problem, paths)
         kernels.note(Population(paths, results), 0, self.recorded, self.summaries)
 
+    def breed(self, generation: int) -> bool:
+        """Compute the generation behind one, and note what is recorded of it."""
+        paths, results = self._table
+        present, following = (
+            Population(paths[g % KEPT], results[g % KEPT]) for g in (generation, generation + 1)
+        )
+        populations, world = (present, following), self._problem.world
+        suffices = kernels.advance(
+            self.draws.block, world, *self._settings, *populations, self.chosen, self._scratch
+        )
+        if suffices:
+            place = (generation + 1) % self.num_places
+            kernels.note(following, place, self.recorded, self.summaries)
+        return bool(suffices)
+
     def population(self, index: int) -> NodeArray:
         """Return the paths of one of the generations computed last, without rests of rows."""
-        kept = len(self._table.paths)
-        paths: NodeArray = self._table.paths[index % kept]
-        return trimmed(paths) if index > self.reached - kept else paths[:0]
-
-
-class _RandomPaths(PathTable):
-    """One run of random search: generations of paths that have nothing to do with each other."""
-
-    def __init__(self, planner: GridPathGa, problem: Problem) -> None:
-        super().__init__(planner.ga, DRAWN_PER_CALL)
-        self._planner, self._problem = planner, problem
-
-    def begin(self, rng: np.random.Generator) -> None:
-        """Draw and measure as many paths as the planner draws at first."""
-        drawn = self._planner.sample(self._problem, rng, self._ga.population_size)
-        self._paths = Population(drawn, self._planner.measured(self._problem, drawn))
-        self.make_table(self._problem.world, len(drawn))
-        kernels.note(self._paths, 0, self.recorded, self.summaries)
-
-    def _make_room(self, rng: np.random.Generator) -> None:
-        """Make the tables of all generations but the first, and draw words ahead for them."""
-        problem, size = self._problem, self._ga.num_offspring
-        self.make_table(problem.world, size)
-        self._paths = Population(
-            np.empty((size, problem.fields.grid.num_nodes + 1), dtype=np.int32),
-            np.empty((RESULTS, size)),
-        )
-        self._counts = np.empty(self.num_places, dtype=np.int64)
-        counts = problem.num_words(size), MORE_WORDS
-        self._words = DrawnAhead(rng, counts[0], rng.bit_generator.random_raw)
-        walks = *counts, problem.choices, problem.ends, not self._planner.revisits
-        judging = problem.world, self._planner.objective.weights, self._paths
-        self._arguments = *walks, *judging, self._counts, self.recorded, self.summaries
-
-    def go_on(self, rng: np.random.Generator, first: int, last: int) -> int:
-        """Draw generations as far as the words suffice, one at least."""
-        if first == 0:
-            self._make_room(rng)
-        reached, steps = first, last - first
-        while reached == first:
-            words = self._words.draw(steps)
-            reached = kernels.draw_generations(words, first, last, *self._arguments)
-            steps += 1
-        self.states = self._words.take(self._counts[: reached - first].tolist())
-        return reached
-
-    def population(self, index: int) -> NodeArray:
-        """Return the paths of the generation drawn last, without rests of rows."""
-        paths = self._paths.paths
-        return trimmed(paths) if index == self.reached else paths[:0]
+        paths: NodeArray = self._table.paths[index % KEPT]
+        return trimmed(paths) if index > self.reached - KEPT else paths[:0]
 
 
 def trimmed(paths: NodeArray) -> NodeArray:
@@ -353,34 +310,44 @@ def _prepared(
             f"{between} are between"
         )
         raise SettingError("scenario.goal", must, list(scenario.goal))
-    fronts = _fronts(fields)
     world = World(
         own.neighbours,
         fields.num_moves,
         own.coordinates,
         own.kinds,
         fields.unsafeness,
-        Tolls.of(own.kinds, fields.unsafeness),
         fields.potentials,
-        fronts,
-        _choices(fields, fronts),
+        _weigh_moves(fields),
     )
     moves = Moves(own.neighbours, fields.potentials, steps)
-    return Problem(fields, moves, choice_table(moves), (start, goal), world, bodies, margin)
+    return Problem(fields, moves, _goal_sums(moves), (start, goal), world, bodies, margin)
 
 
-def _fronts(fields: Fields) -> StepArray:
-    """Return the steps between all nodes (nodes, nodes); (0, nodes) on large grids."""
-    nodes = fields.grid.num_nodes
-    fronts = np.empty((nodes if nodes <= FEW_NODES else 0, nodes), dtype=np.int16)
-    queue, source = np.empty(nodes, dtype=np.int32), np.empty(1, dtype=np.int32)
-    for node, steps in enumerate(fronts):
-        source[0] = node
-        spread_front(fields.grid.neighbours, fields.num_moves, source, steps, queue)
-    return fronts
+def _weigh_moves(fields: Fields) -> SumArray:
+    """Return the sums of the weights of moves toward every node, (targets, nodes, moves).
+
+    There are no targets on large grids, nor where the sums are no whole numbers of 8 bits.
+    """
+    grid, potentials = fields.grid, fields.potentials
+    nodes, moves = grid.neighbours.shape
+    tables = np.empty((nodes if nodes <= FEW_NODES else 0, nodes, moves), dtype=np.uint8)
+    steps, queue = (np.empty(nodes, dtype=np.int32) for _ in range(2))
+    for node, table in enumerate(tables):
+        source = np.array([node], dtype=np.int32)
+        spread_front(grid.neighbours, fields.num_moves, source, steps, queue)
+        sums = weigh_all(Moves(grid.neighbours, potentials, steps))
+        table[:] = sums
+        if not np.array_equal(table, sums):
+            return tables[:0]
+    return tables
 
 
-def _choices(fields: Fields, fronts: StepArray) -> Choices:
-    """Return the choices of walks to all nodes; without rows where they do not fit."""
-    few = fronts if len(fronts) <= FEWER_NODES else fronts[:0]
-    return choices_of(fields.grid.neighbours, fields.potentials, few, MOST_PATTERNS)
+def _goal_sums(moves: Moves) -> SumArray:
+    """Return the sums of the weights of moves toward the goal, (nodes, moves).
+
+    There are no nodes on large grids, nor where the sums are no small whole numbers: there walkers
+    do not take turns.
+    """
+    sums = weigh_all(moves)
+    fits = len(sums) <= MOST_NODES and sums.max() <= MOST_WEIGHT and (sums == np.floor(sums)).all()
+    return sums[: len(sums) if fits else 0].astype(np.uint16)

@@ -41,53 +41,22 @@ class Population(NamedTuple):
 
 
 @kernel
-def evolve(
+def advance(
     draws: Block,  # uniform numbers
-    first: int,  # the present generation
-    last: int,  # the generation to reach
     breeding: Breeding,  # settings of the operators
     coding: Coding,  # the meaning of strings
     model: Model,  # task, weights and limits of the criteria
-    table: Population,  # some generations; number g is at place g modulo the number of places
-    chosen: SelectionMemory,  # parents and elites, written
-    summaries: FloatArray,  # (places, 4) written, see `summarise_rows`
-) -> int:
-    """Go on from one generation to another.
-
-    Returns:
-        The generation reached: an earlier one if the draws did not suffice. Then it is to go on
-        there with more.
-    """
-    draws, coding, model, table, chosen, summaries = borrowed(
-        (draws, coding, model, table, chosen, summaries)
-    )
-    strings, rows = table.strings, table.rows
-    for generation in range(first, last):
-        before, own = draws.taken[0], generation % len(strings)
-        other = (generation + 1) % len(strings)
-        population = Population(strings[own], rows[own])
-        following = Population(strings[other], rows[other])
-        if not advance(draws, breeding, coding, model, population, following, chosen):
-            draws.taken[0] = before
-            return generation
-        summarise_rows(rows[other], summaries[other])
-    return last
-
-
-@kernel
-def advance(
-    draws: Block,
-    breeding: Breeding,
-    coding: Coding,
-    model: Model,
     population: Population,
-    following: Population,
-    chosen: SelectionMemory,
+    following: Population,  # written
+    chosen: SelectionMemory,  # parents and elites, written
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
     Returns whether the draws sufficed; if not, what is written is not complete.
     """
+    draws, coding, model, population, following, chosen = borrowed(
+        (draws, coding, model, population, following, chosen)
+    )
     strings, rows, children = population.strings, population.rows, following.strings
     parents, elites, bits, count = chosen.parents, chosen.elites, coding.bits, len(chosen.parents)
     if not choose_parents(draws, rows[GENES + COST], breeding.multiple, chosen):
@@ -118,10 +87,10 @@ def judge(strings: IntArray, coding: Coding, model: Model, count: int, rows: Flo
 
 
 @kernel
-def summarise_rows(rows: FloatArray, out: FloatArray) -> None:
+def summarise_rows(rows: FloatArray, summary: FloatArray) -> None:
     """Write index of the best, mean and deviation of the costs, number of feasible postures."""
-    out[0], out[1], out[2] = cost_statistics(rows[GENES + COST])
-    feasible = 0
+    summary[0], summary[1], summary[2] = cost_statistics(rows[GENES + COST])
+    num_feasible = 0
     for k in range(rows.shape[1]):
-        feasible += rows[ROWS - 1, k] >= 0.0
-    out[3] = feasible
+        num_feasible += rows[ROWS - 1, k] >= 0.0
+    summary[3] = num_feasible

@@ -177,7 +177,7 @@ class _Search(ScaledSearch):
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
         ga, size = planner.ga, planner.ga.population_size
-        super().__init__(ga, kernels.evolve, PER_CALL, BLOCK)
+        super().__init__(ga, PER_CALL, BLOCK)
         self._planner, self._problem = planner, problem
         self._judging = planner.strings_of(problem), problem.model
         self._table = Population(
@@ -186,7 +186,7 @@ class _Search(ScaledSearch):
         )
         self.costs = self._table.rows[:, FIRST_CRITERION]
         breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
-        self.arguments = breeding, *self._judging, self._table, self.chosen, self.summaries
+        self._settings = breeding, *self._judging
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
@@ -194,6 +194,19 @@ class _Search(ScaledSearch):
         strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
         kernels.judge(strings, *self._judging, strings.shape[1], rows)
         kernels.summarise_rows(rows, self.summaries[0])
+
+    def breed(self, generation: int) -> bool:
+        """Compute the generation behind one, and summarise it."""
+        (strings, rows), num = self._table, self.num_places
+        present, following = (
+            Population(strings[g % num], rows[g % num]) for g in (generation, generation + 1)
+        )
+        suffices = kernels.advance(
+            self.draws.block, *self._settings, present, following, self.chosen
+        )
+        if suffices:
+            kernels.summarise_rows(following.rows, self.summaries[(generation + 1) % num])
+        return bool(suffices)
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return angles, criteria and whether the posture is feasible."""

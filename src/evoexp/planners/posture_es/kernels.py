@@ -225,22 +225,12 @@ def breed(
             offspring[k, n] = min(max(offspring[k, n] + step, limits[k, 0]), limits[k, 1])
         if rate > 0.0:
             origin[n] = nearest_parent(offspring, n, parents, num_parents, scope)
-    draw_immigrants(uniforms[u:], num_bred, strategy, members, memory)
-
-
-@kernel
-def draw_immigrants(
-    uniforms: FloatArray, first: int, strategy: Strategy, members: Members, memory: Memory
-) -> None:
-    """Write offspring from index `first` on, uniform within the limits, and their parents."""
-    offspring, limits, u = memory.offspring, strategy.limits, 0
-    for n in range(first, offspring.shape[1]):
-        for k in range(len(limits)):
+    # immigrants (Algorithm 1, the set Q)
+    for n in range(num_bred, offspring.shape[1]):
+        for k in range(nq):
             offspring[k, n] = limits[k, 0] + (limits[k, 1] - limits[k, 0]) * uniforms[u]
             u += 1
-        memory.origin[n] = nearest_parent(
-            offspring, n, members.postures, members.size, strategy.scope
-        )
+        origin[n] = nearest_parent(offspring, n, parents, num_parents, scope)
 
 
 @kernel

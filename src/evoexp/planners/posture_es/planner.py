@@ -32,7 +32,7 @@ from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, Po
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing, joint_names, of_limits, of_place
 from evoexp.planners.moveit_tasks import hull_notes
-from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
+from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
@@ -48,21 +48,6 @@ from evoexp.validation import Component, NonNegativeCount, Positive
 TERM_VALUES = 60  # numbers kept for an individual: terms, and what the kernels note of it
 DENSE = 50  # configurations per step at which tilts of the continuous motion are sampled
 OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
-
-
-class Judgement:
-    """Postures, judged by the first phase."""
-
-    def __init__(
-        self, rows: FloatArray, feasible: np.ndarray, met: np.ndarray, chosen: tuple[int, ...]
-    ) -> None:
-        self.cost = np.where(feasible, rows[COST], np.inf)
-        self.rows, self.feasible, self.collision_queries = rows, met, rows.shape[1]
-        self._chosen = chosen
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the terms of one posture by name."""
-        return named(self.rows[:, individual], self._chosen)
 
 
 def _one_or_several(value: Any) -> Any:
@@ -123,7 +108,7 @@ class PostureEs(PlannerDefaults, Component):
         low, high = problem.limits.T
         return np.asarray(low[:, None] + (high - low)[:, None] * rng.random((len(low), count)))
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge postures (nq, individuals) by the first phase."""
         stage = problem.begin(0, problem.start, problem.first_situation)
         judged = stage.judge(population)
@@ -132,7 +117,9 @@ class PostureEs(PlannerDefaults, Component):
             Proofs(self, problem).settle(met, lambda k: self.solution(problem, population, k))
             refuted = judged.met & ~np.isfinite(met)
             judged.feasible[refuted] = judged.met[refuted] = False
-        return Judgement(*judged, self.chosen)
+        cost = np.where(judged.feasible, judged.cost, np.inf)
+        terms = {COLUMNS[k]: judged.rows[k] for k in self.chosen} | {"cost": judged.cost}
+        return JudgementArrays(cost, judged.met, len(cost), terms)
 
     def _proves(self, problem: Problem, stage: Stage) -> Callable[[FloatArray, FloatArray], bool]:
         """Return the proof of the way from a parent (nq,) to its child in a phase."""

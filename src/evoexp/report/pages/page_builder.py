@@ -64,9 +64,7 @@ class PageBuilder:
             tables=tuple(self.tables(entry.get("tables", ()))),
             checks=tuple(self.checks(entry.get("checks", ()))),
             comparisons=tuple(self.comparisons(entry)),
-            drawings=tuple(
-                drawing for name in entry.get("figures", ()) for drawing in self.drawings(name)
-            ),
+            drawings=tuple(self.figures(entry.get("figures", ()))),
         )
 
     def quantities(self, names: Sequence[str]) -> Iterator[Quantity]:
@@ -150,6 +148,15 @@ class PageBuilder:
             names, _, items = str(entry["each"]).rpartition(" in ")
             scopes = [_bound(own, names.split(", "), item) for item in own.value(items)]
         return (each for each in scopes if "when" not in entry or each.value(entry["when"]))
+
+    def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
+        """Yield the figures in order; of a list of them those of each item together."""
+        for name in names:
+            if isinstance(name, str):
+                yield from self.drawings(name)
+            else:
+                for together in zip(*map(self.drawings, name), strict=True):
+                    yield from together
 
     def drawings(self, name: str) -> Iterator[Drawing]:
         """Yield a figure, or one of each item."""
@@ -243,7 +250,7 @@ def _values(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
 
 
 def _effects(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
-    found = rows_by_name(scope["compared"])
+    found = scope.value(entry["rows"]) if "rows" in entry else rows_by_name(scope["compared"])
     names = entry.get("of", {name: name for name in found})
     rows = {scope.text(shown): found[name] for name, shown in names.items() if found.get(name)}
     words = [scope.text(entry[key]) for key in ("first", "better") if key in entry]
@@ -266,7 +273,11 @@ def _shares(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
     return (sweep_figures.shares_drawing(results, scope["settings"], rows, caption, printed),)
 
 
-KINDS = {"values": _values, "effects": _effects, "shares": _shares}
+def _convergence(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
+    return (generic.cost_drawing(scope["results"]),)
+
+
+KINDS = {"convergence": _convergence, "values": _values, "effects": _effects, "shares": _shares}
 
 
 def _assumptions(file: PageFile, scope: Scope, entry: Entry) -> Page:
@@ -283,4 +294,5 @@ def _assumptions(file: PageFile, scope: Scope, entry: Entry) -> Page:
     results = scope.value(entry["conditions"]) if "conditions" in entry else scope["results"]
     found = map(headline, entry["headlines"])
     name = file.words.name
-    return assumptions.page(results, scope["settings"], file.rules, name, tuple(found))
+    page = assumptions.page(results, scope["settings"], file.rules, name, tuple(found))
+    return page._replace(quantities=generic.quantities(scope["results"]))

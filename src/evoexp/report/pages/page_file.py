@@ -54,7 +54,7 @@ import importlib
 import importlib.util
 import re
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from typing import Any, NamedTuple
 
@@ -191,12 +191,13 @@ def _check(file: PageFile, field: str) -> None:
             known = name in bound or is_column(name)
             for need in file.functions.needs.get(name, {name}) if known else (name,):
                 if need not in bound and not is_column(need):
-                    must = "a value or function" if need == name else f"an argument of {name}"
+                    must = "a value or function"
+                    must += "" if need == name else f" for this argument of {name}"
                     raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
     for page, entry in file.pages.items():
         for section in ("tables", "checks", "figures"):
             known_here = {*sections[section], *(SHARED_FIGURES if section == "figures" else ())}
-            for name in entry.get(section, ()):
+            for name in _flat(entry.get(section, ())):
                 if name not in known_here:
                     must, hint = f"one of the {section} of this file", nearest(name, known_here)
                     raise SettingError(f"{field}: pages.{page}.{section}", must, name, hint)
@@ -204,6 +205,12 @@ def _check(file: PageFile, field: str) -> None:
         if other not in {*file.pages, GENERIC}:
             must, hint = "a page of this file", nearest(other, file.pages)
             raise SettingError(f"{field}: pages.{page}.otherwise", must, other, hint)
+
+
+def _flat(names: Sequence[str | Sequence[str]]) -> Iterator[str]:
+    """Yield names, those of lists among them, too."""
+    for name in names:
+        yield from [name] if isinstance(name, str) else name
 
 
 def _entries(sections: Mapping[str, Any], field: str) -> Iterator[tuple[str, Mapping[str, Any]]]:

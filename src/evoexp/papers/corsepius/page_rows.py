@@ -1,6 +1,6 @@
 """Rows of the tables, and the runs of the figures, on the pages of Corsépius 2001."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -35,11 +35,6 @@ def is_sweep(results: kit.Results) -> bool:
 def obstructed(main: Conditions) -> Conditions:
     """Return the conditions whose obstacles stand."""
     return measures.among_obstacles(main)
-
-
-def obstructed_results(results: kit.Results, obstructed: Conditions) -> kit.Results:
-    """Return the results of these conditions alone."""
-    return results._replace(conditions=obstructed)
 
 
 def shown_task(obstructed: Conditions) -> Conditions:
@@ -103,11 +98,6 @@ def phased(main: Conditions) -> tuple[kit.ConditionResults, ...]:
     """Return the conditions that have several phases."""
     several = (c for c in main if len(measures.phase_names(c)) > 1)
     return measures.among_obstacles(tuple(several))
-
-
-def phased_results(results: kit.Results, phased: Conditions) -> kit.Results:
-    """Return the results of conditions with several phases alone."""
-    return results._replace(conditions=phased)
 
 
 def phase_rows(phased: Conditions, confidence: float) -> Iterator[tuple[object, ...]]:
@@ -262,35 +252,6 @@ def shares_are_shown(results: kit.Results, parents: tuple[Task, ...]) -> bool:
 def values_are_shown(scopes: tuple[Task, ...], parents: tuple[Task, ...]) -> bool:
     """Return whether efforts are drawn condition by condition."""
     return not (scopes or parents)
-
-
-def main_results(results: kit.Results) -> tuple[kit.Results]:
-    """Return the results without controls and references."""
-    return (results._replace(conditions=results.main),)
-
-
-def parent_counts() -> dict[str, Callable[[kit.ConditionResults], kit.Proportion]]:
-    """Return the shares that are drawn against the number of parents."""
-    return {"goal met": kit.success}
-
-
-def parent_efforts() -> dict[str, kit.Values]:
-    """Return the efforts that are drawn against the number of parents."""
-    return {"evaluations [-]": measures.evaluations}
-
-
-def size_counts() -> dict[str, Callable[[kit.ConditionResults], kit.Proportion]]:
-    """Return the shares that are drawn against the size."""
-    return {
-        "goal met": kit.success,
-        "of these: in contact between postures": measures.refuted,
-    }
-
-
-def size_efforts() -> dict[str, kit.Values]:
-    """Return the efforts that are drawn against the size."""
-    units = {"CPU time": "s"}
-    return {f"{name} [{units.get(name, '-')}]": values for name, values in METRICS.items()}
 
 
 def size_names(sizes: tuple[Task, ...]) -> list[str]:

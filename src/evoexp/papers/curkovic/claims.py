@@ -223,11 +223,6 @@ def joints_title(motion_figure: str) -> str:
     return "Fig. 9: link" if motion_figure == "8" else "Link"
 
 
-def played(condition: kit.ConditionResults) -> tuple[kit.PlayedRun, ...]:
-    """Return the best replicate, whose motion is shown."""
-    return (kit.PlayedRun(condition, condition.best_replicate),)
-
-
 def with_hall(results: kit.Results) -> kit.Results:
     """Return the results of method V under all numbers."""
     treated = (c for c in results.conditions if c.label.partition(", ")[0] == METHOD)

@@ -123,11 +123,6 @@ def _scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
     return [(scene, suffix if len(drawn) > 1 else "") for scene, suffix in drawn]
 
 
-def played(condition: ConditionResults) -> tuple[kit.PlayedRun, ...]:
-    """Return the best replicate, whose motion is shown."""
-    return (kit.PlayedRun(condition, condition.best_replicate),)
-
-
 def length_ratio(condition: ConditionResults) -> float:
     """Return the median length of paths over that of the straight line [-]."""
     return condition.spread("term_path_length_ratio").median

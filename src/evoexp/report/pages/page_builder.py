@@ -175,15 +175,16 @@ class PageBuilder:
         shown = scope.value(entry["shows"]) if "shows" in entry else ()
         bound = scope.inner(shown=shown)
         given = {
-            argument: bound.value(value) if isinstance(value, str) else value
-            for argument, value in entry.get("arguments", {}).items()
+            name: _argument(bound, value) for name, value in entry.get("arguments", {}).items()
         }
+        if "among" in entry:  # results of some conditions alone
+            given["results"] = scope["results"]._replace(conditions=scope.value(entry["among"]))
         functions = entry["functions"]
         pair = functions if isinstance(functions, list) else [functions]
         found = [self.file.function(path) for path in pair]
         table, draw = found if len(found) == 2 else found[0]
-        if "conditions" in entry:
-            conditions = scope.value(entry["conditions"])
+        if "conditions" in entry or "among" in entry:
+            conditions = scope.value(entry.get("conditions") or entry["among"])
         elif shown:
             conditions = [one.condition for one in shown]
         else:
@@ -205,6 +206,13 @@ class PageBuilder:
             ),
             columns=entry.get("columns", ""),
         )
+
+
+def _argument(scope: Scope, value: Any) -> Any:
+    """Return an argument: the value of a name, functions by their texts, or a number itself."""
+    if isinstance(value, Mapping):
+        return {scope.text(text): scope.function(name) for text, name in value.items()}
+    return scope.value(value) if isinstance(value, str) else value
 
 
 def _bound(scope: Scope, names: Sequence[str], item: Any) -> Scope:
@@ -240,6 +248,8 @@ def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
 
 def _values(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
     results = scope["results"]
+    if "among" in entry:
+        results = results._replace(conditions=scope.value(entry["among"]))
     every = {scope.text(name): scope[of] for name, of in entry["of"].items()}
     values = {  # without those that no run has
         name: of

@@ -44,6 +44,8 @@ Its entry points `evoexp.pages` name the file: `my_paper = "my_paper:page.yaml"`
         caption: "Share of runs that took so many attempts, with Wilson's {level:g} % interval."
         columns: "Columns attempts, having, …"  # of its table, for the file beside it
         functions: figures.attempts.ATTEMPTS    # table and drawing, or the names of both
+        arguments: {efforts: {"evaluations [-]": evaluations}}  # that are no values of their name
+        among: main                   # shows the results of these conditions alone
 
 Words in braces are values and functions by name (`page_scope`), written as `markdown.filled`
 does. `each: x in xs` repeats an entry for all items, `when: name` leaves it out where the value is
@@ -81,10 +83,21 @@ KEYS: dict[str, set[str]] = {
     "checks": {"title", "finding", "each", "when", "rows"},
     "figures": {"title", "caption", "columns", "stem", "functions", "arguments", "options"}
     | {"each", "when", "conditions", "plays", "shows", "kind", "of", "rows", "first", "better"}
-    | {"printed"},
+    | {"printed", "among"},
 }
 _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
-_NAMED = ("fits", "when", "rows", "values", "judge", "families", "conditions", "plays", "shows")
+_NAMED = (
+    "fits",
+    "when",
+    "among",
+    "rows",
+    "values",
+    "judge",
+    "families",
+    "conditions",
+    "plays",
+    "shows",
+)
 _TEXTS = ("title", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (
     "results",

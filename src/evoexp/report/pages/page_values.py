@@ -1,5 +1,6 @@
 """Values that every page may name: the parts of its results and settings, its comparisons."""
 
+from evoexp.report.pages.page_parts import PlayedRun
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
@@ -61,3 +62,8 @@ def samples(settings: ReportSettings) -> int:
 def whole(conditions: tuple[ConditionResults, ...]) -> tuple[Family, ...]:
     """Return the first condition against all others."""
     return (Family.of(conditions),)
+
+
+def played(condition: ConditionResults) -> tuple[PlayedRun, ...]:
+    """Return the best replicate, whose motion a figure shows."""
+    return (PlayedRun(condition, condition.best_replicate),)

@@ -169,7 +169,7 @@ def known_groups(groups: tuple[Group, ...]) -> list[Group]:
 
 
 def best_known(group: Group) -> dict[str, object]:
-    """Return what is told of the best path that the reference knows."""
+    """Return the numbers of the best path that the reference knows, by name."""
     assert group.truth is not None
     (best,) = group.best_path
     length, unsafeness, exact = (

@@ -53,7 +53,7 @@ def free_at_via_points(
 
 
 def assumed_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
-    """Judge the same under assumed numbers."""
+    """Judge that the motion is free at the via-points, under assumed numbers."""
     return _free(judge, condition, "", ASSUMED)
 
 
@@ -127,7 +127,7 @@ def evolution(
 def assumed_evolution(
     judge: kit.Judge, condition: kit.ConditionResults, controls: Controls
 ) -> kit.Claim:
-    """Judge the same under assumed numbers."""
+    """Judge what evolution adds to every control, under assumed numbers."""
     told, rows = measures.evolution_told(judge, condition, controls)
     return judge.on("evolution_adds", who="").better_than_all(told, rows)
 

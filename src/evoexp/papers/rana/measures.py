@@ -108,7 +108,7 @@ def planar_scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
 
 
 def spatial_scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
-    """Return the same of scenes in space."""
+    """Return all conditions of each scene in space, and the end of its figure's stem."""
     return [(scene, suffix) for scene, suffix in _scenes(results) if spatial(scene.with_data[0])]
 
 

@@ -114,7 +114,7 @@ SHARED_FIGURES = ("best", "convergence")  # of every page, see `generic`
 
 
 class PageFile(NamedTuple):
-    """What a paper's `page.yaml` says, with its functions and the rules of its claims."""
+    """The content of a paper's `page.yaml`, with its functions and the rules of its claims."""
 
     words: PageWords  # its name, and all entries
     functions: Functions  # of the paper, and of every page

@@ -80,7 +80,7 @@ class Scope(Mapping[str, Any]):
         self._inner: dict[tuple[tuple[str, int], ...], Scope] = {}
 
     def inner(self, **items: Any) -> "Scope":
-        """Return the scope in which items are bound; the same one for the same items."""
+        """Return the scope in which items are bound, once for the same items."""
         key = tuple((name, id(item)) for name, item in items.items())
         return self._inner.setdefault(key, Scope(self.functions, items, self))
 
@@ -108,7 +108,7 @@ class Scope(Mapping[str, Any]):
         return known or (self.outer is not None and name in self.outer)
 
     def call(self, function: Callable[..., Any], **given: Any) -> Any:
-        """Return what a function returns for the values that its arguments name."""
+        """Call a function with the values that its arguments name."""
         for name, is_function in parameters(function).items():
             if name not in given:
                 given[name] = self.function(name) if is_function else self[name]
@@ -116,7 +116,7 @@ class Scope(Mapping[str, Any]):
         return tuple(found) if isinstance(found, Iterator) else found
 
     def function(self, name: str) -> Any:
-        """Return what gives the value of this name for any condition."""
+        """Return the function that gives the value of this name for any condition."""
         if CONDITION not in self.needs(name):
             return self[name]
         return lambda condition: self.inner(condition=condition)[name]

@@ -20,12 +20,8 @@ ROLES = (
     "planner.py",
     "kernels.py",
     "settings.py",
-    "page.py",
-    "sweep_page.py",
-    "assumptions_page.py",
     "measures.py",
     "claims.py",
-    "rules.py",
 )
 SOURCE = re.compile(r"# \[[^\]]+\] (paper: \S+|assumed)")
 

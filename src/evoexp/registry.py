@@ -3,8 +3,9 @@
 A package declares entry points in its metadata. Four groups are read:
 
 - `evoexp.components`: name → `module:class`, the components that a configuration may name;
-- `evoexp.pages`: name → `module:function`, the pages that `report.figures` may name;
-- `evoexp.claims`: paper → `module:RULES`, its claims with their rules (`report.claim_rules`);
+- `evoexp.pages`: name → `package:page.yaml`, or `module:function`, the pages that `report.figures`
+  may name;
+- `evoexp.claims`: paper → `package:claims.yaml`, its claims with their rules;
 - `evoexp.conf`: any name → `package:folder`, a folder of options (see `configuration.search_path`).
 
 A configuration is data; it can name registered components only, also when it comes out of somebody
@@ -18,6 +19,8 @@ import importlib.metadata
 import json
 import re
 from collections.abc import Iterator, Mapping
+from importlib import resources
+from importlib.resources.abc import Traversable
 from typing import Any, NamedTuple, cast
 
 from evoexp.errors import RegistrationError, SettingError, nearest
@@ -50,6 +53,12 @@ class Registration(NamedTuple):
     def module(self) -> str:
         """Module that the name's class or function is in."""
         return self.target.partition(":")[0]
+
+    @property
+    def file(self) -> Traversable | None:
+        """The file that the name stands for, in its package; None: it is an attribute."""
+        package, _, name = self.target.partition(":")
+        return resources.files(package).joinpath(name) if name.endswith(".yaml") else None
 
     def load(self) -> Any:
         """Import and return the class or function.

@@ -11,7 +11,7 @@ import pytest
 from composed import composed
 from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
-from evoexp.papers.chen.fields_page import (
+from evoexp.papers.chen.figures.printed_fields import (
     MISSING,
     SURPLUS,
     WRONG,

@@ -9,6 +9,7 @@ from command_samples import Evoexp
 from evoexp.commands.claim_list import KEYS, NOT_RUN
 from evoexp.configuration.search_path import options
 from evoexp.registry import CLAIMS, Registration, registrations
+from evoexp.report.statistics.claim_rules import registered_rules
 
 
 def test_a_claim_that_nothing_was_run_for_names_the_command(evoexp: Evoexp) -> None:
@@ -43,6 +44,6 @@ def test_an_unknown_paper_is_one_line(evoexp: Evoexp) -> None:
 
 @pytest.mark.parametrize("paper", registrations(CLAIMS), ids=lambda each: each.name)
 def test_every_experiment_that_a_rule_names_is_there(paper: Registration) -> None:
-    for rule in paper.load().values():
+    for rule in registered_rules(paper).values():
         assert rule.experiments, rule.name
         assert not set(rule.experiments) - set(options("experiment")), rule.name

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.papers.chen import path_claims
-from evoexp.papers.chen.fields_page import MISSING, SURPLUS, WRONG, compare
+from evoexp.papers.chen.figures.printed_fields import MISSING, SURPLUS, WRONG, compare
 from evoexp.papers.chen.path_claims import inside_points, routes, signature
 from report_samples import smoke_results
 
@@ -54,7 +54,7 @@ def test_rows_are_aligned_by_the_fewest_slips(printed: str, slips: list[tuple[in
 
 def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) -> None:
     results = smoke_results(outputs, "chen_path")
-    groups = path_claims.group_list(results)
+    groups = path_claims.groups(results)
     assert [(group.name, group.weights) for group in groups] == [
         ("(a)", (1, 0)),
         ("(b)", (0.1, 10)),

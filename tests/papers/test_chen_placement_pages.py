@@ -10,6 +10,7 @@ from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import placements
+from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.statistics import judging
 from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
@@ -62,12 +63,10 @@ def test_gaps_are_those_of_the_summaries(cases: list[Case]) -> None:
     )
 
 
-def test_verdicts_where_they_are_judged(
-    outputs: Path, cases: list[Case], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(placement_claims.judging, "not_judged", lambda _: "")
+def test_verdicts_where_they_are_judged(cases: list[Case]) -> None:
     settings = page_settings("chen_placement")
-    found = placement_claims.judge_cases(smoke_results(outputs, "chen_placement"), cases, settings)
+    judge = judging.Judge("", settings, read_page_file("evoexp.papers.chen").rules)
+    found = placement_claims.judge_cases(judge, cases)
     verdict = {one.text: one.verdict for one in found}
     assert (
         verdict["least torque norm: the best posture has a torque norm of 1.73"]

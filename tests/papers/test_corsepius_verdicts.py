@@ -14,7 +14,7 @@ import report_samples
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.corsepius import claims as paper_claims
 from evoexp.papers.corsepius import measures
-from evoexp.papers.corsepius.rules import RULES
+from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
@@ -29,6 +29,7 @@ from evoexp.report.statistics.judging import (
 from report_samples import REPORT
 from shipped_conditions import expanded
 
+RULES = read_page_file("evoexp.papers.corsepius").rules
 SETTINGS = ReportSettings(**REPORT, figures="corsepius")  # type: ignore[arg-type]
 RUNS = 40
 Effort = Callable[
@@ -168,41 +169,36 @@ def task_rows(having: dict[str, int], free: int = RUNS) -> Callable[[str], dict[
     return rows
 
 
-def judged(
-    name: str, rows: Callable[[str], dict[str, object]], monkeypatch: pytest.MonkeyPatch
-) -> dict[str, str]:
-    monkeypatch.setattr(judging, "not_judged", lambda results: "")
-    return {c.text: c.verdict for c in paper_claims.judge_tasks(made_up(name, rows), SETTINGS)}
+def judged(name: str, rows: Callable[[str], dict[str, object]]) -> dict[str, str]:
+    own = paper_claims.judge_tasks(Judge("", SETTINGS, RULES), made_up(name, rows))
+    return {c.text: c.verdict for c in own}
 
 
-def test_a_wall_that_a_subgoal_opens_is_a_local_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wall_that_a_subgoal_opens_is_a_local_minimum() -> None:
     text = "wall: the search gets stuck in a local minimum, which a sub-goal opens"
-    assert judged("corsepius_wall", task_rows({"wall": 0}), monkeypatch)[text] == REPRODUCED
-    assert judged("corsepius_wall", task_rows({}), monkeypatch)[text] == INCONCLUSIVE
-    assert (
-        judged("corsepius_wall", task_rows({"with a sub-goal": 0}), monkeypatch)[text]
-        == CONTRADICTED
-    )
+    assert judged("corsepius_wall", task_rows({"wall": 0}))[text] == REPRODUCED
+    assert judged("corsepius_wall", task_rows({}))[text] == INCONCLUSIVE
+    assert judged("corsepius_wall", task_rows({"with a sub-goal": 0}))[text] == CONTRADICTED
 
 
-def test_one_tilted_or_touching_path_contradicts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_tilted_or_touching_path_contradicts() -> None:
     name = "corsepius_pick_and_place"
     for free, expected in ((RUNS, REPRODUCED), (RUNS - 1, CONTRADICTED)):
-        found = judged(name, task_rows({}, free), monkeypatch)
+        found = judged(name, task_rows({}, free))
         assert found["pick and place: paths avoid obstacles"] == expected
         assert found["pick and place: the grasped object is not tilted"] == expected
 
 
-def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_certified_path_is_enough_for_redundant_arms() -> None:
     text = "The approach works for highly redundant arms"
     labels = [label for label, _ in conditions_of("corsepius_gate_narrow").conditions]
     nobody = dict.fromkeys(labels, 0)
-    assert judged("corsepius_gate_narrow", task_rows(nobody), monkeypatch)[text] == CONTRADICTED
+    assert judged("corsepius_gate_narrow", task_rows(nobody))[text] == CONTRADICTED
     one, in_empty_space = ({**nobody, label: 1} for label in labels[:2])
-    assert judged("corsepius_gate_narrow", task_rows(one), monkeypatch)[text] == REPRODUCED
-    found = judged("corsepius_gate_narrow", task_rows(in_empty_space), monkeypatch)
+    assert judged("corsepius_gate_narrow", task_rows(one))[text] == REPRODUCED
+    found = judged("corsepius_gate_narrow", task_rows(in_empty_space))
     assert found[text] == CONTRADICTED, "what happens without the gate is no evidence"
-    assert text not in judged("corsepius_pick_and_place", task_rows({}), monkeypatch)
+    assert text not in judged("corsepius_pick_and_place", task_rows({}))
 
 
 @pytest.mark.parametrize(
@@ -215,16 +211,14 @@ def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.Mon
     ],
 )
 def test_obstacles_are_judged_by_the_same_task_in_an_empty_scene(
-    having: dict[str, int], expected: str, monkeypatch: pytest.MonkeyPatch
+    having: dict[str, int], expected: str
 ) -> None:
     text = "The search gets stuck at obstacles: the same goals are met without them"
-    assert judged("corsepius_wall", task_rows(having), monkeypatch)[text] == expected
+    assert judged("corsepius_wall", task_rows(having))[text] == expected
 
 
-def test_empty_scenes_are_controls_and_make_no_claims_of_their_own(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found = judged("corsepius_gate_wide", task_rows({}), monkeypatch)
+def test_empty_scenes_are_controls_and_make_no_claims_of_their_own() -> None:
+    found = judged("corsepius_gate_wide", task_rows({}))
     assert found
     assert not [text for text in found if text.split(":")[0].endswith("empty scene")]
     results = made_up("corsepius_gate_wide", task_rows({}))
@@ -237,24 +231,22 @@ def test_empty_scenes_are_controls_and_make_no_claims_of_their_own(
 @pytest.mark.parametrize(
     ("having", "expected"), [(RUNS, REPRODUCED), (21, REPRODUCED), (20, CONTRADICTED)]
 )
-def test_goals_are_met_if_most_runs_meet_them(
-    having: int, expected: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_goals_are_met_if_most_runs_meet_them(having: int, expected: str) -> None:
     text = "wall: goals in work space are met without inverse kinematics"
-    assert judged("corsepius_wall", task_rows({"wall": having}), monkeypatch)[text] == expected
+    assert judged("corsepius_wall", task_rows({"wall": having}))[text] == expected
 
 
-def test_allowed_contacts_are_named_with_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_allowed_contacts_are_named_with_the_verdict() -> None:
     def rows(label: str) -> dict[str, object]:
         return task_rows({})(label) | {"allowed_contacts": ["table – bottle, hand – bottle"] * RUNS}
 
-    monkeypatch.setattr(judging, "not_judged", lambda results: "")
-    found = paper_claims.judge_tasks(made_up("corsepius_pick_and_place", rows), SETTINGS)
+    results = made_up("corsepius_pick_and_place", rows)
+    found = paper_claims.judge_tasks(Judge("", SETTINGS, RULES), results)
     told = next(c.evidence for c in found if c.name == "paths_avoid_obstacles")
     assert "may touch, 0.001 m deep at most: table – bottle, hand – bottle" in told
 
 
 def test_below_the_papers_budget_nothing_is_judged() -> None:
     results = made_up("corsepius_wall", task_rows({"wall": 0}))._replace(budget="smoke")
-    for claim in paper_claims.judge_tasks(results, SETTINGS):
+    for claim in paper_claims.judge_tasks(judging.judge(results, SETTINGS, RULES), results):
         assert claim.verdict.startswith(NOT_JUDGED)

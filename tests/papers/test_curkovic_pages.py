@@ -8,26 +8,35 @@ import pandas as pd
 import pytest
 
 from evoexp.configuration import compose
-from evoexp.papers.curkovic import (
-    hall_shares,
-    link_motions,
-    measures,
-    motion_page,
-    pareto_page,
-    sweep_page,
+from evoexp.papers.curkovic import compared_settings, hall_shares, link_motions, measures
+from evoexp.papers.curkovic.figures import (
+    link_intersection,
+    motion_curves,
+    pareto_fronts,
+    robot_motions,
 )
-from evoexp.papers.curkovic.figures import link_intersection, motion_curves, robot_motions
 from evoexp.report.pages import page_of
+from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Page
-from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import compare
+from evoexp.report.statistics.comparisons import FamilyComparison, compare, compare_families
+from evoexp.report.statistics.judging import Judge
 from evoexp.store.log_reader import read_log
 from report_samples import can_be_drawn, figure_stems, page_settings, smoke_report, smoke_results
+
+RULES = read_page_file("evoexp.papers.curkovic").rules
 
 
 def page(outputs: Path, name: str, figures: str | None = None) -> Page:
     return page_of(smoke_results(outputs, name), page_settings(name, figures))
+
+
+def compared(results: Results) -> tuple[FamilyComparison, ...]:
+    """Return all comparisons of a sweep, to a cost of 12."""
+    families = compared_settings.families(results)
+    quantities = compared_settings.sweep_measures(results, 12.0)
+    return compare_families(families, quantities, page_settings("curkovic_mutation"))
 
 
 def drawing(found: Page, stem: str) -> pd.DataFrame:
@@ -44,7 +53,7 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
     table = pd.read_csv(directory / "fig_5_fronts.csv")
     assert len(table) == 2 * 100
     for _, rows in table.groupby("population"):
-        values = rows[list(pareto_page.CRITERIA)].to_numpy()
+        values = rows[list(pareto_fronts.CRITERIA)].to_numpy()
         dominated = [
             any((other <= own).all() and (other < own).any() for other in values) for own in values
         ]
@@ -165,7 +174,7 @@ def test_three_radii_are_figure_11(outputs: Path) -> None:
     radii = trail[trail["element"] == "configuration"].groupby("link")["radius"].unique()
     assert [list(values) for values in radii] == [[0.02], [0.02], [0.04]]
     condition = smoke_results(outputs, "curkovic_safety").conditions[0]
-    lines = motion_page.tool_distance(condition)
+    lines = link_motions.tool_distance(condition)
     assert (lines >= condition.column("clearance")).all()  # bodies are thicker than lines
 
 
@@ -269,31 +278,28 @@ def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None
 
 def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
-    one, two = sweep_page.families(results)
+    one, two = compared_settings.families(results)
     assert [other.label for _, other in one.pairs] == [
         f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")
     ]
     assert {first.label for first, _ in two.pairs} == {"Eq. 10, symmetric"}
     assert all(other.label.endswith("symmetric") for _, other in two.pairs)
-    tested = sweep_page.tested(results, page_settings("curkovic_mutation"), 12.0)
-    judged = sweep_page.of_sweep(results, page_settings("curkovic_mutation"), tested)
+    judge = judging.judge(results, page_settings("curkovic_mutation"), RULES)
+    judged = compared_settings.of_sweep(judge, results, compared(results))
     assert [claim.text.rsplit("; ", 1)[1] for claim in judged] == [
         "Eq. 9 as printed",
         "Eq. 9 read as symmetric",
     ] * 3
 
 
-def test_verdicts_follow_the_rows_of_a_sweep(
-    outputs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
-    monkeypatch.setattr(judging, "not_judged", lambda results: "")
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
-    settings, found = page_settings("curkovic_mutation"), []
+    judge, found = Judge("", page_settings("curkovic_mutation"), RULES), []
     for first, second in ((low, high), (high, low), (low, low)):
         rows = tuple(compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
-        tested = [one._replace(rows=rows) for one in sweep_page.tested(results, settings, 12.0)[:1]]
-        (judged,) = sweep_page.of_sweep(results, settings, tested)
+        (first_one, *_) = compared(results)
+        (judged,) = compared_settings.of_sweep(judge, results, [first_one._replace(rows=rows)])
         found.append(judged.verdict)
         assert "constant 2 (A12" in judged.evidence
     assert found == [judging.REPRODUCED, judging.CONTRADICTED, judging.INCONCLUSIVE]
@@ -301,7 +307,7 @@ def test_verdicts_follow_the_rows_of_a_sweep(
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:
     results = smoke_results(outputs, "curkovic_stationary")
-    (twins,) = sweep_page.families(results)
+    (twins,) = compared_settings.families(results)
     assert [(a.label, b.label) for a, b in twins.pairs] == [("configurations only", "5 substeps")]
     found = page(outputs, "curkovic_stationary", "curkovic_sweep")
     assert found.claims == ()
@@ -309,7 +315,7 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
         heading.startswith("solved motion collides between") for heading, _ in found.comparisons
     )
     both = results._replace(conditions=results.conditions[::-1])  # whatever comes first
-    assert sweep_page.families(both)[0].pairs[0][1].label == "5 substeps"
+    assert compared_settings.families(both)[0].pairs[0][1].label == "5 substeps"
 
 
 def test_curves_show_three_defects(outputs: Path) -> None:

@@ -12,7 +12,7 @@ ANY = ("corsepius_assumptions",)  # pages that any planner may have
 FOREIGN = [
     page.name
     for page in registrations(PAGES)
-    if page.module.startswith("evoexp.papers.") and ".rana." not in page.module
+    if page.module.startswith("evoexp.papers.") and "papers.rana" not in page.module
     if page.name not in ANY
 ]
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers.lavoie import assumptions_page, measures
+from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.figures import reaching_motions, run_distributions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
@@ -86,7 +86,7 @@ def test_headline_claims_are_judged_under_every_other_number(outputs: Path) -> N
         *(outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, ""),
         experiment.options,
     )
-    page = assumptions_page.page(results, page_settings(name))
+    page = page_of(results, page_settings(name))
     effects, numbers = page.tables
     changed = {str(row[0]): row[1] for row in effects.rows}
     assert list(changed) == [label for label, _ in experiment.conditions]

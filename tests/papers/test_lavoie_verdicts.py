@@ -13,9 +13,9 @@ import pytest
 import report_samples
 from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment
-from evoexp.papers.lavoie import claims, measures, sweep_page
+from evoexp.papers.lavoie import claims, measures
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.papers.lavoie.rules import RULES
+from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
@@ -30,6 +30,7 @@ from evoexp.report.statistics.judging import (
 )
 from report_samples import REPORT, hearing
 
+RULES = read_page_file("evoexp.papers.lavoie").rules
 SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]
 
 
@@ -172,13 +173,11 @@ def test_motions_in_contact_contradict() -> None:
     certified = seven.summaries["certified"].copy()
     certified[:115] = False
     seven = dataclasses.replace(seven, summaries=seven.summaries.assign(certified=certified))
-    found = claims.free_of_collision(judge(results, SETTINGS, RULES), seven, Proportion(115, 1000))
+    found = claims.free_of_collision(judge(results, SETTINGS, RULES), seven)
     assert found.verdict == CONTRADICTED
     assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
-    assert (
-        claims.free_of_collision(judge(results, SETTINGS, RULES), ten, Proportion(0, 1000)).verdict
-        == REPRODUCED
-    )
+    free = claims.free_of_collision(judge(results, SETTINGS, RULES), ten)
+    assert free.verdict == REPRODUCED
 
 
 def test_what_is_overridden_or_too_few_is_not_judged() -> None:
@@ -204,7 +203,16 @@ def sweep(results: Results, in_contact: dict[str, int] | None = None) -> list[Cl
         )
         for c in results.conditions
     }
-    return list(sweep_page.judge_sweep(results, SETTINGS, refuted))
+    own = judge(results, SETTINGS, RULES)
+    return [
+        *claims.either_success(own, results),
+        *claims.precision(own, results),
+        *claims.generations(own, results),
+        *claims.coding(own, results),
+        *claims.blindness(own, results, lambda c: refuted[c.label]),
+        *claims.judge_controls(own, results),
+        *claims.positions(own, results, lambda c: refuted[c.label]),
+    ]
 
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evoexp.condition import Prepared
-from evoexp.papers.curkovic import link_motions, motion_page
+from evoexp.papers.curkovic import link_motions
 from evoexp.records import FloatArray
 from evoexp.report.results import motion_geometry
 from report_samples import expand
@@ -114,4 +114,4 @@ def test_the_distance_of_a_point_from_segments_is_that_of_a_dense_one() -> None:
     points, start, end = rng.normal(size=(3, 30, 2))
     share = np.linspace(0.0, 1.0, 4001)[:, None, None]
     dense = np.linalg.norm(points - (start + share * (end - start)), axis=2).min()
-    assert motion_page.to_segment(points, start, end) == pytest.approx(dense, abs=1e-5)
+    assert link_motions.to_segment(points, start, end) == pytest.approx(dense, abs=1e-5)

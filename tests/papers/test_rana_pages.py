@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp.papers.rana import measures, motions, operators_page, weights_page
+from evoexp.papers.rana import claims as paper_claims
+from evoexp.papers.rana import measures, motions
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.records import generations
 from evoexp.report.pages import page_of
@@ -80,7 +81,7 @@ def test_runs_without_a_free_individual_count_as_never(obstacles: Results) -> No
     ],
 )
 def test_a_part_improves_if_nothing_is_worse(says: list[int], expected: bool | None) -> None:
-    assert operators_page.improves(says) is expected
+    assert paper_claims.improves(says) is expected
 
 
 def test_unevenness_is_the_sum_over_arms(obstacles: Results) -> None:
@@ -96,7 +97,7 @@ def test_unevenness_is_the_sum_over_arms(obstacles: Results) -> None:
 
 def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
     (condition, *_) = smoke_results(outputs, "rana_crossover", *WORDS).conditions
-    shares = operators_page.kept_apart(condition)
+    shares = measures.kept_apart(condition)
     assert list(shares) == [0]  # three generations only
     planner, problem = condition.planner, motions.problem(condition)
     first = next(iter(generations(planner.evolve(problem, condition.condition.rng(0)))))
@@ -139,7 +140,7 @@ def test_the_page_of_the_weights_tells_what_a_collision_costs(outputs: Path) -> 
         np.linalg.norm(np.diff(q[a:b], axis=1), axis=0).sum() for a, b in ((0, 3), (3, 6))
     )
     place = list(printed.summaries.index).index(printed.best_replicate)
-    assert weights_page.length(printed)[place] == pytest.approx(by_hand, rel=1e-9)
+    assert measures.length(printed)[place] == pytest.approx(by_hand, rel=1e-9)
 
 
 def test_ablations_that_are_stored_judge_the_papers_page(

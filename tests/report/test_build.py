@@ -13,8 +13,8 @@ import pytest
 
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
+from evoexp.papers.rana import claims as rana_claims
 from evoexp.papers.rana import motions
-from evoexp.papers.rana import page as rana_page
 from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import swept_settings
@@ -346,13 +346,13 @@ def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> 
         results.conditions[0], condition=paper.conditions[0].condition, planned=20
     )
     judged = results._replace(budget="paper")
-    assert rana_page.not_judged(judged, condition) == ""
-    assert rana_page.not_judged(results, condition) == "budget smoke"
+    assert rana_claims.not_judged(judged, condition) == ""
+    assert rana_claims.not_judged(results, condition) == "budget smoke"
     assert (
-        rana_page.not_judged(judged, dataclasses.replace(condition, planned=3))
+        rana_claims.not_judged(judged, dataclasses.replace(condition, planned=3))
         == "3 of 20 replicates planned"
     )
-    assert rana_page.not_judged(
+    assert rana_claims.not_judged(
         judged, dataclasses.replace(results.conditions[0], planned=20)
     ).startswith("overridden: ga.")
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp.papers.rana import page as rana_page
+from evoexp.report.pages import page_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.claim_rules import KINDS, Rules, read_rules
@@ -118,6 +118,6 @@ def test_nothing_is_judged_on_a_control_alone(results: Results) -> None:
     controls = tuple(c for c in results.conditions if c.is_control)
     alone = results._replace(conditions=controls, budget="paper")
     assert not_judged(alone) == "only a control was run"
-    claims = rana_page.page(alone, ReportSettings(**REPORT, figures="rana")).claims
+    claims = page_of(alone, ReportSettings(**REPORT, figures="rana")).claims
     own = [claim.verdict for claim in claims if claim.name == "free_at_via_points"]
     assert own == ["not judged (only a control was run)"] * len(controls)

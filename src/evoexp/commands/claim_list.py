@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any
 
 from rich.table import Column, Table
 
@@ -13,7 +13,7 @@ from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages import page_of
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results.stored_results import gather
-from evoexp.report.statistics.claim_rules import Rule, Rules
+from evoexp.report.statistics.claim_rules import Rule, Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 
 KEYS = (
@@ -104,7 +104,7 @@ def _rules(paper: str) -> Rules:
     found = registered(CLAIMS, paper)
     if found is None:
         raise UnknownOption("paper", paper, names(CLAIMS))
-    return cast(Rules, found.load())
+    return registered_rules(found)
 
 
 def _judged_row(paper: str, experiment: str, claim: Claim) -> dict[str, Any]:

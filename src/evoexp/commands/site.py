@@ -4,7 +4,6 @@ import argparse
 import importlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import cast
 
 from evoexp.commands.console import say
 from evoexp.commands.stored_runs import stored_runs
@@ -14,7 +13,7 @@ from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages.build import ReportFiles
 from evoexp.report.pages.home_page import Paper, StoredRun, home_page, summaries
 from evoexp.report.pages.html_page import HTML
-from evoexp.report.statistics.claim_rules import Rules
+from evoexp.report.statistics.claim_rules import registered_rules
 from evoexp.store.files import write_file
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -93,7 +92,7 @@ def _paper(name: str) -> Paper:
     """Return a paper; its title is the first sentence of its package."""
     registration = registered(CLAIMS, name)
     assert registration is not None
-    rules = cast(Rules, registration.load())
+    rules = registered_rules(registration)
     module = importlib.import_module(registration.module)
     text = importlib.import_module(module.__package__ or module.__name__).__doc__ or name
     title, _, subtitle = text.strip().partition("\n")[0].rstrip(".").partition(": ")

@@ -1,38 +1,30 @@
 """All parts of a report's page, to be imported from here by the papers and by guests.
 
-A page is a function (`Results`, `ReportSettings`) → `Page`, named by an entry point `evoexp.pages`.
-It reads `Results`: columns of summaries, generations, solutions, and the answers of the planner's
-protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
+A page is an entry of a paper's `page.yaml` (see `pages.page_file`), named by an entry point
+`evoexp.pages`; or a function (`Results`, `ReportSettings`) → `Page`. Its functions read `Results`:
+columns of summaries, generations, solutions, and the answers of the planner's protocol
+(`ConditionResults.evaluate`, `motion`, `problem`). They return
 
-- `Table`, `Quantity` (of `quantity`), `Claim` (of a `Judge`, by the rules of the paper's
-  `claims.yaml`, see `claim_rules` and `judging.judge`),
-  `Comparison` (of `compared`) and `Drawing`, each with its words in `markdown`;
-- a `Drawing` is two functions: results → table (columns by `records`, `groups`, `rounded`), and
-  table → figure (`style`); `sweep_figures` has those that all sweeps share; its `plays` name the
-  runs whose motions it shows (`PlayedRun`): the page plays them beside it;
-- the seed is the unit of all statistics: `spread`, `Proportion`, `fisher_exact`, `holm`, ….
+- values of single runs, (done,), and counts of runs (`Proportion`);
+- rows of tables and checks; `Comparison` (of `compared`) and `Family`;
+- `Claim` (of a `Judge`, by the rules of the paper's `claims.yaml`, see `claim_rules`);
+- tables of figures (columns by `records`, `groups`, `rounded`) and figures of tables (`style`);
+  `PlayedRun` are the runs whose motions a figure shows: the page plays them beside it.
+
+The seed is the unit of all statistics: `spread`, `Proportion`, `fisher_exact`, `holm`, ….
 """
 
-from evoexp.report.figures import convergence as convergence
 from evoexp.report.figures import groups as groups
 from evoexp.report.figures import marks as marks
 from evoexp.report.figures import records as records
 from evoexp.report.figures import rounded as rounded
 from evoexp.report.figures import shares as shares
 from evoexp.report.figures import style as style
-from evoexp.report.pages import assumptions as assumptions
-from evoexp.report.pages import generic as generic
 from evoexp.report.pages import markdown as markdown
-from evoexp.report.pages import sweep_figures as sweep_figures
-from evoexp.report.pages.assumptions import Headline as Headline
 from evoexp.report.pages.page_parts import Claim as Claim
-from evoexp.report.pages.page_parts import Drawing as Drawing
-from evoexp.report.pages.page_parts import Page as Page
 from evoexp.report.pages.page_parts import PlayedRun as PlayedRun
 from evoexp.report.pages.page_parts import Quantity as Quantity
-from evoexp.report.pages.page_parts import Table as Table
 from evoexp.report.pages.page_words import quantity as quantity
-from evoexp.report.pages.page_words import read_paper as read_paper
 from evoexp.report.report_settings import ReportSettings as ReportSettings
 from evoexp.report.results import motion_geometry as motion_geometry
 from evoexp.report.results import run_measures as run_measures
@@ -54,6 +46,7 @@ from evoexp.report.results.stored_results import ConditionResults as ConditionRe
 from evoexp.report.results.stored_results import Results as Results
 from evoexp.report.results.stored_results import wrapped as wrapped
 from evoexp.report.statistics import judging as judging
+from evoexp.report.statistics.claim_rules import Rules as Rules
 from evoexp.report.statistics.comparisons import Comparison as Comparison
 from evoexp.report.statistics.comparisons import Family as Family
 from evoexp.report.statistics.comparisons import FamilyComparison as FamilyComparison
@@ -64,8 +57,6 @@ from evoexp.report.statistics.comparisons import beside as beside
 from evoexp.report.statistics.comparisons import by_column as by_column
 from evoexp.report.statistics.comparisons import compare_families as compare_families
 from evoexp.report.statistics.comparisons import compared as compared
-from evoexp.report.statistics.comparisons import compared_with_controls as compared_with_controls
-from evoexp.report.statistics.comparisons import headed as headed
 from evoexp.report.statistics.comparisons import rows_by_name as rows_by_name
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED as BOOTSTRAP_SEED
 from evoexp.report.statistics.inference import Interval as Interval

@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.papers.chen.rules import RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import ConditionResults, Results, judging, markdown, planned_by, run_measures
+from evoexp.report.kit import ConditionResults, Results, markdown, planned_by, run_measures
 
 # name of a route (A, B, …; A is the most frequent) → keys of its paths
 Routes = dict[str, tuple[Any, ...]]
@@ -58,7 +57,7 @@ class Group(NamedTuple):
         return [] if self.truth is None else [paths(self.truth)[0]]
 
 
-def fits(results: Results) -> bool:
+def fits_paths(results: Results) -> bool:
     """Whether there are planners' results, and all are of paths over a plane grid."""
     found = results.with_data
     evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
@@ -68,7 +67,7 @@ def fits(results: Results) -> bool:
     )
 
 
-def group_list(results: Results) -> tuple[Group, ...]:
+def groups(results: Results) -> tuple[Group, ...]:
     """Return the conditions by weighting and rule for loops, in the order of the experiment."""
     found = []
     for members in run_measures.grouped(
@@ -172,11 +171,8 @@ def _name(number: int) -> str:
     return (_name(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def judge_paths(
-    results: kit.Results, settings: kit.ReportSettings, groups: tuple[Group, ...]
-) -> tuple[kit.Claim, ...]:
+def judge_paths(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim, ...]:
     """Judge the claims of Fig. 2: they need its three weightings, in their order."""
-    judge = judging.judge(results, settings, RULES)
     return (
         nearly_shortest(judge, groups[0].main, shortest(groups)),
         *(_compromise(judge, groups) if len(groups) == 3 else ()),

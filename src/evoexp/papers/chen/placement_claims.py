@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from evoexp.papers.chen.cases import METHODS, Case
-from evoexp.papers.chen.rules import RULES
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import Claim, Judge, judging, markdown
+from evoexp.report.kit import Claim, Judge, markdown
 
 
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
@@ -113,11 +112,9 @@ def _degrees(angles: tuple[float, float]) -> str:
     return f"({angles[0]:g}, {angles[1]:g})°".replace("-", "−")
 
 
-def judge_cases(
-    results: kit.Results, cases: list[Case], settings: kit.ReportSettings
-) -> tuple[Claim, ...]:
+def judge_cases(judge: Judge, exact_cases: list[Case]) -> tuple[Claim, ...]:
     """Judge all claims; the optimum of every case is known."""
-    judge = judging.judge(results, settings, RULES)
+    cases = exact_cases
     minimax = [case for case in cases if case.name == "minimax torque"]
     return (
         *(one for case in cases for one in judge_printed(judge, case)),

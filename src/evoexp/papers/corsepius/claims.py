@@ -7,7 +7,6 @@ import numpy as np
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
-from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import kit
 from evoexp.report.kit import judging, markdown
 
@@ -21,11 +20,10 @@ METRICS: dict[str, kit.Values] = {
 }
 
 
-def judge_tasks(results: kit.Results, settings: kit.ReportSettings) -> tuple[kit.Claim, ...]:
+def judge_tasks(judge: kit.Judge, results: kit.Results) -> tuple[kit.Claim, ...]:
     """Judge the claims that the conditions of an experiment allow to judge."""
-    judge = judging.judge(results, settings, RULES)
     found = measures.among_obstacles(results.main)
-    many = RULES["redundant_arms"].limits["joints"]
+    many = judge.rules["redundant_arms"].limits["joints"]
     arms = [c for c in found if kit.num_joints(c) > many]
     single = (
         (judge_met(judge, c), judge_free(judge, c), *_tilt(judge, c), *_planning_time(judge, c))
@@ -161,11 +159,11 @@ class SizeComparison(NamedTuple):
 
 
 def judge_study(
-    judge: kit.Judge, found: tuple[Task, ...], compared: dict[str, list[SizeComparison]]
+    judge: kit.Judge, sizes: tuple[Task, ...], size_ratios: dict[str, list[SizeComparison]]
 ) -> tuple[kit.Claim, ...]:
     """Judge the claims on the size."""
-    larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in compared.items()}
-    smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in compared.items()}
+    larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in size_ratios.items()}
+    smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in size_ratios.items()}
     return (
         *(
             claim(judge, metric, own)
@@ -173,9 +171,21 @@ def judge_study(
             for claim in (_no_faster, _not_necessarily)
         ),
         *(_over_proportional(judge, metric, own) for metric, own in smaller.items()),
-        _converges_less(judge, found),
-        *(_reasonable(judge, metric, found, values) for metric, values in METRICS.items()),
+        _converges_less(judge, sizes),
+        *(_reasonable(judge, metric, sizes, values) for metric, values in METRICS.items()),
     )
+
+
+def size_ratios(
+    sizes: tuple[Task, ...], settings: kit.ReportSettings
+) -> dict[str, list[SizeComparison]]:
+    """Return the comparisons of all sizes with the recommended one, metric by metric."""
+    return {metric: compare_sizes(sizes, metric, settings) for metric in METRICS}
+
+
+def are_compared(size_ratios: dict[str, list[SizeComparison]]) -> bool:
+    """Return whether any size can be compared with the recommended one."""
+    return any(size_ratios.values())
 
 
 def _beside_recommended(
@@ -302,7 +312,7 @@ def _reasonable(
         if RECOMMENDED in efforts and np.isfinite(efforts[best]):
             factors[task.name] = efforts[RECOMMENDED] / efforts[best], best
     texts = (f"{name} {_short(factor)} (best: {b:g})" for name, (factor, b) in factors.items())
-    most = RULES["reasonable"].limits["most"]
+    most = judge.rules["reasonable"].limits["most"]
     told = f"effort of 100 over that of the best size: {', '.join(texts) or '–'}"
     hearing = judge.on("reasonable", metric=metric)
     against = any(factor > most for factor, _ in factors.values())

@@ -1,7 +1,8 @@
 """How much of the gain by a hall of fame elitism alone explains."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
 from evoexp.report import kit
+from evoexp.report.kit import judging, markdown
 
 EFFORT = "effort (logarithm)"
 Statistic = Callable[[kit.ConditionResults, np.ndarray], FloatArray]
@@ -190,3 +192,111 @@ def _shares(nothing: FloatArray, some: FloatArray, full: FloatArray) -> FloatArr
     known = np.isfinite(nothing)
     np.divide(nothing - some, nothing - full, out=shares, where=known)
     return shares
+
+
+# (reading and rate, quantity, elites, hall) → how much of the hall's gain elites have, too
+Shares = Callable[[Corner, Gain, kit.ConditionResults, kit.ConditionResults], Share]
+
+
+def has_corners(results: kit.Results) -> bool:
+    """Return whether there are all conditions that the question needs."""
+    return measures.fits(results) and bool(corners(results.with_data))
+
+
+def gains(threshold: float) -> tuple[Gain, ...]:
+    """Return the quantities in which gains are shared out."""
+    return gain_measures(threshold, markdown.number(threshold))
+
+
+def judged_gains(gains: tuple[Gain, ...]) -> list[kit.Measure]:
+    """Return the quantities by which claims are judged."""
+    return [gain.judged for gain in gains if gain.judged is not None]
+
+
+def hall_shares(settings: kit.ReportSettings) -> Shares:
+    """Return the function that gives shares, each computed once."""
+    return cache(partial(share, settings=settings))
+
+
+def corner_families(corners: Sequence[Corner]) -> list[kit.Family]:
+    """Return the hall of distinct genomes against all else of a reading and rate."""
+    return [kit.Family.of((c.hall, c.nothing, *c.elites, *c.halls[1:], *c.others)) for c in corners]
+
+
+def _value(gain: Gain, condition: kit.ConditionResults) -> str:
+    found = of_all_runs(gain, condition)
+    return markdown.number(float(np.rint(np.exp(found))) if gain.short == EFFORT else found)
+
+
+def told_share(share: Share) -> str:
+    """Return a share in words, with its interval if there is one."""
+    if np.isnan(share.value):
+        return "–"
+    text = f"{100 * share.value:.0f} %"
+    if np.isfinite(share.interval.low) or np.isfinite(share.interval.high):
+        text += f" [{100 * share.interval.low:.0f}, {100 * share.interval.high:.0f}]"
+    return text
+
+
+def elitism_headers(corners: Sequence[Corner]) -> tuple[str, ...]:
+    """Return the headers of the columns of values, shares and runs."""
+    elites = [
+        f"{c.planner.ga.num_elites} elite" + "s" * (k > 0) for k, c in enumerate(corners[0].elites)
+    ]
+    shares = (f"share of {name}" for name in elites)
+    return (*elites, "hall", *shares, f"n (nothing, {elites[-1]}, hall)")
+
+
+def elitism_rows(
+    corners: Sequence[Corner], gains: Sequence[Gain], hall_shares: Shares
+) -> Iterator[tuple[str, ...]]:
+    """Yield quantities, shares by elitism, and the runs behind them."""
+    for corner, gain in itertools.product(corners, gains):
+        for hall, kept in zip(corner.halls, ("genome", "index"), strict=False):
+            found = [hall_shares(corner, gain, elites, hall) for elites in corner.elites]
+            values = (_value(gain, c) for c in (corner.nothing, *corner.elites, hall))
+            counts = ", ".join(map(str, found[-1].n))
+            yield corner.name, gain.name, kept, *values, *map(told_share, found), counts
+
+
+def short_label(elites: kit.ConditionResults) -> str:
+    """Return the part of a label that names the elites."""
+    return elites.label.rpartition(", ")[2]
+
+
+def _of_corner(judge: kit.Judge, corner: Corner, gain: Gain, shares: Shares) -> list[kit.Claim]:
+    """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
+    assert gain.judged is not None
+    name, values, *_ = gain.judged
+    who, hall = f"{corner.name}: ", corner.hall
+    over_elites = kit.compared([(hall, c) for c in corner.elites], values, judge.settings)
+    told = "; ".join(
+        f"against {row.quantity} {judging.evidence(row, 'lower')}" for row in over_elites
+    )
+    explained = ", ".join(
+        f"{told_share(shares(corner, gain, c, hall))} ({short_label(c)})" for c in corner.elites
+    )
+    elites = " and than ".join(map(short_label, corner.elites))
+    beyond = judge.on("hall_beyond_elites", who=who, elites=elites, measure=name)
+    single = [("hall_helps", corner.nothing)]
+    single += [("distinct_genomes", c) for c in corner.halls[1:]]
+    single += [("frozen_hall", c) for c in corner.others if c.planner.ga.hall_frozen]
+    first, *more = (
+        judge.on(rule, who=who, measure=name).better(judge.compared(hall, c, values), "lower")
+        for rule, c in single
+    )
+    told += f"; share of the hall's gain over nothing: {explained}"
+    return [first, beyond.better_than_all(told, over_elites), *more]
+
+
+def hall_claims(
+    judge: kit.Judge, corners: Sequence[Corner], gains: Sequence[Gain], hall_shares: Shares
+) -> list[kit.Claim]:
+    """Judge the claims on the hall, quantity by quantity."""
+    return [
+        claim
+        for gain in gains
+        if gain.judged is not None
+        for corner in corners
+        for claim in _of_corner(judge, corner, gain, hall_shares)
+    ]

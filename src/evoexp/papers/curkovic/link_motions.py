@@ -1,5 +1,6 @@
 """Executed motions of robots of two links, in absolute link angles."""
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,9 @@ from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.records import FloatArray
-from evoexp.report.kit import motion_geometry, wrapped
+from evoexp.report.kit import ConditionResults, motion_geometry, wrapped
+
+TOOL_SAMPLES = 20  # per segment, where end-effectors' distances from other robots are measured
 
 
 class SampledMotion(NamedTuple):
@@ -83,3 +86,34 @@ def straight(prepared: Prepared) -> FloatArray:
     planner, problem = prepared
     ends = problem.start.ravel(), problem.goal.ravel()
     return motion_geometry.straight_line(planner.shape(problem), *ends) / DEGREE
+
+
+def tool_distance(condition: ConditionResults) -> FloatArray:
+    """Return how near any end-effector comes to a link of another robot, (done,) [length unit].
+
+    Links and end-effectors have no thickness here.
+    """
+    prepared, found = condition.prepared, []
+    robots = arms(prepared)
+    for k in condition.summaries.index:
+        motion = executed(prepared, condition.solutions[int(k)])
+        links = np.radians(sampled(motion, TOOL_SAMPLES).links)
+        chains = []  # of each robot: base, elbows, tips
+        for r, arm in enumerate(robots):
+            points = arm.outlines(links[:, r, :, None])[:, :4, 0]
+            base = np.broadcast_to(arm.base, (len(links), 2))
+            chains.append((base, points[:, :2], points[:, 2:]))
+        distances = (
+            to_segment(own[-1], start, end)
+            for own, other in itertools.permutations(chains, 2)
+            for start, end in itertools.pairwise(other)
+        )
+        found.append(min(distances))
+    return np.array(found)
+
+
+def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
+    """Return the least distance of points from segments, row by row; each (rows, 2)."""
+    along = end - start
+    share = np.clip(((points - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.sqrt(((points - start - share[:, None] * along) ** 2).sum(axis=1)).min())

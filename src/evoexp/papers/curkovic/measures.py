@@ -1,11 +1,8 @@
 """Quantities that all pages on Curkovic et al. 2013 show: effort to a threshold, known defects."""
 
-from functools import partial
-
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions
-from evoexp.papers.curkovic.rules import PAPER
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
@@ -61,16 +58,54 @@ def expected_seconds(condition: kit.ConditionResults, threshold: float) -> float
     return expected_evaluations(condition, threshold) * price
 
 
-def team_quantities(results: kit.Results, name: str, threshold: float) -> tuple[kit.Quantity, ...]:
-    """Return the rows of the table of results, those about the effort to a threshold among them."""
-    own: dict[str, kit.Values] = {
-        "generations_to": partial(generations_to, threshold=threshold),
-        "evaluations_to": partial(evaluations_to, threshold=threshold),
-        "expected_evaluations": lambda c: np.rint([expected_evaluations(c, threshold)]),
-        "expected_seconds": lambda c: np.array([expected_seconds(c, threshold)]),
-        "times_over_limit": times_over_limit,
-    }
-    return PAPER.quantities(results, name, own, threshold=markdown.number(threshold))
+def expected_effort(condition: kit.ConditionResults, threshold: float) -> FloatArray:
+    """Return the expected running time to a cost in whole evaluations, (1,)."""
+    return np.rint([expected_evaluations(condition, threshold)])
+
+
+def expected_time(condition: kit.ConditionResults, threshold: float) -> FloatArray:
+    """Return the expected running time to a cost, (1,) [s]."""
+    return np.array([expected_seconds(condition, threshold)])
+
+
+def bound(first: kit.ConditionResults) -> float:
+    """Return the lower bound of a team's cost in the first condition's scene."""
+    return lower_bound(first)
+
+
+def threshold(bound: float, settings: kit.ReportSettings) -> float:
+    """Return the cost that effort is measured to."""
+    return settings.threshold_ratio * bound
+
+
+def several(results: kit.Results) -> bool:
+    """Return whether there are several conditions of co-evolving robots to compare."""
+    return fits(results) and len(results.with_data) > 1
+
+
+def one_scene(results: kit.Results) -> bool:
+    """Return whether all conditions share robots and scene."""
+    return len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
+
+
+def several_scenes(one_scene: bool) -> bool:
+    """Return whether conditions differ in robots or scene."""
+    return not one_scene
+
+
+def free_at_first(condition: kit.ConditionResults) -> int:
+    """Count the runs whose first generation holds a collision-free team."""
+    return int((condition.column("first_feasible_generation") == 0).sum())
+
+
+def method_defects(results: kit.Results) -> list[tuple[str, str]]:
+    """Return the rows on the defects that straight motions can have."""
+    return [rates_check(results, defect) for defect in (REFUTED, TOO_FAST)]
+
+
+def all_defects(results: kit.Results) -> list[tuple[str, str]]:
+    """Return the rows on all known defects."""
+    return [rates_check(results, defect) for defect in DEFECTS]
 
 
 def refuted(condition: kit.ConditionResults) -> FloatArray:

@@ -1,14 +1,18 @@
 """The claims of Lavoie & Boudreau 2001, judged by their experiment and against controls."""
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from evoexp.papers.lavoie import measures
-from evoexp.papers.lavoie.rules import RULES
+from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.report import kit
 from evoexp.report.kit import markdown
 
+Group = tuple[kit.ConditionResults, ...]
+Counts = Callable[[kit.ConditionResults], RefutedMotions]
 ELSEWHERE = (
     ("more_solutions", {"who": "", "control": ""}),
     ("precision", {"where": ", with more generations"}),
@@ -41,6 +45,18 @@ def percentages(judge: kit.Judge, conditions: Sequence[kit.ConditionResults]) ->
         hearing = judge.on("share_below", who=c.label, **words)
         claims.append(hearing.same_share(evidence, own, theirs, p_adjusted))
     return claims
+
+
+def first_percentage(judge: kit.Judge, condition: kit.ConditionResults, main: Group) -> kit.Claim:
+    """Judge the percentage that is printed for errors below 1, the least bound.
+
+    The percentages of the other arm, as assumed, belong to the same family of tests, so that the
+    verdict as assumed is that of the experiment itself.
+    """
+    # number of joints → the condition as assumed, which is the first one of the arm
+    assumed = {kit.num_joints(c): c for c in reversed(main)}
+    others = [c for joints, c in assumed.items() if joints != kit.num_joints(condition)]
+    return percentages(judge, [condition, *others])[0]
 
 
 def _difference(own: kit.Proportion, theirs: kit.Proportion, level: float) -> str:
@@ -87,10 +103,9 @@ def no_start_needed(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Cl
     return hearing.own(evidence, f"{own.total} and {theirs.total}", holds)
 
 
-def free_of_collision(
-    judge: kit.Judge, condition: kit.ConditionResults, refuted: kit.Proportion
-) -> kit.Claim:
+def free_of_collision(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     """Judge that accepted motions touch nothing."""
+    refuted = kit.counted(measures.touches(condition)[kit.solved(condition)])
     free = kit.certified(condition).having
     planned = condition.planned if condition.solved == condition.done else 0
     evidence = f"{markdown.share(free, refuted.total)} certified; refuted {judge.share(refuted, 1)}"
@@ -102,7 +117,7 @@ def judged_elsewhere(judge: kit.Judge) -> list[kit.Claim]:
     """Return the claims that need controls or a sweep, not judged."""
     told = "judged by `evoexp run experiment={}`"
     return [
-        judge.on(name, **words).elsewhere(told.format(RULES[name].experiments[0]))
+        judge.on(name, **words).elsewhere(told.format(judge.rules[name].experiments[0]))
         for name, words in ELSEWHERE
     ]
 
@@ -189,3 +204,128 @@ def _controls(results: kit.Results, own: kit.ConditionResults) -> list[kit.Condi
         for c in results.with_data
         if c.is_control and (c.condition.robot, c.condition.scenario, c.planner) == same
     ]
+
+
+def groups_but_for(results: kit.Results, *path: str) -> list[Group]:
+    """Return groups of conditions, without controls, that agree in all settings but one.
+
+    The names of the path lead to it: "ga", "num_generations".
+    """
+
+    def key(condition: kit.ConditionResults) -> tuple[Any, ...]:
+        part = planner = condition.planner.canonical()
+        for name in path[:-1]:
+            part[name] = part = dict(part[name])
+        part.pop(path[-1], None)
+        scene = condition.condition.robot, condition.condition.scenario
+        return *(one.canonical() for one in scene), planner
+
+    return [group for group in kit.grouped(results.main, key) if len(group) > 1]
+
+
+def either_success(judge: kit.Judge, results: kit.Results) -> list[kit.Claim]:
+    """Judge the printed percentages by either reading of a success, each a family of tests."""
+    by_reading: dict[str, list[kit.ConditionResults]] = {}
+    for condition in itertools.chain(*groups_but_for(results, "success")):
+        by_reading.setdefault(condition.planner.success, []).append(condition)
+    families = (percentages(judge, own) for own in by_reading.values())
+    return list(itertools.chain(*families))
+
+
+def precision(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+    """Judge that smaller stopping values give smaller errors, step by step."""
+    for group in groups_but_for(results, "stop_cost_sp2"):
+        own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
+        steps = [(small, large) for large, small in itertools.pairwise(own)]
+        rows = kit.compared(steps, measures.errors, judge.settings, named=_against)
+        medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)
+        told = "; ".join(f"{row.quantity}: {kit.evidence(row, 'smaller')}" for row in rows)
+        where = f": at most {own[0].planner.ga.num_generations} generations"
+        told = f"median errors: {', '.join(medians)}; step by step: {told}"
+        yield judge.on("precision", where=where).better_than_all(told, rows)
+
+
+def generations(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+    """Judge that more generations are needed at the smallest stopping value."""
+    least = min(c.planner.stop_cost_sp2 for c in results.main)
+    for group in groups_but_for(results, "ga", "num_generations"):
+        few, *_, many = sorted(group, key=lambda c: int(c.planner.ga.num_generations))
+        if few.planner.stop_cost_sp2 > least:
+            continue
+        attempts = (f"{c.column('term_attempts').mean():.2f}" for c in (many, few))
+        spent = (_median(c, measures.effort) for c in (many, few))
+        one, two = kit.success(many), kit.success(few)
+        told = (
+            f"runs with a solution: {judge.share(one, 1)} with at most "
+            f"{many.planner.ga.num_generations} generations, {judge.share(two, 1)} "
+            f"with {few.planner.ga.num_generations}; {kit.fisher_evidence(one, two)}; mean "
+            f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
+        )
+        yield judge.on("generations", least=f"{least:g}").greater(told, one, two)
+
+
+def coding(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+    """Judge real against binary coding."""
+    for group in groups_but_for(results, "ga"):
+        coded = {c.planner.ga.component: c for c in group}
+        if not {"real_genetic", "binary_genetic"} <= set(coded):
+            continue
+        pair = coded["real_genetic"], coded["binary_genetic"]
+        for what, values, word in (
+            ("position error", measures.errors, "smaller"),
+            ("evaluations to a solution", measures.effort, "fewer"),
+        ):
+            row = judge.compared(*pair, values)
+            where = f", judged by {what}: {_against(*pair)}"
+            told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
+            yield judge.on("coding", where=where).better(row, word, told)
+
+
+def blindness(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterator[kit.Claim]:
+    """Judge that the scene is not trivial: an arm that ignores obstacles meets them."""
+    for group in groups_but_for(results, "collision", "blind"):
+        seeing, blind = sorted(group, key=lambda c: bool(c.planner.collision.blind))
+        one, two = refuted(blind).anywhere, refuted(seeing).anywhere
+        hearing = judge.on("blind_collides", who=_against(blind, seeing))
+        yield hearing.greater(_shares(judge, one, two), one, two)
+
+
+def positions(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterator[kit.Claim]:
+    """Judge that chords, and more positions with chords, leave fewer contacts between positions."""
+    pairs: list[Group] = []  # (coarse, fine)
+    least = min(int(c.planner.collision.num_positions) for c in results.main)
+    for group in groups_but_for(results, "collision", "swept"):
+        if group[0].planner.collision.num_positions == least:
+            by_name = sorted(group, key=lambda c: str(c.planner.collision.swept), reverse=True)
+            pairs.append(tuple(by_name))
+    for group in groups_but_for(results, "collision", "num_positions"):
+        if group[0].planner.collision.swept == "chords":
+            coarse, *finer = sorted(group, key=lambda c: int(c.planner.collision.num_positions))
+            pairs += [(coarse, fine) for fine in finer]
+    # contacts of either condition, and the tests of all pairs as one family
+    counts = [tuple(refuted(c).anywhere for c in pair) for pair in pairs]
+    p_values = kit.holm([kit.fisher_exact(one, two) for one, two in counts])
+    for (coarse, fine), (one, two), p in zip(pairs, counts, p_values, strict=True):
+        told = f"{_shares(judge, two, one)}; adjusted (Holm) {markdown.p_value(p)}"
+        yield judge.on("fewer_contacts", who=_against(fine, coarse)).greater(told, one, two, p)
+    for (_, fine), (_, two) in zip(pairs, counts, strict=True):
+        positions = fine.planner.collision.num_positions
+        if positions > least:
+            told = f"refuted: {judge.share(two, 1)}"
+            hearing = judge.on("no_contacts", positions=positions, who=fine.label)
+            runs = two.total - two.having, two.total, fine.solved
+            yield hearing.every(told, *runs)
+
+
+def _against(one: kit.ConditionResults, two: kit.ConditionResults) -> str:
+    return f"{one.label} against {two.label}"
+
+
+def _median(condition: kit.ConditionResults, values: kit.Values) -> str:
+    value = float(np.median(values(condition)))
+    return markdown.number(float(round(value)) if 1e3 < value < np.inf else value)
+
+
+def _shares(judge: kit.Judge, one: kit.Proportion, two: kit.Proportion) -> str:
+    shares = " against ".join(judge.share(proportion, 1) for proportion in (one, two))
+    return f"{shares}; {kit.fisher_evidence(one, two)}"

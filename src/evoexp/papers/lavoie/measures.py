@@ -1,11 +1,13 @@
 """Measures of Lavoie & Boudreau 2001 that several pages share: errors, effort, refuted motions."""
 
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
+from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
 from evoexp.report import kit
@@ -48,9 +50,24 @@ def fits(results: kit.Results) -> bool:
     return kit.planned_by(results, RedundantGa)
 
 
+def is_sweep(results: kit.Results) -> bool:
+    """Return whether there are several such conditions to compare."""
+    return fits(results) and len(results.with_data) > 1
+
+
+def arms(results: kit.Results) -> tuple[kit.Family, ...]:
+    """Return the first condition of each arm against its others; arms differ in joints."""
+    return tuple(map(kit.Family.of, kit.grouped(results.with_data, kit.num_joints)))
+
+
 def printed(condition: kit.ConditionResults) -> list[Percentage]:
     """Return the percentages that the paper prints for an arm of so many joints."""
     return [one for one in PRINTED if one.joints == kit.num_joints(condition)]
+
+
+def printed_points(condition: kit.ConditionResults) -> list[tuple[float, kit.Proportion]]:
+    """Return (bound, share) of the percentages that the paper prints for the arm."""
+    return [(one.bound, one.proportion) for one in printed(condition)]
 
 
 def below(condition: kit.ConditionResults, bound: float) -> kit.Proportion:
@@ -111,3 +128,105 @@ def refuted(condition: kit.ConditionResults) -> RefutedMotions:
     """Count the solved runs whose motion the exact verdict refutes, by sub-path."""
     paths = refuted_paths(condition)[kit.solved(condition)]
     return RefutedMotions(kit.counted(paths.any(axis=1)), *map(kit.counted, paths.T))
+
+
+BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
+
+
+def told_shares(condition: kit.ConditionResults, confidence: float) -> str:
+    """Return the shares of a condition's runs in words, and its mean attempts."""
+    own = refuted(condition)
+    shares = {
+        "with a solution": kit.success(condition),
+        f"error below {BOUND:g}": below(condition, BOUND),
+        "accepted and in contact": own.anywhere,
+        "on SP1": own.sp1,
+        "on SP2": own.sp2,
+    }
+    texts = [f"{name}: {p.with_interval(confidence, 1)}" for name, p in shares.items() if p.total]
+    if not condition.is_control:
+        texts.append(f"mean attempts: {condition.column('term_attempts').mean():.2f}")
+    return "; ".join(texts)
+
+
+def weak_evidence(results: kit.Results, confidence: float) -> Iterator[tuple[str, str]]:
+    """Count the settings of each arm that agree with a printed percentage.
+
+    The more settings agree, the less agreement says about any of them. Nothing is counted where
+    conditions are controls or blind, or differ in the places of their tests.
+    """
+    if any(c.is_control or c.planner.collision.blind for c in results.with_data):
+        return
+    if paths_differ(results):
+        return
+    for own in kit.grouped(results.with_data, kit.num_joints):
+        for one in (one for one in printed(own[0]) if one.bound == BOUND):
+            theirs = one.proportion
+            intervals = {c.label: kit.newcombe(below(c, BOUND), theirs, confidence) for c in own}
+            same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
+            what = (
+                f"{own[0].label} and others: whose errors below {BOUND:g} cannot be told from the "
+                f"printed {100 * theirs.share:.1f} %"
+            )
+            text = (
+                f"{len(same)} of {len(own)}{': ' if same else ''}{', '.join(same)} (0 within "
+                f"Newcombe's {100 * confidence:g} % interval of the difference; at most "
+                f"{max(c.done for c in own)} runs each). Agreement with Fig. 3 is weak evidence "
+                "for a setting as long as others agree as well"
+            )
+            yield (what, text)
+
+
+def paths_differ(results: kit.Results) -> bool:
+    """Return whether conditions differ in the places at which they test paths for collision."""
+    collisions = (c.planner.collision for c in results.with_data)
+    return len({(model.num_positions, model.swept) for model in collisions}) > 1
+
+
+def printed_shares(results: kit.Results) -> dict[str, float]:
+    """Return the shares that the paper prints, by the names of `share_rows`, of a single arm."""
+    one_arm = len(arms(results)) == 1
+    points = printed(results.with_data[0]) if one_arm else []
+    return {f"error below {p.bound:g}": p.proportion.share for p in points}
+
+
+def stopping_values_differ(conditions: tuple[kit.ConditionResults, ...]) -> bool:
+    """Return whether searches stop at different values."""
+    return len({c.planner.stop_cost_sp2 for c in conditions}) > 1
+
+
+def share_rows(
+    results: kit.Results, refuted: Callable[[kit.ConditionResults], RefutedMotions]
+) -> list[tuple[str, int, str, kit.Proportion]]:
+    """Return the counts that are drawn, by sub-path if the tests of paths differ."""
+    rows = []
+    for position, c in enumerate(results.with_data):
+        found = refuted(c)
+        told = {"touch an obstacle": found.anywhere, "on SP1": found.sp1, "on SP2": found.sp2}
+        if not paths_differ(results):
+            told = {
+                f"error below {BOUND:g}": below(c, BOUND),
+                "with a solution": kit.success(c),
+                "touch an obstacle": found.anywhere,
+            }
+        rows += [(name, position, c.label, proportion) for name, proportion in told.items()]
+    return rows
+
+
+def literal_start(condition: kit.ConditionResults) -> str:
+    """Say whether the start is free if the printed shift of obstacles is read literally.
+
+    The words vertically and horizontally are not swapped then. Empty if nothing is shifted. The
+    arm's collision model judges the start among the obstacles of the literal reading.
+    """
+    scenario: Any = condition.condition.scenario
+    problem = condition.problem(Problem)
+    dx, dy = scenario.obstacle_shift
+    if dx == dy:
+        return ""
+    literal = scenario.model_copy(update={"obstacle_shift": (dy, dx)})
+    model = condition.planner.collision.bind(problem.assembly, literal.obstacle_table())
+    contact = model.contact(problem.start, problem.start)
+    if contact is None:
+        return "free of collision"
+    return f"not free of collision: link {contact.link} touches obstacle {contact.obstacle}"

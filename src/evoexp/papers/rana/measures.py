@@ -3,14 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 
 from evoexp.papers.rana import motions
-from evoexp.records import FloatArray
+from evoexp.planners.via_point_ga.planner import ViaPointGa
+from evoexp.planners.via_point_ga.strings import Problem
+from evoexp.records import FloatArray, generations
 from evoexp.report import kit
 from evoexp.report.kit import ConditionResults, markdown
 
 UNEVENNESS = "term_unevenness_arm_"
-FIRST_FREE = "first generation with a collision-free individual (∞: none in the whole run)"
+AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
+EVENNESS = "unevenness of the best, C3 + C4"
+ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
+GENERATIONS = (0, 10, 50)  # whose pairs of strings are looked at
+PAIRS = 2000  # drawn of each generation
 COST = kit.by_column("best_cost")
 
 
@@ -51,3 +58,256 @@ def evolution_told(
     if not shown:
         told.append("no control beside it")
     return "; ".join(told), [rows[control.label] for control in shown]
+
+
+def who(results: kit.Results, condition: ConditionResults) -> str:
+    """Return the beginning of a line about a condition: nothing if there is no other one."""
+    return f"{condition.label}: " if len(results.main) > 1 else ""
+
+
+def fits(results: kit.Results) -> bool:
+    """Return whether the paper's figures can draw all conditions."""
+    return bool(results.with_data) and all(map(can_be_drawn, results.with_data))
+
+
+def can_be_drawn(condition: kit.ConditionResults) -> bool:
+    """Return whether the paper's figures can draw a condition.
+
+    They draw several arms of two joints in a plane, or of three joints or more in space.
+    """
+    problem = condition.prepared.problem
+    if not isinstance(problem, Problem) or problem.assembly.num_arms < 2:
+        return False
+    joints = 2 if problem.assembly.table.planar else 3
+    return all(stop - first >= joints for first, stop in problem.arm_slices)
+
+
+def planar(condition: ConditionResults) -> bool:
+    """Return whether the arms move in a plane."""
+    return bool(motions.problem(condition).assembly.table.planar)
+
+
+def spatial(condition: ConditionResults) -> bool:
+    """Return whether the arms move in space."""
+    return not planar(condition)
+
+
+def arms(main: tuple[ConditionResults, ...]) -> str:
+    """Return which arms the conditions have, in words."""
+    return " and ".join(ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True))
+
+
+def margin(condition: ConditionResults) -> float:
+    """Return the safety distance [length unit]."""
+    return motions.problem(condition).security_margin
+
+
+def planar_scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
+    """Return all conditions of each scene in the plane, and the end of its figure's stem."""
+    return [(scene, suffix) for scene, suffix in _scenes(results) if planar(scene.with_data[0])]
+
+
+def spatial_scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
+    """Return all conditions of each scene in space, and the end of its figure's stem."""
+    return [(scene, suffix) for scene, suffix in _scenes(results) if spatial(scene.with_data[0])]
+
+
+def _scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
+    suffixes = {c.label: suffix for c, suffix in results.suffixed}
+    scenes = kit.grouped(results.conditions, lambda c: (c.condition.robot, c.condition.scenario))
+    found = [
+        (results._replace(conditions=own), [suffixes[c.label] for c in own if c.label in suffixes])
+        for own in scenes
+    ]
+    drawn = [(scene, own[0]) for scene, own in found if own]
+    return [(scene, suffix if len(drawn) > 1 else "") for scene, suffix in drawn]
+
+
+def length_ratio(condition: ConditionResults) -> float:
+    """Return the median length of paths over that of the straight line [-]."""
+    return condition.spread("term_path_length_ratio").median
+
+
+def straight_terms(condition: ConditionResults) -> dict[str, float]:
+    """Return the named terms of the straight line."""
+    return condition.evaluate(motions.straight_line(condition))
+
+
+def straight_centres(sampled_distances: pd.DataFrame) -> float:
+    """Return the least distance of centres along the straight line [length unit]."""
+    straight = sampled_distances[sampled_distances["series"] == motions.STRAIGHT]
+    return float(straight["centres"].min())
+
+
+def longer(condition: ConditionResults) -> FloatArray:
+    """Return how much longer than the straight line each run's best paths are, (done,) [deg]."""
+    ratio = condition.column("term_path_length_ratio")
+    return np.asarray(motions.straight_length(condition) * (ratio - 1.0))
+
+
+def dips(condition: ConditionResults) -> int:
+    """Count the runs whose centres come closer than the safety distance between via-points."""
+    return int(np.count_nonzero(condition.column(BETWEEN) < margin(condition)))
+
+
+def closer(condition: ConditionResults) -> int:
+    """Count the runs whose bodies come closer than the safety distance."""
+    return int(np.count_nonzero(condition.column("clearance") < margin(condition)))
+
+
+def redistributed(condition: ConditionResults) -> int:
+    """Count the free final strings that collide after redistribution."""
+    return motions.colliding_after(condition, relaxed=False)
+
+
+def relaxed(condition: ConditionResults) -> int:
+    """Count the free final strings that collide after redistribution and relaxation."""
+    return motions.colliding_after(condition, relaxed=True)
+
+
+def safety_share(condition: ConditionResults) -> FloatArray:
+    """Return the least distance of centres between via-points in units of the safety distance."""
+    return np.asarray(condition.column(BETWEEN) / margin(condition))
+
+
+def refuted(condition: ConditionResults) -> kit.Proportion:
+    """Count the motions whose bodies touch."""
+    counts = condition.verdicts
+    return kit.Proportion(counts.refuted, counts.judged)
+
+
+def colliding(condition: ConditionResults) -> kit.Proportion:
+    """Count the runs whose best string collides at a via-point by the paper's model."""
+    return kit.Proportion(condition.done - condition.solved, condition.done)
+
+
+def varies_via_points(results: kit.Results) -> bool:
+    """Return whether all conditions are of the paper's planner."""
+    return kit.planned_by(results, ViaPointGa)
+
+
+def length(condition: kit.ConditionResults) -> FloatArray:
+    """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
+    ratio = condition.column("term_path_length_ratio")
+    return np.asarray(motions.straight_length(condition) * ratio)
+
+
+def median_length(condition: ConditionResults) -> float:
+    """Return the median length of all arms' paths [deg]."""
+    return float(np.median(length(condition)))
+
+
+def any_planar(results: kit.Results) -> bool:
+    """Return whether the arms of any condition can be drawn in the plane."""
+    return any(map(drawable, results.main))
+
+
+def drawable(condition: kit.ConditionResults) -> bool:
+    """Return whether a condition's arms move in a plane and have two joints each."""
+    problem = condition.prepared.problem
+    if not isinstance(problem, Problem) or not problem.assembly.table.planar:
+        return False
+    return all(stop - first == 2 for first, stop in problem.arm_slices)
+
+
+def several_arms(condition: ConditionResults) -> bool:
+    """Return whether a condition has arms to keep apart."""
+    return drawable(condition) and condition.problem(Problem).assembly.num_arms > 1
+
+
+def crossover_readings(conditions: Sequence[ConditionResults]) -> list[ConditionResults]:
+    """Return the conditions that read "double cross-over" in another way than the first one."""
+    return _changing(conditions, "crossover_reading")
+
+
+def crossover_distances(conditions: Sequence[ConditionResults]) -> list[ConditionResults]:
+    """Return the conditions that cross strings at other distances than the first one."""
+    return _changing(conditions, "crossover_distance")
+
+
+def _changing(conditions: Sequence[ConditionResults], name: str) -> list[ConditionResults]:
+    first, *others = conditions
+    if not isinstance(first.planner, ViaPointGa) or first.is_control:
+        return []
+    return [other for other in others if _changes(first, other, name)]
+
+
+def _changes(first: kit.ConditionResults, other: kit.ConditionResults, name: str) -> bool:
+    """Return whether this setting, and no other, differs from the first condition's."""
+    if other.is_control or not isinstance(other.planner, ViaPointGa):
+        return False
+    value = getattr(first.planner, name)
+    same = bool(other.planner.model_copy(update={name: value}) == first.planner)
+    return same and bool(getattr(other.planner, name) != value)
+
+
+def cost_difference(other: ConditionResults, compared: tuple[kit.FamilyComparison, ...]) -> str:
+    """Return how far the costs of a condition are from those of the first one, in words."""
+    return _difference(other, {"best cost": kit.rows_by_name(compared)["best cost"]})
+
+
+def reading_difference(other: ConditionResults, compared: tuple[kit.FamilyComparison, ...]) -> str:
+    """Return how far cost and evenness of a condition are from those of the first one."""
+    rows = kit.rows_by_name(compared)
+    return _difference(
+        other, {"best cost": rows["best cost"], "unevenness C3 + C4": rows[EVENNESS]}
+    )
+
+
+def _difference(other: kit.ConditionResults, tables: dict[str, Sequence[kit.Comparison]]) -> str:
+    """Return the differences of the first condition from another one in words."""
+    told = [
+        f"{name} differs by {markdown.number(row.median_difference)} in the median of pairs, "
+        f"p = {markdown.p_value(row.test.p_value)}"
+        for name, rows in tables.items()
+        for row in rows
+        if row.quantity == other.label
+    ]
+    return "; ".join(told) or "nothing to compare"
+
+
+def told_apart(first: ConditionResults) -> str:
+    """Return the share of pairs that are too far apart to be crossed, in words."""
+    return ", ".join(
+        f"{100 * share:.1f} % in generation {generation}"
+        for generation, share in kept_apart(first).items()
+    )
+
+
+def kept_apart(condition: kit.ConditionResults) -> dict[int, float]:
+    """Return the share of pairs that are too far apart to be crossed, by generation.
+
+    The first replicate is run again for some generations; sites and pairs are drawn at random.
+    """
+    planner, problem = condition.planner, motions.problem(condition)
+    draw = np.random.Generator(np.random.PCG64(0))
+    found = {}
+    for generation in generations(planner.evolve(problem, condition.condition.rng(0))):
+        if generation.index in GENERATIONS:
+            strings = generation.population[:, :, : planner.ga.population_size]
+            found[generation.index] = _share_apart(
+                strings, problem.arm_slices, planner.crossover_distance, draw
+            )
+        if generation.index >= max(GENERATIONS):
+            break
+    return found
+
+
+def _share_apart(
+    strings: FloatArray, arm_slices: np.ndarray, distance: float, rng: np.random.Generator
+) -> float:
+    """Return the share of pairs of strings (nq, N + 1, individuals) [deg] that are not crossed.
+
+    They are not closer than the distance [deg] at the site of an arm at least.
+    """
+    num_points, individuals = strings.shape[1:]
+    if num_points < 3 or individuals < 2:
+        return 0.0
+    one = rng.integers(individuals, size=PAIRS)
+    two = (one + rng.integers(1, individuals, size=PAIRS)) % individuals
+    apart = np.zeros(PAIRS, dtype=bool)
+    for first, stop in arm_slices:
+        site = rng.integers(1, num_points - 1, size=PAIRS)  # 1 … N − 1
+        gap = strings[first:stop, site, one] - strings[first:stop, site, two]
+        apart |= np.linalg.norm(gap, axis=0) >= distance
+    return float(np.mean(apart))

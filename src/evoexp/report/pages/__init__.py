@@ -1,7 +1,7 @@
 """Pages: the figures, claims and checks that the report of an experiment has.
 
-Packages register pages in the entry-point group `evoexp.pages`, as `module:function`; the option
-`report.figures` names one of them.
+Packages register pages in the entry-point group `evoexp.pages`, as `package:page.yaml` (see
+`page_file`) or as `module:function`; the option `report.figures` names one of them.
 """
 
 from typing import TYPE_CHECKING, cast
@@ -49,8 +49,19 @@ def page_of(results: "Results", settings: ReportSettings) -> "Page":
     chosen = page_registration(settings)
     if sweep := sweep_of(results):
         return swept.page(results, sweep, settings)
-    page = cast("Page", chosen.load()(results, settings))
+    page = _built(chosen, results, settings)
     page = page._replace(claims=(*page.claims, *left_out(results, page.claims)))
     if any(drawing.plays for drawing in page.drawings):
         return page
     return page._replace(drawings=(*page.drawings, *scene_drawing(best_motions(results))))
+
+
+def _built(chosen: Registration, results: "Results", settings: ReportSettings) -> "Page":
+    """Return a page, which is an entry of a file or what a function returns."""
+    from evoexp.report.pages.page_builder import build
+    from evoexp.report.pages.page_file import read_page_file
+
+    if chosen.target.endswith(".yaml"):
+        package, _, file = chosen.target.partition(":")
+        return build(read_page_file(package, file), chosen.name, results, settings)
+    return cast("Page", chosen.load()(results, settings))

@@ -12,13 +12,12 @@ conditions as everywhere:
       "N = 10": [planner.num_via_points=10]
       "N = 10, multi-start": [planner.num_via_points=10, control=multi_start]
 
-The paper registers a page (`papers/<paper>/assumptions_page.py`, entry point `evoexp.pages`, option
-`conf/report/<paper>_assumptions.yaml`) that names its headline claims, each with its rule in the
-paper's `claims.yaml`, a quantity that is drawn, and a function that judges it on one condition:
+The paper's `page.yaml` (see `page_file`) has a page with `headlines`: its headline claims, each
+with its rule in `claims.yaml`, a quantity that is drawn, and a function that judges it on one
+condition:
 
-    def page(results, settings):
-        return assumptions.page(results, settings, RULES, "Rana & Zalzala 1995", (
-            Headline("free_at_via_points", "free runs [%]", free, judge_free), ...))
+    headlines:
+      - {claim: free_at_via_points, quantity: "free runs [%]", values: free, judge: judge_free}
 
     def judge_free(judge, condition, controls):  # -> Claim
         return judge.on("free_at_via_points", who="").every(...)

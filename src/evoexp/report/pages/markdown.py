@@ -4,11 +4,12 @@ import math
 import re
 import string
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from evoexp.report.pages.page_parts import Document
 from evoexp.report.pages.templates import environment
-from evoexp.report.statistics.inference import Interval, Spread
+from evoexp.report.statistics.inference import Interval, Proportion, Spread
+from evoexp.report.statistics.inference import spread as spread_of
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")
@@ -48,20 +49,49 @@ def number(value: float) -> str:
     return (f"{value + 0.0:.0f}" if whole else f"{value:.4g}").replace("-", "−")  # −0.0 is 0
 
 
-def filled(template: str, words: Mapping[str, object]) -> str:
-    """Fill in the words of a sentence: `{x!n}` is written as `number` does, `{p!p}` as `p_value`.
+def filled(template: str, words: Mapping[str, Any]) -> str:
+    """Fill in the words of a sentence.
+
+    `{x!n}` is written as `number` does, `{p!p}` as `p_value`, `{xs!m}` as the median of its values
+    with quartiles, `{runs!i}` as a proportion with its interval at the level `confidence`, its
+    decimals behind a colon (`{runs!i:1}`). A method stands for what it returns: `{xs.mean:.2f}`.
 
     Raises:
         KeyError: If a word is missing.
     """
-    return _Sentence().vformat(template, (), words)
+    return Sentence(words).vformat(template, (), words)
 
 
-class _Sentence(string.Formatter):
+class Sentence(string.Formatter):
+    """Reads and writes the words in braces of a sentence."""
+
+    def __init__(self, words: Mapping[str, Any]) -> None:
+        self.words = words
+
+    def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:
+        """Return the value of a dotted name."""
+        found, first = super().get_field(field_name, args, kwargs)
+        return (found() if "." in field_name and callable(found) else found), first
+
     def convert_field(self, value: Any, conversion: str | None) -> Any:
+        """Return a value as the letter behind its exclamation mark asks."""
+        if conversion == "i":
+            return _Shared(value, self.words["confidence"])
+        if conversion == "m":
+            return spread(spread_of(value))
         if conversion in ("n", "p"):
             return (number if conversion == "n" else p_value)(float(value))
         return super().convert_field(value, conversion)
+
+
+class _Shared(NamedTuple):
+    """A proportion that is written with its interval."""
+
+    proportion: Proportion
+    confidence: float
+
+    def __format__(self, decimals: str) -> str:
+        return self.proportion.with_interval(self.confidence, int(decimals or 0))
 
 
 def p_value(p: float) -> str:

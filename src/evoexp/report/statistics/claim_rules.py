@@ -1,6 +1,7 @@
 """The rules by which claims are judged, as data.
 
-A paper keeps its claims in a file `claims.yaml` beside its pages, one entry per claim:
+A paper keeps its claims in a file `claims.yaml` beside its pages, which its entry point
+`evoexp.claims` names (`my_paper = "my_paper:claims.yaml"`), one entry per claim:
 
     free_at_via_points:                     # its name
       claim: "{who}The motion is free of collision at the via-points, in every run"
@@ -32,11 +33,14 @@ on more than numbers is given as a text instead.
 
 import functools
 from collections.abc import Mapping
+from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import yaml
+
+from evoexp.registry import Registration
 
 OWN = "own"
 # kind → (reproduced, contradicted)
@@ -108,6 +112,14 @@ def read_rules(path: Path) -> Rules:
     """
     entries = yaml.safe_load(path.read_text(encoding="utf-8"))
     return MappingProxyType({name: _rule(name, entry) for name, entry in entries.items()})
+
+
+def registered_rules(registration: Registration) -> Rules:
+    """Return the rules that a package registers: as a file, or as the value of a module."""
+    if registration.file is None:
+        return cast(Rules, registration.load())
+    with resources.as_file(registration.file) as path:
+        return read_rules(path)
 
 
 def _rule(name: str, entry: dict[str, Any]) -> Rule:

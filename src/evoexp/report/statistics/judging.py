@@ -9,7 +9,7 @@ from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import option, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules
+from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules, registered_rules
 from evoexp.report.statistics.comparisons import Comparison, Values, compared
 from evoexp.report.statistics.inference import Proportion, fisher_exact
 from evoexp.shipped import config_directory, shipped
@@ -228,7 +228,7 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
     for paper in names(CLAIMS):
         registration = registered(CLAIMS, paper)
         assert registration is not None
-        for rule in registration.load().values():
+        for rule in registered_rules(registration).values():
             if results.experiment in rule.experiments and rule.name not in known:
                 told = "not among its conditions: " + ", ".join(sorted(missing))
                 yield Hearing(rule.unjudged(), "", 0.0).made(told, "0", verdict)

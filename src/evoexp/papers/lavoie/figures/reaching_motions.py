@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Patch, Rectangle
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers.lavoie import measures
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import marks, motion_geometry, style
+from evoexp.report.kit import markdown, marks, motion_geometry, style
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
 LINK, TOUCHING, CONTACT = "link", "touching", "contact"
@@ -46,6 +47,33 @@ class ShownMotion(NamedTuple):
     replicate: int | None = None
     # (instant, bodies) of the first contact on each sub-path that has one
     contacts: Sequence[tuple[float, str]] = ()
+
+
+def starts(conditions: Sequence[kit.ConditionResults]) -> list[ShownMotion]:
+    """Return the start posture of every condition."""
+    return [ShownMotion(c.label, c) for c in conditions]
+
+
+def solutions(conditions: Sequence[kit.ConditionResults]) -> list[ShownMotion]:
+    """Return every condition's solved run of median error."""
+    return [_shown(c, kit.solved(c)) for c in conditions if kit.solved(c).any()]
+
+
+def refuted_solutions(conditions: Sequence[kit.ConditionResults]) -> list[ShownMotion]:
+    """Return every condition's solved run of median error among those that touch an obstacle."""
+    touching = ((c, kit.solved(c) & measures.touches(c)) for c in conditions)
+    return [_shown(c, rows) for c, rows in touching if rows.any()]
+
+
+def _shown(condition: kit.ConditionResults, among: np.ndarray) -> ShownMotion:
+    """Return the run of median error among some, (done,), as it is drawn."""
+    errors = measures.errors(condition)
+    replicate = kit.median_replicate(condition, errors, among)
+    verdict = motion_geometry.refuted(condition).get(replicate)
+    contacts = measures.contacts(condition, replicate, verdict) if verdict else []
+    error = float(errors[condition.summaries.index.get_loc(replicate)])
+    title = f"{condition.label}: run {replicate}, error {markdown.number(error)}"
+    return ShownMotion(title, condition, replicate, contacts)
 
 
 def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:

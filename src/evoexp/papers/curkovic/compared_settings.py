@@ -1,4 +1,4 @@
-"""The page of sweeps of Curkovic et al. 2013: families of conditions, claims on settings."""
+"""Settings of Curkovic et al. 2013 side by side: families, measures, claims, defects."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -9,10 +9,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import measures
-from evoexp.papers.curkovic.figures import facets, methods
-from evoexp.papers.curkovic.rules import PAPER, RULES
 from evoexp.report import kit
-from evoexp.report.kit import generic, judging, markdown, shares, sweep_figures
+from evoexp.report.kit import markdown, shares
 
 COLLIDES = f"solved motion {measures.REFUTED}"  # says nothing about convergence
 MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
@@ -23,7 +21,6 @@ SHORT = {
     measures.LEAVES: "leave [0, π]",
     measures.TOO_FAST: "too fast (Eq. 2)",
 }
-EFFECTS = "the first one is better than the other one"
 
 
 def families(results: kit.Results) -> tuple[kit.Family, ...]:
@@ -47,19 +44,13 @@ def families(results: kit.Results) -> tuple[kit.Family, ...]:
     return tuple(found)
 
 
-def tested(
-    results: kit.Results, settings: kit.ReportSettings, threshold: float
-) -> tuple[kit.FamilyComparison, ...]:
-    """Return all comparisons of a sweep."""
-    return kit.compare_families(families(results), _measures(results, threshold), settings)
-
-
 def curved(results: kit.Results) -> bool:
     """Return whether any motion is executed as a curve."""
     return any(c.planner.interpolation == "cubic" for c in results.with_data)
 
 
-def _measures(results: kit.Results, threshold: float) -> list[kit.Measure]:
+def sweep_measures(results: kit.Results, threshold: float) -> list[kit.Measure]:
+    """Return the quantities that conditions are compared in."""
     to = f"to a team of cost ≤ {markdown.number(threshold)}"
     found = [
         kit.Measure("best cost", kit.by_column("best_cost")),
@@ -85,7 +76,7 @@ def _without_substeps(condition: kit.ConditionResults) -> str:
 
 
 def of_sweep(
-    results: kit.Results, settings: kit.ReportSettings, found: Sequence[kit.FamilyComparison]
+    judge: kit.Judge, results: kit.Results, compared: Sequence[kit.FamilyComparison]
 ) -> tuple[kit.Claim, ...]:
     """Return the claims that a sweep can judge, chosen by the settings that differ."""
     claims_of: Callable[[kit.Judge, kit.Results, Sequence[kit.FamilyComparison]], list[kit.Claim]]
@@ -96,8 +87,7 @@ def of_sweep(
         claims_of = _mutation
     else:
         return ()
-    judge = judging.judge(results, settings, RULES)
-    return tuple(claims_of(judge, results, _converging(found)))
+    return tuple(claims_of(judge, results, _converging(compared)))
 
 
 def _converging(found: Sequence[kit.FamilyComparison]) -> list[kit.FamilyComparison]:
@@ -168,64 +158,16 @@ def _outcomes(
     return f"{first.label} {'; '.join(parts)}"
 
 
-def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
-    """Build the page of a sweep, or the generic page if there is nothing to compare."""
-    if not measures.fits(results) or len(results.with_data) < 2:
-        return generic.page(results, settings)
-    bound = measures.lower_bound(results.with_data[0])
-    threshold = settings.threshold_ratio * bound
-    found = tested(results, settings, threshold)
-    return PAPER.page(
-        results,
-        "sweep",
-        generic.basis(results, settings),
-        quantities=measures.team_quantities(results, "sweep", threshold),
-        claims=of_sweep(results, settings, found),
-        checks=_checks(results, bound),
-        comparisons=kit.headed(found),
-        drawings=_drawings(results, settings, found, threshold),
-    )
+def converging_rows(
+    compared: Sequence[kit.FamilyComparison],
+) -> dict[str, tuple[kit.Comparison, ...]]:
+    """Return the comparisons in how fast or how far a method converges, by quantity."""
+    return kit.rows_by_name(_converging(compared))
 
 
-def _checks(results: kit.Results, bound: float) -> tuple[tuple[str, str], ...]:
-    slowest = "; ".join(
-        f"{c.label}: {markdown.number(float(c.column('cpu_s').max()))} s" for c in results.with_data
-    )
-    return (
-        *(measures.rates_check(results, defect) for defect in SHORT),
-        ("CPU time of the slowest run (the paper accepts 10 s)", slowest),
-        (measures.BOUND, markdown.number(bound)),
-    )
-
-
-def _drawings(
-    results: kit.Results,
-    settings: kit.ReportSettings,
-    found: Sequence[kit.FamilyComparison],
-    threshold: float,
-) -> tuple[kit.Drawing, ...]:
-    by_name = kit.rows_by_name(_converging(found))
-    told, shown = markdown.number(threshold), results.with_data
-    bound = markdown.number(threshold / settings.threshold_ratio)
-    table = partial(facets.facet_table, results, threshold)
-    return (
-        PAPER.drawing("costs", methods.COSTS, shown, results, threshold, threshold=told),
-        PAPER.drawing("effort", (table, facets.draw_effort), shown, threshold=told),
-        PAPER.drawing(
-            "convergence", (table, facets.draw_convergence), shown, threshold=told, bound=bound
-        ),
-        *sweep_figures.effects_drawings(
-            results, settings, by_name, "the first condition of a family", EFFECTS
-        ),
-        PAPER.drawing(
-            "defects",
-            (rates_table, draw_rates),
-            results.with_data,
-            results,
-            settings.confidence,
-            level=100 * settings.confidence,
-        ),
-    )
+def slowest(condition: kit.ConditionResults) -> float:
+    """Return the CPU time of the slowest run [s]."""
+    return float(condition.column("cpu_s").max())
 
 
 def rates_table(results: kit.Results, confidence: float) -> pd.DataFrame:

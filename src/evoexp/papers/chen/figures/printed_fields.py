@@ -13,11 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from evoexp.papers.chen.rules import PAPER, RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import generic, groups, judging, records, style
+from evoexp.report.kit import groups, records, style
 
 BLOCKED = "*"
 MOST_LEVELS = 10  # of a map whose colour bar shows them one by one
@@ -165,23 +164,30 @@ def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
     )
 
 
-def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
-    """Build the page of the potential fields, or the generic page if there are none."""
-    shown = [c for c in results.references if isinstance(c.planner, GridPathGa)]
-    if not shown:
-        return generic.page(results, settings)
-    tables = {c.label: _compared(c) for c in shown if _fields(c)[0].shape == (16, 16)}
-    judge, compared = judging.judge(results, settings, RULES), tables.values()
-    numbers = (_numbers(c, tables[c.label]) for c in shown if c.label in tables)
-    return PAPER.page(
-        results,
-        "fields",
-        claims=tuple(
-            _claim(judge, *own) for table in compared for own in kit.groups(table, "field")
-        ),
-        checks=tuple(_slips(*own) for table in compared for own in kit.groups(table, "field")),
-        drawings=(*numbers, *map(_map, shown)),
-    )
+def field_references(results: kit.Results) -> tuple[kit.ConditionResults, ...]:
+    """Return the references that hold potential fields."""
+    return tuple(c for c in results.references if isinstance(c.planner, GridPathGa))
+
+
+def printed_fields(
+    field_references: Sequence[kit.ConditionResults],
+) -> list[tuple[kit.ConditionResults, pd.DataFrame]]:
+    """Return the references of the printed map, with all nodes of both fields."""
+    return [(c, _compared(c)) for c in field_references if _fields(c)[0].shape == (16, 16)]
+
+
+def nodes_table(nodes: pd.DataFrame) -> pd.DataFrame:
+    """Return all nodes of both fields beside the printed ones; see `compare`."""
+    return nodes
+
+
+def single_fields(
+    printed_fields: list[tuple[kit.ConditionResults, pd.DataFrame]],
+) -> list[tuple[str, pd.DataFrame]]:
+    """Return the name and the nodes of every field."""
+    return [
+        (str(name), rows) for _, nodes in printed_fields for name, rows in groups(nodes, "field")
+    ]
 
 
 def _fields(condition: kit.ConditionResults) -> tuple[np.ndarray, np.ndarray]:
@@ -197,27 +203,27 @@ def _compared(condition: kit.ConditionResults) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _claim(judge: kit.Judge, name: str, table: pd.DataFrame) -> kit.Claim:
+def wave_front(judge: kit.Judge, field: str, nodes: pd.DataFrame) -> kit.Claim:
     """Judge that a field is printed as the wave front computes it."""
-    total = int((table["slip"] != SURPLUS).sum())
+    total = int((nodes["slip"] != SURPLUS).sum())
     same, wrong, missing, surplus = (
-        int((table["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
+        int((nodes["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
     )
     evidence = (
         f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left out, "
         f"{surplus} tokens too many"
     )
-    hearing = judge.on("wave_front", part=name)
+    hearing = judge.on("wave_front", part=field)
     return hearing.own(evidence, f"{total} nodes", same >= hearing.rule.limits["share"] * total)
 
 
-def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:
-    """Return the row of checks on a field: its slips in words."""
-    slips = kit.records(table[table["slip"] != ""])
+def slips(nodes: pd.DataFrame) -> str:
+    """Return the slips of a field in words."""
+    found = records(nodes[nodes["slip"] != ""])
     told = "; ".join(
-        (SLIPS[row.slip].format(row) + _alike(row, table)).replace("*", "\\*") for row in slips
+        (SLIPS[row.slip].format(row) + _alike(row, nodes)).replace("*", "\\*") for row in found
     )
-    return f"Slips of the print, Fig. 1{name} (counted from 0)", told or "none"
+    return told or "none"
 
 
 def _alike(slip: Any, table: pd.DataFrame) -> str:
@@ -234,22 +240,12 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
     return f" (or any equal one of columns {first} to {last})" if first < last else ""
 
 
-def _numbers(condition: kit.ConditionResults, table: pd.DataFrame) -> kit.Drawing:
-    return PAPER.drawing("fig_1_fields", (lambda: table, draw_fields), (condition,))
+def map_shape(condition: kit.ConditionResults) -> str:
+    """Return the numbers of nodes along both axes, as stems have them."""
+    return "_".join(map(str, _fields(condition)[0].shape))
 
 
-def _map(condition: kit.ConditionResults) -> kit.Drawing:
-    return PAPER.drawing(
-        "fields_map",
-        (_map_table, draw_maps),
-        (condition,),
-        condition,
-        shape="_".join(map(str, _fields(condition)[0].shape)),
-        label=condition.label,
-    )
-
-
-def _map_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def map_table(condition: kit.ConditionResults) -> pd.DataFrame:
     """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
     x, y = (axis.ravel() for axis in np.indices(goal.shape))

@@ -1,6 +1,6 @@
 """Curkovic et al. 2013, Fig. 5: Pareto fronts of the populations in an early generation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 
 from evoexp.evolution.pareto import pareto_front
 from evoexp.papers.curkovic import measures
-from evoexp.papers.curkovic.rules import PAPER
 from evoexp.records import FloatArray, FrontRow
 from evoexp.report import kit
-from evoexp.report.kit import generic, groups, markdown, marks, rounded, style
+from evoexp.report.kit import groups, marks, rounded, style
 from evoexp.store.log_reader import read_log
 
 CRITERIA = ("c1", "c2", "c3", "c4")
@@ -78,45 +77,48 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
-    """Build the page of fronts, or the generic page if no log holds a front."""
-    if not measures.fits(results):
-        return generic.page(results, settings)
-    fronts = {
-        c.label: {int(k): read_log(c.run.log_path(int(k))).fronts for k in c.summaries.index}
-        for c in results.with_data
+Fronts = dict[int, list[FrontRow]]  # replicate → front of each population
+
+
+def fronts(condition: kit.ConditionResults) -> Fronts:
+    """Return the fronts that the logs of a condition hold."""
+    return {
+        int(k): read_log(condition.run.log_path(int(k))).fronts for k in condition.summaries.index
     }
-    drawn = [c for c in results.with_data if fronts[c.label].get(c.best_replicate)]
-    if not drawn:
-        return generic.page(results, settings)
-    base = generic.basis(results, settings)
-    populations = range(max(len(rows) for c in drawn for rows in fronts[c.label].values()))
-    sizes = (
-        kit.Quantity(
+
+
+def front_conditions(results: kit.Results) -> list[tuple[kit.ConditionResults, str]]:
+    """Return the conditions whose fronts are drawn, each with the end of its figure's stem."""
+    several = len(results.with_data) > 1
+    return [
+        (c, f"_{results.position(c.label) + 1}" if several else "")
+        for c in results.with_data
+        if measures.fits(results) and fronts(c).get(c.best_replicate)
+    ]
+
+
+def best_fronts(condition: kit.ConditionResults, fronts: Fronts) -> list[FrontRow]:
+    """Return the fronts of the best replicate."""
+    return fronts[condition.best_replicate]
+
+
+def front_sizes(results: kit.Results) -> Iterator[kit.Quantity]:
+    """Yield the rows of the sizes of fronts, population by population."""
+    found = {c.label: fronts(c) for c in results.with_data}
+    most = max(len(rows) for own in found.values() for rows in own.values())
+    for population in range(most):
+        yield kit.Quantity(
             f"individuals on the front of robot {population + 1}'s population",
             "–",
-            {c.label: kit.spread(_sizes(fronts[c.label], population)) for c in results.with_data},
+            {label: kit.spread(_sizes(own, population)) for label, own in found.items()},
         )
-        for population in populations
-    )
-    return PAPER.page(
-        results,
-        "fronts",
-        base,
-        quantities=(*sizes, *base.quantities),
-        checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
-        drawings=(
-            *(_drawing(results, c, fronts[c.label]) for c in drawn),
-            generic.best_drawing(results),
-        ),
-    )
 
 
 def _size(front: FrontRow) -> int:
     return int(pareto_front(np.ascontiguousarray(front.criteria.T)).sum())
 
 
-def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
+def _sizes(fronts: Fronts, population: int) -> FloatArray:
     """Return the number of individuals on the front of a population, (replicates,)."""
     return np.array(
         [_size(rows[population]) for rows in fronts.values() if population < len(rows)],
@@ -124,39 +126,15 @@ def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
     )
 
 
-def _checks(
-    condition: kit.ConditionResults, fronts: dict[int, list[FrontRow]]
-) -> tuple[tuple[str, str], ...]:
-    ga = condition.planner.ga
-    sizes = np.array([_size(front) for rows in fronts.values() for front in rows])
-    larger, single = (
-        markdown.share(int(np.count_nonzero(of)), len(sizes))
-        for of in (sizes > ga.num_hall_teams, sizes == 1)
-    )
-    return PAPER.checks(
-        "fronts",
-        ga=ga,
-        larger=larger,
-        single=single,
-        costs=markdown.spread(condition.spread("best_cost")),
-        bound=markdown.number(measures.lower_bound(condition)),
-    )
+def large_fronts(condition: kit.ConditionResults, fronts: Fronts) -> kit.Proportion:
+    """Count the fronts that are larger than the hall of fame may be."""
+    return kit.counted(_all_sizes(fronts) > condition.planner.ga.num_hall_teams)
 
 
-def _drawing(
-    results: kit.Results, condition: kit.ConditionResults, fronts: dict[int, list[FrontRow]]
-) -> kit.Drawing:
-    best, several = condition.best_replicate, len(results.with_data) > 1
-    generation = fronts[best][0].generation
-    suffix = f"_{results.position(condition.label) + 1}" if several else ""
-    return PAPER.drawing(
-        "fig_5_fronts",
-        (fronts_table, draw_fronts),
-        (condition,),
-        fronts[best],
-        best,
-        condition.condition.length_unit,
-        suffix=suffix,
-        generation=generation,
-        replicate=best,
-    )
+def single_fronts(fronts: Fronts) -> kit.Proportion:
+    """Count the fronts of a single point."""
+    return kit.counted(_all_sizes(fronts) == 1)
+
+
+def _all_sizes(fronts: Fronts) -> np.ndarray:
+    return np.array([_size(front) for rows in fronts.values() for front in rows])

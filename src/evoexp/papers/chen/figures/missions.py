@@ -1,6 +1,6 @@
 """Chen & Zalzala 1995, both searches joined: a safe path and a docking posture as one motion."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,11 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
-from evoexp.papers.chen.rules import PAPER
 from evoexp.planners.two_stage.planner import Problem, TwoStage
 from evoexp.records import FloatArray
 from evoexp.report import kit
-from evoexp.report.kit import generic, markdown, run_measures, style
+from evoexp.report.kit import markdown, style
 
 PATH, TRAVEL, DOCKED = "path", "travel posture", "docking posture"
 TARGET, BODY, FORCE = "target", "body", "force"
@@ -109,45 +108,34 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
     axes.margins(0.1)
 
 
-def page(results: kit.Results, settings: kit.ReportSettings) -> kit.Page:
-    """Build the page of the missions, or the generic page if another planner was run."""
-    found = results.with_data
-    if not kit.planned_by(results, TwoStage):
-        return generic.page(results, settings)
-    drawing = PAPER.drawing(
-        "mission",
-        (missions_table, draw_missions),
-        found,
-        found,
-        plays=tuple(
-            kit.PlayedRun(c, run_measures.median_replicate(c, c.column("best_cost"))) for c in found
-        ),
-    )
-    return PAPER.page(
-        results,
-        "mission",
-        quantities=PAPER.quantities(results, "mission"),
-        checks=tuple(row for c in found for row in _checks(c, settings)),
-        drawings=(drawing,),
-    )
+def fits_missions(results: kit.Results) -> bool:
+    """Return whether there are results, all of two searches in one."""
+    return kit.planned_by(results, TwoStage)
 
 
-def _checks(
-    condition: kit.ConditionResults, settings: kit.ReportSettings
-) -> tuple[tuple[str, str], ...]:
-    """Return the rows on a condition's exact verdicts and on its docking places."""
-    label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
-    free = kit.Proportion(found.certified, found.judged)
-    nearest = condition.summaries["clearance_pair"].value_counts()
-    places = np.round(condition.column("term_platform_x"), 3)
-    near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]
-    verdicts = (
-        f"{markdown.share(*free)} ({markdown.percent(free.interval(settings.confidence))}) free "
-        f"of contact over the whole motion; {found.refuted} touch, {found.undecided} undecided; "
-        f"closest most often: {nearest.index[0]}"
-    )
-    spread = (
-        f"between {places.min():g} and {places.max():g}, {near} of {condition.done} on the near "
-        "side of the end-effector"
-    )
-    return (f"{label}: exact verdicts", verdicts), (f"{label}: docking places X_p", spread)
+def median_missions(conditions: Sequence[kit.ConditionResults]) -> list[kit.PlayedRun]:
+    """Return the run of median cost of every condition."""
+    return [kit.PlayedRun(c, kit.median_replicate(c, c.column("best_cost"))) for c in conditions]
+
+
+def mission_checks(
+    conditions: Sequence[kit.ConditionResults], confidence: float
+) -> Iterator[tuple[str, str]]:
+    """Yield the rows on every condition's exact verdicts and on its docking places."""
+    for condition in conditions:
+        label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
+        free = kit.Proportion(found.certified, found.judged)
+        nearest = condition.summaries["clearance_pair"].value_counts()
+        places = np.round(condition.column("term_platform_x"), 3)
+        near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]
+        verdicts = (
+            f"{markdown.share(*free)} ({markdown.percent(free.interval(confidence))}) free "
+            f"of contact over the whole motion; {found.refuted} touch, {found.undecided} "
+            f"undecided; closest most often: {nearest.index[0]}"
+        )
+        spread = (
+            f"between {places.min():g} and {places.max():g}, {near} of {condition.done} on the "
+            "near side of the end-effector"
+        )
+        yield f"{label}: exact verdicts", verdicts
+        yield f"{label}: docking places X_p", spread

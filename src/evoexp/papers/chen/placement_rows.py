@@ -1,0 +1,147 @@
+"""Rows of the tables and checks on the docking postures of Chen & Zalzala 1995, Figs. 3–9."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from evoexp.papers.chen.cases import CLOSE, Case
+from evoexp.papers.chen.cases import cases as case_list
+from evoexp.planners.placement_ga.planner import PlacementGa
+from evoexp.report import kit
+from evoexp.report.kit import markdown
+
+Conditions = tuple[kit.ConditionResults, ...]
+
+
+def fits_placements(results: kit.Results) -> bool:
+    """Return whether there are results, all of docking postures."""
+    return kit.planned_by(results, PlacementGa)
+
+
+def exact_cases(cases: list[Case]) -> list[Case]:
+    """Return the criteria whose exact optimum is known."""
+    return [case for case in cases if case.optimum is not None]
+
+
+def evolved_cases(exact_cases: list[Case]) -> list[Case]:
+    """Return those of them for which anything was evolved."""
+    return [case for case in exact_cases if case.evolved]
+
+
+def landscapes(results: kit.Results) -> list[Case]:
+    """Return the criteria whose landscape was computed."""
+    found = case_list(results) if fits_placements(results) else []
+    return [case for case in found if case.landscape is not None]
+
+
+def case_conditions(cases: list[Case]) -> Conditions:
+    """Return the conditions of all criteria."""
+    return tuple(c for case in cases for c in case.conditions)
+
+
+def landscape_conditions(landscapes: list[Case]) -> Conditions:
+    """Return the conditions of the criteria whose landscape was computed."""
+    return case_conditions(landscapes)
+
+
+def landscape_row(case: Case) -> tuple[object, ...]:
+    """Return a criterion's feasible share, its local minima and the best run."""
+    assert case.landscape is not None
+    share = 100.0 * float(case.landscape.column("term_share_feasible")[0])
+    told = "; ".join(f"({a:.2f}, {b:.2f})°: {e:.5g}" for a, b, e in case.minima).replace("-", "−")
+    best = float(case.plain.column("best_cost").min()) if case.plain is not None else np.nan
+    return case.name, f"{share:.1f} %", len(case.minima), told or "–", markdown.number(best)
+
+
+def result_row(case: Case) -> tuple[str, ...]:
+    """Return a criterion's row: paper, exact optimum, GA, random search, conventional methods."""
+    methods = (f"{name} {_shares(case, ends[:, 2])}" for name, ends in case.ends().items())
+    least = f"E = {case.least:.6g}" if case.optimum is not None else "–"
+    runs = (_run(case, c) for c in (case.plain, case.elitist, case.search))
+    return (case.name, _paper(case) or "–", least, *runs, "; ".join(methods) or "–")
+
+
+def _paper(case: Case) -> str:
+    """Return the printed number, and E at the printed angles."""
+    value, angles = case.printed.value, case.printed.angles
+    told = [] if np.isnan(value) else [f"{case.printed.term.replace('_', ' ')} {value:g}"]
+    if angles is not None:
+        told.append(f"E = {case.measured(angles)['cost']:.6g} at its angles")
+    return "; ".join(told)
+
+
+def _run(case: Case, condition: kit.ConditionResults | None) -> str:
+    """Return the spread of the best E of a condition's runs, and shares near the optimum."""
+    if condition is None:
+        return "–"
+    costs = condition.column("best_cost")
+    return f"{markdown.spread(kit.spread(costs))} {_shares(case, costs)}"
+
+
+def _shares(case: Case, costs: np.ndarray) -> str:
+    """Return the shares of costs near the optimum; empty if it is not known."""
+    shares = (f"{100 * case.within(costs, close).share:.0f} %" for close in CLOSE)
+    return "" if np.isnan(case.least) else f"({', '.join(shares)})"
+
+
+def posture_rows(cases: list[Case]) -> Iterator[tuple[str, ...]]:
+    """Yield the numbers of the exact optimum and of the paper's angles."""
+    for case in cases:
+        shown = {"exact optimum": case.optimal_angles, "paper's angles": case.printed.angles}
+        for name, angles in shown.items():
+            if angles is not None:
+                found = case.measured(angles)
+                row = (
+                    case.name,
+                    name,
+                    ", ".join(f"{found[f'theta_{k}_deg']:.2f}" for k in (1, 2, 3)),
+                    f"{found['platform_x']:.4f}",
+                    ", ".join(f"{found[f'torque_{k}']:.3f}" for k in (1, 2, 3)),
+                    *(
+                        f"{found[term]:.4g}"
+                        for term in ("torque_norm", "torque_max", "obstacle", "manipulability")
+                    ),
+                    f"{found['cost']:.6g}",
+                )
+                yield tuple(cell.replace("-", "−") for cell in row)
+
+
+def posture_checks(case: Case) -> list[tuple[str, str]]:
+    """Return the rows on the local minima, and on contacts of the exact bodies."""
+    rows = []
+    if case.optimum is not None:
+        values = ", ".join(f"{value:.4g}" for value in case.minima[:, 2])
+        touching = case.optimum.summaries["certified"].eq(False).any()
+        clearance = markdown.number(float(case.optimum.column("clearance")[0]))
+        column = "refuted_pair" if touching else "clearance_pair"
+        pair = str(case.optimum.summaries[column].iloc[0])
+        named = pair.replace("arm_1_link_", "link ").replace("obstacle_1", "obstacle")
+        told = "touches" if touching else f"is free, clearance {clearance}"
+        rows = [
+            (f"{case.name}: local minima", values),
+            (f"{case.name}: bodies at the exact optimum", f"{told} ({named})"),
+        ]
+    if case.conditions[0].planner.objective.avoidances:
+        rows += [
+            (
+                f"{case.name}: {name}, exact bodies",
+                f"{c.verdicts.refuted} of {c.verdicts.judged} best postures touch",
+            )
+            for name, c in case.evolved.items()
+        ]
+    return rows
+
+
+def result_rows(cases: list[Case]) -> list[tuple[str, ...]]:
+    """Return the rows of all criteria."""
+    return [result_row(case) for case in cases]
+
+
+def landscape_rows(landscapes: list[Case]) -> list[tuple[object, ...]]:
+    """Return the rows of all landscapes."""
+    return [landscape_row(case) for case in landscapes]
+
+
+def placement_checks(cases: list[Case]) -> list[tuple[str, str]]:
+    """Return the rows of checks of all criteria."""
+    return [row for case in cases for row in posture_checks(case)]

@@ -1,0 +1,287 @@
+"""Rows of the tables, and the runs of the figures, on the pages of Corsépius 2001."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from evoexp.numeric.elementary import DEGREE
+from evoexp.papers.corsepius import claims, measures
+from evoexp.papers.corsepius.claims import METRICS
+from evoexp.papers.corsepius.figures import posture_trap
+from evoexp.papers.corsepius.figures.posture_motions import ShownPath
+from evoexp.papers.corsepius.measures import Task
+from evoexp.planners.posture_es.planner import PostureEs
+from evoexp.report import kit
+from evoexp.report.kit import markdown
+
+SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
+Conditions = tuple[kit.ConditionResults, ...]
+# evaluations and cycles to the goal, and steps of the path to it, (done,); inf without it
+effort = kit.where_solved(measures.evaluations)
+cycles_to_goal = kit.where_solved(measures.cycles)
+steps_to_goal = kit.where_solved(measures.num_steps)
+
+
+def fits(results: kit.Results) -> bool:
+    """Return whether there are results, all of postures that evolve."""
+    return kit.planned_by(results, PostureEs)
+
+
+def is_sweep(results: kit.Results) -> bool:
+    """Return whether there are several such conditions to compare."""
+    return fits(results) and len(results.main) > 1
+
+
+def obstructed(main: Conditions) -> Conditions:
+    """Return the conditions whose obstacles stand."""
+    return measures.among_obstacles(main)
+
+
+def shown_task(obstructed: Conditions) -> Conditions:
+    """Return the first of these conditions."""
+    return obstructed[:1]
+
+
+def tilts(results: kit.Results) -> Iterator[kit.Quantity]:
+    """Yield the rows of the tilts that any task limits."""
+    for term in claims.TILTS:
+        if any(getattr(c.planner.objective, term) is not None for c in results.with_data):
+            for where, part in (("at", ""), ("between", "_between")):
+                name = f"greatest tilt {where} postures ({term.replace('_', ' ')})"
+                values = kit.by_column(f"term_greatest_{term}{part}_deg")
+                yield kit.quantity(results, name, "deg", values)
+
+
+def ends(condition: kit.ConditionResults) -> str:
+    """Return why searches ended, with the number of runs."""
+    reasons = measures.reasons(condition).items()
+    return ", ".join(f"{name} {p.having}" for name, p in reasons if p.having)
+
+
+def beside_empty(results: kit.Results, confidence: float) -> tuple[tuple[str, ...], ...]:
+    """Return a row per task that has an empty scene as its control: shares, test, cycles."""
+    pairs = measures.with_empty_scenes(results.main)
+    tested = [kit.fisher_exact(kit.success(c), kit.success(e)) for c, e in pairs]
+    return tuple(
+        (
+            c.label,
+            *(kit.success(one).with_interval(confidence) for one in (c, e)),
+            markdown.p_value(p),
+            *(markdown.spread(kit.spread(measures.cycles(one))) for one in (c, e)),
+        )
+        for (c, e), p in zip(pairs, kit.holm(tested), strict=True)
+    )
+
+
+def releases(obstructed: Conditions) -> list[tuple[str, ...]]:
+    """Return a row per condition that lets go of an object."""
+    letting_go = filter(measures.lets_go, obstructed)
+    return [_release_row(c) for c in letting_go if measures.releases(c)]
+
+
+def _release_row(condition: kit.ConditionResults) -> tuple[str, ...]:
+    """Return gap and tilt of the objects of a condition: medians and the worst."""
+    found, unit = measures.releases(condition), condition.condition.length_unit
+    gaps, tilts = (np.array([getattr(one, name) for one in found]) for name in ("gap", "tilt"))
+    deepest, highest = max(0.0, -float(gaps.min())), max(0.0, float(gaps.max()))
+    return (
+        condition.label,
+        str(len(found)),
+        f"{markdown.number(float(f'{deepest:.2g}'))} {unit}",
+        f"{markdown.number(float(f'{highest:.2g}'))} {unit}",
+        f"{np.median(tilts) / DEGREE:.2f}°",
+        f"{tilts.max() / DEGREE:.2f}°",
+    )
+
+
+def phased(main: Conditions) -> tuple[kit.ConditionResults, ...]:
+    """Return the conditions that have several phases."""
+    several = (c for c in main if len(measures.phase_names(c)) > 1)
+    return measures.among_obstacles(tuple(several))
+
+
+def phase_rows(phased: Conditions, confidence: float) -> Iterator[tuple[object, ...]]:
+    """Yield a row per condition and phase: runs that met its goal, and cycles."""
+    for condition in phased:
+        table = measures.phase_cycles(condition)
+        for k, name in enumerate(measures.phase_names(condition)):
+            own = table[table["phase"] == k]
+            reached = kit.counted(own["reached"]).with_interval(confidence)
+            cycles = markdown.spread(kit.spread(own["cycles"].to_numpy(dtype=np.float64)))
+            yield condition.label, f"{k + 1}  {name}", reached, cycles
+
+
+def collision_models(main: Conditions) -> Iterator[tuple[str, str]]:
+    """Yield a row on the collision model of every robot."""
+    for c in measures.by_robot(main):
+        bodies = measures.problem(c).bodies
+        pairs = bodies.sorted_pairs
+        text = (
+            f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most "
+            f"{bodies.inflation:.3g} {c.condition.length_unit} beyond them; pairs of bodies: "
+            f"{len(pairs.tested)} tested, {len(pairs.adjacent)} neighbours or disabled, "
+            f"{len(pairs.always)} always touch, {len(pairs.never)} never do"
+        )
+        yield f"{c.label}: the model of collisions", text
+
+
+def robots(obstructed: Conditions) -> Conditions:
+    """Return one condition per robot."""
+    return measures.by_robot(obstructed)
+
+
+def titled_robots(robots: Conditions) -> list[tuple[str, kit.ConditionResults]]:
+    """Return (title, condition) of every robot."""
+    return [(c.label if len(robots) > 1 else "the robot", c) for c in robots]
+
+
+def stop_reasons(main: Conditions) -> list[tuple[str, int, str, kit.Proportion]]:
+    """Return (quantity, position, condition, runs) of every reason for which searches end."""
+    return [
+        (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
+        for reason in measures.REASONS
+        for position, c in enumerate(main)
+    ]
+
+
+def shown_paths(obstructed: Conditions) -> list[ShownPath]:
+    """Return the run of every condition whose path is drawn."""
+    return [
+        ShownPath(f"{c.label}\nrun {k}{'' if c.solved else ', not solved'}", c, k)
+        for c in obstructed
+        for k in (measures.shown_replicate(c),)
+    ]
+
+
+def manoeuvres(results: kit.Results, phased: Conditions) -> list[tuple[list[ShownPath], str]]:
+    """Return the runs whose phases are drawn one by one, each with the end of its figure's stem."""
+    several = [c for c in phased if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
+    ends = [f"_{results.position(c.label) + 1}" if len(several) > 1 else "" for c in several]
+    shown = [[ShownPath(c.label, c, measures.shown_replicate(c), True)] for c in several]
+    return list(zip(shown, ends, strict=True))
+
+
+def stuck_pair(obstructed: Conditions) -> Conditions:
+    """Return a condition that gets stuck and the same with sub-goals; empty without both."""
+    return posture_trap.pair(obstructed) or ()
+
+
+def scenes(results: kit.Results) -> tuple[kit.Family, ...]:
+    """Return the first condition of every task against its others."""
+    return tuple(map(kit.Family.of, kit.grouped(results.with_data, measures.scene)))
+
+
+def goal_measures(main: Conditions) -> list[kit.Measure]:
+    """Return the quantity that is compared: if no run meets its goal, the distance to it."""
+    if any(c.solved for c in main):
+        return [kit.Measure("evaluations to the goal", effort)]
+    return [kit.Measure("distance to the goal", measures.residuals)]
+
+
+def share_rows(results: kit.Results, confidence: float) -> Iterator[tuple[str, ...]]:
+    """Yield success, verdicts and oversized steps of every condition."""
+    for first, *others in kit.grouped(results.with_data, measures.scene):
+        met, touching = (
+            [
+                "–",
+                *map(
+                    markdown.p_value,
+                    kit.holm([kit.fisher_exact(count(first), count(c)) for c in others]),
+                ),
+            ]
+            for count in (kit.success, measures.refuted)
+        )
+        for c, p_met, p_touching in zip((first, *others), met, touching, strict=True):
+            goal_met, refuted = kit.success(c).with_interval(confidence), measures.refuted(c)
+            beyond = markdown.spread(kit.spread(c.column("term_oversized_steps")))
+            told = goal_met, p_met, refuted.with_interval(confidence), p_touching, beyond
+            yield c.label, *told
+
+
+def scopes(results: kit.Results) -> tuple[Task, ...]:
+    """Return the tasks whose scopes differ and that never end by reaching the goal."""
+    if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
+        return ()
+    found = measures.tasks(results, "scope", "")
+    return tuple(task for task in found if not any(c.solved for c in task.conditions))
+
+
+def parents(results: kit.Results) -> tuple[Task, ...]:
+    """Return the tasks whose numbers of parents differ."""
+    return measures.tasks(results, "num_parents")
+
+
+def sizes(results: kit.Results) -> tuple[Task, ...]:
+    """Return the tasks whose populations differ in size."""
+    return measures.tasks(results, "num_offspring") if fits(results) else ()
+
+
+def scope_conditions(scopes: tuple[Task, ...]) -> Conditions:
+    """Return the conditions of these tasks."""
+    return _conditions(scopes)
+
+
+def parent_conditions(parents: tuple[Task, ...]) -> Conditions:
+    """Return the conditions of these tasks."""
+    return _conditions(parents)
+
+
+def size_conditions(sizes: tuple[Task, ...]) -> Conditions:
+    """Return the conditions of these tasks."""
+    return _conditions(sizes)
+
+
+def _conditions(tasks: tuple[Task, ...]) -> Conditions:
+    return tuple(c for task in tasks for c in task.conditions)
+
+
+def floor_rows(main: Conditions, scopes: tuple[Task, ...]) -> list[tuple[str, ...]]:
+    """Return the distances at which searches stagnate, if no goal can be met."""
+    columns = (lambda c: 1e3 * measures.residuals(c)), measures.cycles
+    return [
+        (c.label, *(markdown.spread(kit.spread(values(c))) for values in columns))
+        for c in (main if scopes else ())
+    ]
+
+
+def shares_are_shown(results: kit.Results, parents: tuple[Task, ...]) -> bool:
+    """Return whether shares are drawn: some run meets its goal."""
+    return not parents and any(c.solved for c in results.with_data)
+
+
+def values_are_shown(scopes: tuple[Task, ...], parents: tuple[Task, ...]) -> bool:
+    """Return whether efforts are drawn condition by condition."""
+    return not (scopes or parents)
+
+
+def size_names(sizes: tuple[Task, ...]) -> list[str]:
+    """Return the names of the tasks."""
+    return [task.name for task in sizes]
+
+
+def num_size_runs(size_conditions: Conditions) -> int:
+    """Count the finished runs."""
+    return sum(c.done for c in size_conditions)
+
+
+def size_rows(sizes: tuple[Task, ...], settings: kit.ReportSettings) -> Iterator[tuple[str, ...]]:
+    """Yield success and expected running times with their intervals, a row per task and size."""
+    level = settings.confidence
+    for task in sizes:
+        for value, c in task.by_value.items():
+            shares = (count(c).with_interval(level) for count in (kit.success, measures.refuted))
+            efforts = (_expected(c, metric, settings) for metric in METRICS)
+            yield task.name, f"{value:g}", *shares, *efforts
+
+
+def _expected(condition: kit.ConditionResults, metric: str, settings: kit.ReportSettings) -> str:
+    """Return the expected running time with its interval."""
+    if not condition.solved:
+        return "∞"
+    runs = METRICS[metric](condition), kit.solved(condition)
+    interval = kit.expected_interval(*runs, settings.confidence, settings.num_resamples)
+    expected, low, high = (
+        markdown.number(float(f"{SCALES[metric] * value:.3g}"))
+        for value in (kit.expected_effort(*runs), *interval)
+    )
+    return f"{expected} [{low}, {high}]"

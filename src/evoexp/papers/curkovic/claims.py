@@ -1,0 +1,286 @@
+"""The claims of Curkovic et al. 2013 on methods and motions, and under assumed numbers."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.papers.curkovic import link_motions, measures
+from evoexp.planners.coevolution.link_problem import Problem
+from evoexp.records import FloatArray
+from evoexp.report import kit
+from evoexp.report.kit import judging, markdown
+
+Rows = tuple[kit.Comparison, ...]
+Conditions = Sequence[kit.ConditionResults]
+PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
+EFFORT = "evaluations to a team whose cost is the threshold"
+METHOD, PLAIN, ELITES = "V", "I", "15 elites"
+KEPT = "least distance of an end-effector from another robot's links"
+
+
+def method_pairs() -> tuple[tuple[str, str], ...]:
+    """Return the methods with a hall, each with its twin without."""
+    return PAIRS
+
+
+class MatchedPairs(NamedTuple):
+    """Comparisons of methods with a hall and their twins without."""
+
+    costs: Rows  # best costs
+    generations: Rows  # generations to the threshold
+    certified: Rows  # best costs, a refuted motion counting as worse than any
+
+
+def matched_pairs(
+    results: kit.Results, settings: kit.ReportSettings, threshold: float
+) -> MatchedPairs:
+    """Compare the methods that have a twin."""
+    by_label = {c.label: c for c in results.with_data}
+    pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
+    matched = partial(
+        kit.compared, pairs, settings=settings, named=lambda a, b: f"{a.label} against {b.label}"
+    )
+    generations = partial(measures.generations_to, threshold=threshold)
+    values = kit.by_column("best_cost"), generations, measures.certified_cost
+    return MatchedPairs(*map(matched, values))
+
+
+def method_comparisons(matched_pairs: MatchedPairs, threshold: float) -> list[tuple[str, Rows]]:
+    """Return (heading, comparisons) of matched pairs."""
+    to = markdown.number(threshold)
+    titles = "best cost of a team", f"generations to a team below {to}", measures.CERTIFIED
+    return [
+        (f"{title}: matched pairs of methods", rows)
+        for title, rows in zip(titles, matched_pairs, strict=True)
+        if rows
+    ]
+
+
+def judge_methods(
+    judge: kit.Judge, results: kit.Results, matched_pairs: MatchedPairs, threshold: float
+) -> list[kit.Claim]:
+    """Judge the claims on methods of co-evolution."""
+    judged = {  # measure → the word of the better one, comparisons
+        f"a team of cost ≤ {markdown.number(threshold)}": ("earlier", matched_pairs.generations),
+        "the best cost at the end": ("lower", matched_pairs.costs),
+        measures.CERTIFIED: ("lower", matched_pairs.certified),
+    }
+    found = [
+        judge.on("faster", who="", measure=title, pair=f": {row.quantity}").better(row, word)
+        for title, (word, rows) in judged.items()
+        for row in rows
+    ]
+    slowest = max((float(c.column("cpu_s").max()) for c in results.with_data), default=np.nan)
+    solved, done = sum(c.solved for c in results.with_data), sum(c.done for c in results.with_data)
+    planned = sum(c.planned for c in results.conditions)
+    told = (
+        f"{markdown.share(solved, done)} runs found one; the slowest run took "
+        f"{markdown.number(slowest)} s of CPU"
+    )
+    in_time = solved if slowest < judge.rules["in_time"].limits["seconds"] else 0
+    return [*found, judge.on("in_time").every(told, in_time, done, planned)]
+
+
+def conditions_by_radius(results: kit.Results) -> dict[int, list[kit.ConditionResults]]:
+    """Return collision substeps → conditions by growing radius; nothing if no radius differs."""
+    found: dict[int, list[kit.ConditionResults]] = {}
+    for c in sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius)):
+        found.setdefault(c.planner.collision.collision_substeps, []).append(c)
+    several = len({c.planner.collision.tcp_radius for c in results.main}) > 1
+    return found if several else {}
+
+
+def radius_conditions(
+    conditions_by_radius: dict[int, list[kit.ConditionResults]],
+) -> tuple[kit.ConditionResults, ...]:
+    """Return these conditions in one row; empty if no radius differs."""
+    return tuple(c for conditions in conditions_by_radius.values() for c in conditions)
+
+
+def compared_radii(
+    conditions_by_radius: dict[int, list[kit.ConditionResults]], settings: kit.ReportSettings
+) -> Rows:
+    """Compare the largest radius with the smallest one, for every number of collision substeps."""
+
+    def named(largest: kit.ConditionResults, smallest: kit.ConditionResults) -> str:
+        substeps = largest.planner.collision.collision_substeps
+        tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
+        return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
+
+    pairs = [(own[-1], own[0]) for own in conditions_by_radius.values() if len(own) > 1]
+    return kit.compared(
+        pairs, link_motions.tool_distance, settings, lower_is_better=False, named=named
+    )
+
+
+def tool_comparisons(compared_radii: Rows) -> list[tuple[str, Rows]]:
+    """Return (heading, comparisons) of radii."""
+    return [("Largest against smallest radius", compared_radii)] if compared_radii else []
+
+
+def tools(results: kit.Results, compared_radii: Rows) -> list[kit.Quantity]:
+    """Return the row of end-effectors' distances where radii differ."""
+    name = f"{KEPT}, its centre line"
+    unit = results.with_data[0].condition.length_unit
+    row = kit.quantity(results, name, unit, link_motions.tool_distance) if compared_radii else None
+    return [row] if row else []
+
+
+def judge_motions(judge: kit.Judge, results: kit.Results, compared_radii: Rows) -> list[kit.Claim]:
+    """Judge the claims on motions and radii."""
+    found = list[kit.Claim]()
+    for c in results.main:
+        scene, where = _scene_claim(c)
+        certified = kit.certified(c).having
+        for who, holds, judged in (
+            ("the paper's model", c.solved, c.done),
+            ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
+        ):
+            hearing = judge.on(
+                "free_motion", condition=c.label, scene=scene, judge=who, where=where
+            )
+            told = f"{markdown.share(holds, judged)} runs"
+            found.append(hearing.every(told, holds, judged, c.planned))
+    found += [
+        judge.on("larger_radius", pair=row.quantity).better(row, "larger") for row in compared_radii
+    ]
+    return found
+
+
+def _scene_claim(condition: kit.ConditionResults) -> tuple[str, str]:
+    """Return the claim that the paper makes of a scene, and its source."""
+    problem = condition.problem(Problem)
+    if len(problem.start) > 2:
+        return "The method takes new robots: it finds a collision-free motion of three", "section 5"
+    if not problem.moving.all():
+        text = "One robot stands still, obstacles stand around: a collision-free motion"
+        return text, "section 4, Fig. 10"
+    if enveloped(condition):
+        text = "Envelopes and circles: a collision-free motion of the robots with their bodies"
+        return text, "section 4"
+    return "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
+
+
+def enveloped(condition: kit.ConditionResults) -> bool:
+    """Return whether the search tests more of the robots than their lines."""
+    collision = condition.planner.collision
+    return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
+
+
+def motion_checks(results: kit.Results) -> tuple[tuple[str, str], ...]:
+    """Return the rows on defects, bodies that stick out, and the length of the chromosome."""
+    first = results.with_data[0]
+    checks = [measures.rates_check(results, defect) for defect in measures.DEFECTS]
+    if enveloped(first):
+        models = {c.label: c.planner.collision for c in results.with_data}
+        sticks = [name for name, model in models.items() if model.tcp_radius < model.half_width]
+        title = (
+            "Boundary lines have no ends: the body of a link, round at its end, sticks out where "
+            "the tool is smaller"
+        )
+        checks.append((title, "; ".join(sticks) or "nowhere"))
+    notes = first.planner.notes(first.prepared.problem)
+    return (*checks, *(("Length of the chromosome (Eqs. 2, 3)", note) for note in notes))
+
+
+def crossing(main: Conditions) -> Conditions:
+    """Return the first condition if it is one of two moving robots of lines; empty otherwise."""
+    first = main[0]
+    problem = first.problem(Problem)
+    plain = len(problem.start) == 2 and not enveloped(first) and problem.moving.all()
+    return (first,) if plain else ()
+
+
+def motion_figure(condition: kit.ConditionResults, radius_conditions: Conditions) -> str:
+    """Return the number of the paper's figure that shows such a motion; empty: none does."""
+    problem = condition.problem(Problem)
+    if not problem.moving.all():
+        return "10"
+    return "" if len(problem.start) > 2 or radius_conditions else "8"
+
+
+def motion_stem(motion_figure: str) -> str:
+    """Return the stem of the figure of a motion."""
+    return f"fig_{motion_figure}_motion" if motion_figure else "motion"
+
+
+def motion_title(condition: kit.ConditionResults, motion_figure: str) -> str:
+    """Return the title of the figure of a motion."""
+    titles = {"8": "Fig. 8: motion of the two robots", "10": "Fig. 10: one robot stands still"}
+    robots = len(condition.problem(Problem).start)
+    return titles.get(motion_figure, f"Motion of {robots} robots")
+
+
+def joints_stem(motion_figure: str) -> str:
+    """Return the stem of the figure of angles."""
+    return "fig_9_joints" if motion_figure == "8" else "joints"
+
+
+def joints_title(motion_figure: str) -> str:
+    """Return the beginning of the title of the figure of angles."""
+    return "Fig. 9: link" if motion_figure == "8" else "Link"
+
+
+def with_hall(results: kit.Results) -> kit.Results:
+    """Return the results of method V under all numbers."""
+    treated = (c for c in results.conditions if c.label.partition(", ")[0] == METHOD)
+    return results._replace(conditions=tuple(treated))
+
+
+def effort(condition: kit.ConditionResults, settings: kit.ReportSettings) -> FloatArray:
+    """Return the evaluations to a team of the threshold's cost in its own scene, (done,)."""
+    threshold = settings.threshold_ratio * measures.lower_bound(condition)
+    return measures.evaluations_to(condition, threshold)
+
+
+def assumed_faster(
+    judge: kit.Judge, condition: kit.ConditionResults, results: kit.Results
+) -> kit.Claim:
+    """Judge method V against method I under the same numbers."""
+    hearing = judge.on("faster", who="", measure=EFFORT, pair=f": {METHOD} against {PLAIN}")
+    values = partial(effort, settings=judge.settings)
+    return hearing.better(_against(judge, results, condition, PLAIN, values), "lower")
+
+
+def assumed_elites(
+    judge: kit.Judge, condition: kit.ConditionResults, results: kit.Results
+) -> kit.Claim:
+    """Judge method V against elites under the same numbers."""
+    row = _against(judge, results, condition, ELITES, kit.by_column("best_cost"))
+    told = judging.evidence(row, "lower") if row else "nothing to compare"
+    hearing = judge.on("hall_beyond_elites", who="", elites=ELITES, measure="best cost")
+    return hearing.better_than_all(told, [row] if row else [])
+
+
+def _against(
+    judge: kit.Judge,
+    results: kit.Results,
+    condition: kit.ConditionResults,
+    other: str,
+    values: kit.Values,
+) -> kit.Comparison | None:
+    """Compare method V with another treatment under the same numbers.
+
+    Numbers of the hall are no numbers of a treatment without one: that is as assumed then.
+    """
+    _, comma, changed = condition.label.partition(", ")
+    by_label = {c.label: c for c in results.with_data}
+    twin = by_label.get(f"{other}{comma}{changed}", by_label.get(other))
+    return None if twin is None else judge.compared(condition, twin, values)
+
+
+def assumed_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+    """Judge that the whole motion is free, under assumed numbers."""
+    certified = kit.certified(condition).having
+    judged = condition.done - condition.verdicts.undecided
+    hearing = judge.on(
+        "free_motion",
+        condition="Figs. 8, 9",
+        scene="a collision-free motion of two robots in each other's way",
+        judge="the exact verdict on the whole motion",
+        where="section 4, Figs. 8, 9",
+    )
+    told = f"{markdown.share(certified, judged)} runs"
+    return hearing.every(told, certified, judged, condition.planned)

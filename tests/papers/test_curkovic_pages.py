@@ -291,7 +291,7 @@ def test_verdicts_follow_the_rows_of_a_sweep(
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
     settings, found = page_settings("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):
-        rows = tuple(compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
+        rows = tuple(compare(f"constant {k}", first, second, True, 0.95) for k in range(3))
         tested = [one._replace(rows=rows) for one in sweep_page.tested(results, settings, 12.0)[:1]]
         (judged,) = sweep_page.of_sweep(results, settings, tested)
         found.append(judged.verdict)

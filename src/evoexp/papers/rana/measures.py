@@ -45,8 +45,8 @@ def evolution_told(
         row = rows[control.label]
         which = f"the best control, {control.label}" if place == 0 else control.label
         told.append(
-            f"to {which}, evolution adds {markdown.number(-row.median_difference)} in the median "
-            f"of pairs: its best cost is {kit.evidence(row, 'lower')}"
+            f"to {which}, evolution adds {markdown.number(-row.median_difference)} to the median: "
+            f"its best cost is {kit.evidence(row, 'lower')}"
         )
     if not shown:
         told.append("no control beside it")

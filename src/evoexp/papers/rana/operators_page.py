@@ -93,8 +93,8 @@ def _share_apart(
 def _difference(other: kit.ConditionResults, tables: dict[str, Sequence[kit.Comparison]]) -> str:
     """Return the differences of the first condition from another one in words."""
     told = [
-        f"{name} differs by {markdown.number(row.median_difference)} in the median of pairs, "
-        f"p = {markdown.p_value(row.test.p_value)}"
+        f"the median of {name} differs by {markdown.number(row.median_difference)}, "
+        f"p = {markdown.p_value(row.better.p_value)}"
         for name, rows in tables.items()
         for row in rows
         if row.quantity == other.label
@@ -209,4 +209,6 @@ def _told(
         with_it, without = (markdown.number(float(np.median(measures.unevenness(c)))) for c in pair)
         medians = f"{with_it}{shown} with, {without}{shown} without, "
     difference = markdown.number(row.median_difference)
-    return f"{name}: {medians}median difference {difference}{shown}, {kit.evidence(row, 'lower')}"
+    return (
+        f"{name}: {medians}difference of medians {difference}{shown}, {kit.evidence(row, 'lower')}"
+    )

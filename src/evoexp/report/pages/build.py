@@ -17,7 +17,6 @@ from evoexp.report.pages.motion_pictures import players_of
 from evoexp.report.pages.page_parts import Drawing, Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
-from evoexp.report.statistics.inference import forget_resamples
 from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
@@ -100,7 +99,6 @@ def derived(
         request.options,
     )
     page = page_of(found, settings)
-    forget_resamples()  # before figures take their room
     return page_files(request, page, found, settings)
 
 

@@ -69,7 +69,7 @@ class ReportFiles(NamedTuple):
 def report(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> Path:
-    """Write a report and return the path of its `index.md`; see `derived`."""
+    """Write a report and return the path of its `index.html`; see `derived`."""
     return write_report(derived(request, settings, outputs, num_replicates))
 
 
@@ -120,13 +120,13 @@ def page_files(
 
 
 def write_report(report: ReportFiles) -> Path:
-    """Write the files of a report and return the path of its `index.md`."""
+    """Write the files of a report and return the path of its `index.html`."""
     directory, files = report
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})
     for path in stale_files(report):
         path.unlink()
-    return directory / INDEX
+    return directory / HTML
 
 
 def stale_files(report: ReportFiles) -> list[Path]:

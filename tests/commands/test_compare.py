@@ -26,7 +26,7 @@ def test_runs_are_compared_by_their_hashes(evoexp: Evoexp, stored: Path) -> None
     one, two, *_ = sorted(run.hash12 for run in find_runs(stored))
     said = evoexp("compare", one, two)
     assert said.code == 0 and "refuted" in said.out
-    page = stored / "reports" / f"compare_{one}+{two}" / "index.md"
+    page = stored / "reports" / f"compare_{one}+{two}" / "index.html"
     assert str(page) in said.out and page.exists()
 
 

@@ -96,10 +96,10 @@ def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture
     out = capsys.readouterr().out
     (line,) = [line for line in out.splitlines() if line.startswith("report: ")]
     page = Path(line.removeprefix("report: "))
-    assert page.name == "index.md"
+    assert page.name == "index.html"
     assert page.parent.parent == outputs / "reports"
     assert page.parent.name == compose.expand(PLANAR)[0].report_name
-    assert "ga.population_size=8" in page.read_text()
+    assert "ga.population_size=8" in page.with_suffix(".md").read_text()
     assert len({path.read_bytes() for path in page.parent.glob("*.png")}) > 3, "figures are drawn"
 
 
@@ -109,7 +109,7 @@ def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs
     assert "(as it was)" not in evoexp(*words).out
     (page,) = outputs.glob("reports/*/index.md")
     content, drawn = page.read_bytes(), page.stat().st_mtime_ns
-    assert "index.md (as it was)\n" in evoexp(*words).out
+    assert "index.html (as it was)\n" in evoexp(*words).out
     assert page.stat().st_mtime_ns == drawn
     assert evoexp("report", "--check", *words[1:]).code == 0
     (log,) = outputs.glob("runs/*/replicates/0000.mcap")

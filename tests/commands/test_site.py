@@ -110,7 +110,7 @@ def test_all_reports_are_drawn_again_by_their_own_commands(
     said = evoexp("report", "--all")
     assert said.code == 0, said
     assert said.out.splitlines() == [
-        f"report: {drawn / 'index.md'}",
+        f"report: {drawn / 'index.html'}",
         f"site: {stored / 'reports' / 'index.html'}",
     ]
     assert reports(stored) == before

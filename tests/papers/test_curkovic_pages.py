@@ -297,7 +297,7 @@ def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path) -> None:
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
     judge, found = Judge("", page_settings("curkovic_mutation"), RULES), []
     for first, second in ((low, high), (high, low), (low, low)):
-        rows = tuple(compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
+        rows = tuple(compare(f"constant {k}", first, second, True, 0.95) for k in range(3))
         (first_one, *_) = compared(results)
         (judged,) = compared_settings.of_sweep(judge, results, [first_one._replace(rows=rows)])
         found.append(judged.verdict)

@@ -65,7 +65,7 @@ def draw(
         ReportSettings(**REPORT | {"formats": formats, "figures": page}),
         outputs,
         experiment.num_replicates,
-    )  # type: ignore[arg-type]
+    ).with_suffix(".md")  # type: ignore[arg-type]
 
 
 def contents(page: Path) -> dict[str, bytes]:
@@ -275,7 +275,7 @@ def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
     store(tmp_path, together)
     request = build.Request("methods", together.name, together.budget, together.conditions)
     settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "curkovic"})  # type: ignore[arg-type]
-    page = build.report(request, settings, tmp_path, 3)
+    page = build.report(request, settings, tmp_path, 3).with_suffix(".md")
     text = page.read_text()
     assert "V against I |" in text
     assert "VI against II |" in text
@@ -387,7 +387,7 @@ def test_varied_conditions_are_told_apart_and_compared_with_their_own_control(
     store(tmp_path, experiment)
     request = build.Request("swept", experiment.name, experiment.budget, experiment.conditions)
     settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "rana"})  # type: ignore[arg-type]
-    page = build.report(request, settings, tmp_path, 2)
+    page = build.report(request, settings, tmp_path, 2).with_suffix(".md")
     text = page.read_text()
     assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [
         f"via-point GA · population_size={size} against {control} · population_size={size}"

@@ -13,7 +13,7 @@ from evoexp.report.statistics.judging import Judge, left_out, not_judged
 from report_samples import REPORT
 
 SETTINGS = ReportSettings(**REPORT, figures=None)  # type: ignore[arg-type]
-BETTER = compare("cost", np.arange(12.0), np.arange(12.0) + 20.0, True, 0.95, 50)
+BETTER = compare("cost", np.arange(12.0), np.arange(12.0) + 20.0, True, 0.95)
 ENTRY = (
     '{{claim: "{{who}}a claim of {{metric}}", source: "section 5", kind: {kind}, experiments: [e]'
 )

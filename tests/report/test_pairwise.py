@@ -35,7 +35,7 @@ def test_every_pair_is_compared_and_of_many_conditions_the_first_with_each(
     (_, costs), *_ = pairwise.comparisons(found, settings)
     assert len(costs) == rows
     assert len({row.quantity for row in costs}) == rows
-    assert [row.p_adjusted for row in costs] == holm([row.test.p_value for row in costs])
+    assert [row.p_adjusted for row in costs] == holm([row.better.p_value for row in costs])
     assert all(row.better.a12 > 0.5 for row in costs)  # the first of a pair costs less
 
 

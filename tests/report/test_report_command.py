@@ -17,7 +17,10 @@ def report(*words: str) -> int:
 
 
 def page(captured: pytest.CaptureFixture[str]) -> Path:
-    return Path(captured.readouterr().out.removeprefix("report: ").strip())
+    """Return the page in Markdown beside the one that is named."""
+    named = Path(captured.readouterr().out.removeprefix("report: ").strip())
+    assert named.name == "index.html"
+    return named.with_suffix(".md")
 
 
 @pytest.mark.matrix

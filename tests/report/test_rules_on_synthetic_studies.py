@@ -5,6 +5,7 @@ often as its level says, and where nothing differs a rule must seldom say that s
 """
 
 import itertools
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -70,14 +71,16 @@ def test_newcombes_interval_holds_the_difference(one: float, two: float, runs: i
     assert coverage(inside) >= LOWEST
 
 
-@pytest.mark.parametrize("runs", [20, 50])
-@pytest.mark.parametrize("shift", [0.0, 0.5, 1.0])
-def test_the_interval_of_a12_holds_the_probability(runs: int, shift: float) -> None:
-    """Of pairs with a common part, as common seeds have."""
-    rng, truth, inside = np.random.default_rng(runs), float(stats.norm.cdf(shift / 2**0.5)), []
+@pytest.mark.parametrize(("runs", "others"), [(20, 20), (50, 20)])
+@pytest.mark.parametrize(("shift", "wider"), [(0.0, 1.0), (1.0, 1.0), (2.5, 1.0), (0.5, 3.0)])
+def test_the_interval_of_a12_holds_the_probability(
+    runs: int, others: int, shift: float, wider: float
+) -> None:
+    rng, inside = np.random.default_rng(runs), []
+    truth = float(stats.norm.cdf(shift / math.hypot(1.0, wider)))
     for _ in range(STUDIES):
-        x, y = rng.normal(shift, size=runs), rng.normal(size=runs)
-        low, high = effect(x, y, LEVEL, RESAMPLES).interval
+        x, y = rng.normal(shift, size=runs), rng.normal(0.0, wider, others)
+        low, high = effect(x, y, LEVEL).interval
         inside.append(low <= truth <= high)
     assert coverage(inside) >= LOWEST
 
@@ -126,7 +129,7 @@ def censored(rng: np.random.Generator, size: int) -> FloatArray:
 def test_where_nothing_differs_better_is_seldom_said(draw: Draw, runs: int) -> None:
     rng, said = np.random.default_rng(runs), []
     for _ in range(STUDIES):
-        found = compare("cost", draw(rng, runs), draw(rng, runs), True, LEVEL, 2)
+        found = compare("cost", draw(rng, runs), draw(rng, runs), True, LEVEL)
         said.append(judge_better(found) != INCONCLUSIVE)
     assert coverage(said) <= MOST
 
@@ -135,7 +138,7 @@ def test_where_something_differs_better_is_said_and_never_the_wrong_way() -> Non
     rng, said = np.random.default_rng(1), []
     for _ in range(STUDIES):
         x, y = rng.normal(0.0, size=20), rng.normal(1.2, size=20)
-        said.append(judge_better(compare("cost", x, y, True, LEVEL, 2)))
+        said.append(judge_better(compare("cost", x, y, True, LEVEL)))
     assert said.count(REPRODUCED) > 0.85 * STUDIES
     assert said.count(CONTRADICTED) <= 0.001 * STUDIES
 
@@ -144,7 +147,7 @@ def test_of_six_equal_settings_none_is_said_to_be_better_or_best() -> None:
     rng, better, best = np.random.default_rng(2), [], []
     for _ in range(STUDIES):
         own, *others = (smooth(rng, 20) for _ in range(6))
-        rows = adjusted([compare("cost", own, other, True, LEVEL, 2) for other in others])
+        rows = adjusted([compare("cost", own, other, True, LEVEL) for other in others])
         median = bool(np.median(own) <= min(np.median(other) for other in others))
         better.append(hearing("better than all").better_than_all("", rows).verdict != INCONCLUSIVE)
         best.append(hearing("best").best("", rows, median).verdict != INCONCLUSIVE)

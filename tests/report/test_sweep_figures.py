@@ -153,8 +153,8 @@ def test_a_legend_takes_as_many_columns_as_fit(length: int, columns: int) -> Non
 )
 def test_names_beside_a_matrix_are_not_cut_off(count: int, name: str) -> None:
     labels = [name.format(k) for k in range(count)]
-    pairs = [(a, b, 0.6, 0.5, 0.7, 0.2, 20) for a in labels for b in labels if a != b]
-    names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "seeds"]
+    pairs = [(a, b, 0.6, 0.5, 0.7, 0.2, 20, 20) for a in labels for b in labels if a != b]
+    names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]
     table = pd.DataFrame(pairs, columns=names).assign(significance=0.05)
     kept: list[Figure] = []
 

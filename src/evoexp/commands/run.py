@@ -175,7 +175,7 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
         directory = outputs_root() / "reports" / experiment.report_name
         note = directory / DRAWN_FROM
         if note.exists() and note.read_text() == _drawn_from(experiment, asked, sources, directory):
-            return f"{directory / 'index.md'} (as it was)"
+            return f"{directory / 'index.html'} (as it was)"
         from evoexp.commands.report_requests import request_of  # pandas, where there is no need
 
         page = request_of(experiment, *asked).write()

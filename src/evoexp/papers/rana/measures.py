@@ -52,8 +52,8 @@ def evolution_told(
         row = rows[control.label]
         which = f"the best control, {control.label}" if place == 0 else control.label
         told.append(
-            f"to {which}, evolution adds {markdown.number(-row.median_difference)} in the median "
-            f"of pairs: its best cost is {kit.evidence(row, 'lower')}"
+            f"to {which}, evolution adds {markdown.number(-row.median_difference)} to the median: "
+            f"its best cost is {kit.evidence(row, 'lower')}"
         )
     if not shown:
         told.append("no control beside it")
@@ -257,8 +257,8 @@ def reading_difference(other: ConditionResults, compared: tuple[kit.FamilyCompar
 def _difference(other: kit.ConditionResults, tables: dict[str, Sequence[kit.Comparison]]) -> str:
     """Return the differences of the first condition from another one in words."""
     told = [
-        f"{name} differs by {markdown.number(row.median_difference)} in the median of pairs, "
-        f"p = {markdown.p_value(row.test.p_value)}"
+        f"the median of {name} differs by {markdown.number(row.median_difference)}, "
+        f"p = {markdown.p_value(row.better.p_value)}"
         for name, rows in tables.items()
         for row in rows
         if row.quantity == other.label

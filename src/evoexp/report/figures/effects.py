@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results.stored_results import Results
@@ -20,13 +20,8 @@ from evoexp.report.statistics.inference import quantile
 WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn
 CLEAR = 0.22  # [-] of an axis: no number stands so near to the word "never"
-TESTS = ("p_adjusted", "unpaired_adjusted")
 DOT: dict[str, Any] = {"color": style.ARM_COLOURS[0], "markersize": 5}
-LOOKS: tuple[dict[str, Any], ...] = (
-    {"markerfacecolor": "white"},
-    {"fillstyle": "left", "markerfacecoloralt": "white"},
-    {"markerfacecolor": style.ARM_COLOURS[0]},
-)  # looks of differences that are significant by none, one and both of the tests
+OPEN: dict[str, Any] = {"markerfacecolor": "white"}  # the look of what is not significant
 
 
 def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
@@ -130,17 +125,23 @@ def effects_table(
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted (signed rank),
-        unpaired_adjusted (rank sum), direction (of the signed ranks: 1 where the first is better),
-        seeds, significance.
+        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, runs (of the
+        first), runs_other, significance.
     """
     rows = [
-        (quantity, c.quantity, c.better.a12, *c.better.interval, *tests, c.num_seeds)
-        for quantity, found in comparisons.items()
+        (
+            name,
+            c.quantity,
+            c.better.a12,
+            *c.better.interval,
+            c.p_adjusted,
+            c.num_first,
+            c.num_second,
+        )
+        for name, found in comparisons.items()
         for c in found
-        for tests in ((c.p_adjusted, c.unpaired_adjusted, c.test.direction),)
     ]
-    names = ["quantity", "condition", "a12", "lower", "upper", *TESTS, "direction", "seeds"]
+    names = ["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]
     return pd.DataFrame(rows, columns=names).assign(significance=significance)
 
 
@@ -155,9 +156,9 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
         marks.dashed(axes, 0.5)
         axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
-        clear = _clear(rows)
-        for count, look in enumerate(LOOKS):
-            axes.plot(a12[clear == count], y[clear == count], "o", **DOT, **look)
+        clear = (rows["p_adjusted"] < rows["significance"]).to_numpy()
+        axes.plot(a12[~clear], y[~clear], "o", **DOT, **OPEN)
+        axes.plot(a12[clear], y[clear], "o", **DOT)
         axes.set_xlim(-0.03, 1.03)
         axes.set_title(textwrap.fill(quantity, WRAPPED), fontsize=7.5)
         axes.set_xlabel("A12: the first is better")
@@ -165,23 +166,11 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     level = float(table["significance"].iloc[0])
-    texts = (f"adjusted p ≥ {level:g}", f"< {level:g} by one test of two", f"< {level:g} by both")
-    counts = sorted(set(_clear(table)))
-    style.keys_below(
-        figure,
-        [style.key(texts[n], marker="o", linestyle="none", **DOT, **LOOKS[n]) for n in counts],
-    )
+    dot: dict[str, Any] = {"marker": "o", "linestyle": "none", **DOT}
+    keys = style.key(f"adjusted p < {level:g}", **dot), style.key(f"≥ {level:g}", **dot, **OPEN)
+    is_clear = table["p_adjusted"] < level
+    style.keys_below(figure, [keys[k] for k in (0, 1) if (is_clear == (k == 0)).any()])
     return figure
-
-
-def _clear(rows: pd.DataFrame) -> IntArray:
-    """Return by how many of the two tests each row's A12 is significant, (rows,).
-
-    Signed ranks that point the other way than A12 say nothing for it.
-    """
-    below = rows[list(TESTS)].to_numpy(np.float64) < rows[["significance"]].to_numpy(np.float64)
-    below[:, 0] &= (rows["direction"] * (rows["a12"] - 0.5)).to_numpy(np.float64) > 0.0
-    return np.asarray(below.sum(axis=1), dtype=np.int64)
 
 
 EFFECTS = effects_table, draw_effects

@@ -30,16 +30,16 @@ def matrix_table(
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Columns condition, other, a12 (of the condition being better), lower, upper, p_adjusted
-        (rank sum, the test of A12), seeds, significance.
+        Columns condition, other, a12 (of the condition being better), lower, upper, p_adjusted,
+        runs (of the condition), runs_other, significance.
     """
     found = []
     for (first, second), row in zip(pairs, rows, strict=True):
         low, high = row.better.interval
-        told = (row.unpaired_adjusted, row.num_seeds)
-        found.append((first, second, row.better.a12, low, high, *told))
-        found.append((second, first, 1.0 - row.better.a12, 1.0 - high, 1.0 - low, *told))
-    names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "seeds"]
+        a12, p, one, two = row.better.a12, row.p_adjusted, row.num_first, row.num_second
+        found.append((first, second, a12, low, high, p, one, two))
+        found.append((second, first, 1.0 - a12, 1.0 - high, 1.0 - low, p, two, one))
+    names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]
     return pd.DataFrame(found, columns=names).assign(significance=significance)
 
 

@@ -17,7 +17,6 @@ from evoexp.report.pages.motion_pictures import players_of
 from evoexp.report.pages.page_parts import Drawing, Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
-from evoexp.report.statistics.inference import forget_resamples
 from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
@@ -70,7 +69,7 @@ class ReportFiles(NamedTuple):
 def report(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> Path:
-    """Write a report and return the path of its `index.md`; see `derived`."""
+    """Write a report and return the path of its `index.html`; see `derived`."""
     return write_report(derived(request, settings, outputs, num_replicates))
 
 
@@ -100,7 +99,6 @@ def derived(
         request.options,
     )
     page = page_of(found, settings)
-    forget_resamples()  # before figures take their room
     return page_files(request, page, found, settings)
 
 
@@ -122,13 +120,13 @@ def page_files(
 
 
 def write_report(report: ReportFiles) -> Path:
-    """Write the files of a report and return the path of its `index.md`."""
+    """Write the files of a report and return the path of its `index.html`."""
     directory, files = report
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})
     for path in stale_files(report):
         path.unlink()
-    return directory / INDEX
+    return directory / HTML
 
 
 def stale_files(report: ReportFiles) -> list[Path]:

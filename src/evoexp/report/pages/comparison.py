@@ -254,7 +254,7 @@ def effort_text(queries: float) -> str:
 def _comparisons(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare the planners of each problem on common seeds."""
+    """Compare the planners of each problem."""
     stored = [(own, own.condition) for own in runs if own.condition is not None]
     by_label = {own.label: own for own, _ in stored}
     pairs = [

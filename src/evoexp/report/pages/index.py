@@ -196,18 +196,14 @@ def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettin
     cells = [
         (
             c.quantity,
-            c.num_seeds,
+            c.num_runs,
             markdown.number(c.median_difference),
             f"{c.better.a12:.3f} [{c.better.interval.low:.3f}, {c.better.interval.high:.3f}]",
-            *map(
-                markdown.p_value,
-                (c.test.p_value, c.p_adjusted, c.unpaired.p_value, c.unpaired_adjusted),
-            ),
+            *map(markdown.p_value, (c.better.p_value, c.p_adjusted)),
         )
         for c in rows
     ]
-    level, resamples = 100 * settings.confidence, settings.num_resamples
-    return WORDS.table("comparison", cells, heading=heading, level=level, resamples=resamples)
+    return WORDS.table("comparison", cells, heading=heading, level=100 * settings.confidence)
 
 
 def _figure(

@@ -92,7 +92,7 @@ class Page(NamedTuple):
     claims: tuple[Claim, ...] = ()  # with verdicts; empty where there is no paper to judge
     # (title, finding): known defects and checks of the scene, shown at every budget
     checks: tuple[tuple[str, str], ...] = ()
-    # Of conditions on common seeds, by heading
+    # Of conditions, by heading
     comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()
     drawings: tuple[Drawing, ...] = ()  # the figures
     tables: tuple[Table, ...] = ()  # of its own, shown behind the table of results

@@ -1,4 +1,4 @@
-"""Compares conditions on their common seeds, pair by pair."""
+"""Compares conditions, pair by pair: their runs are independent samples."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
@@ -9,42 +9,31 @@ from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
-from evoexp.report.statistics.inference import (
-    Effect,
-    RankSum,
-    SignedRank,
-    effect,
-    holm,
-    quantile,
-    rank_sum,
-    signed_rank,
-)
+from evoexp.report.statistics.inference import Effect, effect, holm, quantile
 
 Values = Callable[[ConditionResults], FloatArray]
 Pair = tuple[ConditionResults, ConditionResults]
 
 
 class Comparison(NamedTuple):
-    """One quantity of two conditions on their common seeds."""
+    """One quantity of the runs of two conditions."""
 
     quantity: str  # its name, or that of the pair in a table of one quantity
-    num_seeds: int  # replicates that both have
-    median_difference: float  # of first minus second
-    # Signed-rank test of the pairs; positive ranks are those of the first being better
-    test: SignedRank
-    # Its p-value by Holm over all quantities compared; equal to the plain one until `adjusted`
-    p_adjusted: float
-    unpaired: RankSum  # the same values tested as independent samples
-    unpaired_adjusted: float  # its p-value by Holm, a family of its own
+    num_first: int  # runs of the first that have the quantity
+    num_second: int  # the same of the second
+    median_difference: float  # the first's median minus the second's
     better: Effect  # a12 of the first being better than the second
+    p_adjusted: float  # by Holm over all that are compared; the plain one until `adjusted`
+
+    @property
+    def num_runs(self) -> str:
+        """In words: "20", or "20 and 18"."""
+        counts = dict.fromkeys((self.num_first, self.num_second))
+        return " and ".join(map(str, counts))
 
     def says(self, significance: float) -> int:
-        """Return 1 if the first is significantly better, −1 if significantly worse, else 0.
-
-        Significance and direction are those of one statistic, the signed ranks: A12 and medians may
-        point the other way.
-        """
-        return self.test.direction if self.p_adjusted < significance else 0
+        """Return 1 if the first is significantly better, −1 if significantly worse, else 0."""
+        return self.better.direction if self.p_adjusted < significance else 0
 
 
 class Measure(NamedTuple):
@@ -74,7 +63,7 @@ class FamilyComparison(NamedTuple):
 
     measure: Measure
     family: Family
-    rows: tuple[Comparison, ...]  # one per pair that shares seeds; p-values are adjusted over them
+    rows: tuple[Comparison, ...]  # one per pair; p-values are adjusted over them
 
 
 def compare_families(
@@ -119,32 +108,23 @@ def by_column(name: str) -> Values:
 
 
 def compare(
-    quantity: str,
-    first: FloatArray,
-    second: FloatArray,
-    lower_is_better: bool,
-    confidence: float,
-    num_resamples: int,
+    quantity: str, first: FloatArray, second: FloatArray, lower_is_better: bool, confidence: float
 ) -> Comparison:
-    """Compare a quantity of two conditions, (seeds,) each without NaN, seed by seed."""
+    """Compare a quantity of two conditions, (n,) and (m,) without NaN."""
     sign = -1.0 if lower_is_better else 1.0
-    test, unpaired = signed_rank(sign * first, sign * second), rank_sum(first, second)
-    better = effect(sign * first, sign * second, confidence, num_resamples)
-    differences = np.zeros(len(first))  # two infinite costs do not differ
-    np.subtract(first, second, out=differences, where=first != second)
-    median = quantile(differences, 0.5)
-    return Comparison(
-        quantity, len(first), median, test, test.p_value, unpaired, unpaired.p_value, better
-    )
+    better = effect(sign * first, sign * second, confidence)
+    medians = quantile(first, 0.5), quantile(second, 0.5)
+    difference = (
+        0.0 if medians[0] == medians[1] else medians[0] - medians[1]
+    )  # both may be infinite
+    return Comparison(quantity, len(first), len(second), difference, better, better.p_value)
 
 
 def adjusted(comparisons: Iterable[Comparison]) -> list[Comparison]:
-    """Return comparisons with p-values adjusted by Holm; either test is a family of its own."""
+    """Return comparisons with p-values adjusted by Holm over all of them."""
     rows = list(comparisons)
-    paired = holm([row.test.p_value for row in rows])
-    unpaired = holm([row.unpaired.p_value for row in rows])
-    found = zip(rows, paired, unpaired, strict=True)
-    return [row._replace(p_adjusted=p, unpaired_adjusted=q) for row, p, q in found]
+    p_values = holm([row.better.p_value for row in rows])
+    return [row._replace(p_adjusted=p) for row, p in zip(rows, p_values, strict=True)]
 
 
 def compared_with_controls(
@@ -153,14 +133,14 @@ def compared_with_controls(
     """Compare every condition with its controls: those that wrap the same planner.
 
     Args:
-        settings: Levels and resamples.
+        settings: Levels.
         compared: (quantity, whether lower is better, its values).
 
     Returns:
         (heading, one comparison per quantity), p-values adjusted over the quantities.
     """
     found = (
-        (f"{first.label} against {second.label}", _common(first, second, compared, settings))
+        (f"{first.label} against {second.label}", _compared(first, second, compared, settings))
         for first in results.evolved
         for second in results.evolved
         if not first.is_control and second.is_control and beside(first.condition, second.condition)
@@ -181,12 +161,12 @@ def compared(
     lower_is_better: bool = True,
     named: Callable[[ConditionResults, ConditionResults], str] = lambda first, second: second.label,
 ) -> tuple[Comparison, ...]:
-    """Compare pairs of conditions in one quantity on their common seeds.
+    """Compare pairs of conditions in one quantity.
 
     Args:
-        pairs: (first, second); pairs without a common seed are left out.
+        pairs: (first, second); pairs without runs of both are left out.
         values: The quantity of a condition, (done,).
-        settings: Levels and resamples.
+        settings: Levels.
         lower_is_better: Which of two values is better.
         named: Gives the name of a pair's row; by default the label of the second condition.
 
@@ -196,25 +176,21 @@ def compared(
     rows = (
         row
         for a, b in pairs
-        for row in _common(a, b, [(named(a, b), lower_is_better, values)], settings)
+        for row in _compared(a, b, [(named(a, b), lower_is_better, values)], settings)
     )
     return tuple(adjusted(rows))
 
 
-def _common(
+def _compared(
     first: ConditionResults,
     second: ConditionResults,
     quantities: Sequence[tuple[str, bool, Values]],
     settings: ReportSettings,
 ) -> list[Comparison]:
-    """Compare quantities over the replicates that both have; none where they share no replicate."""
-    common = first.summaries.index.intersection(second.summaries.index)
+    """Compare quantities of all runs that have them; none where one condition has no such run."""
     found = []
     for name, lower_is_better, values in quantities:
-        x = values(first)[first.summaries.index.get_indexer(common)]
-        y = values(second)[second.summaries.index.get_indexer(common)]
-        known = ~(np.isnan(x) | np.isnan(y))
-        if known.any():
-            levels = settings.confidence, settings.num_resamples
-            found.append(compare(name, x[known], y[known], lower_is_better, *levels))
+        x, y = (own[~np.isnan(own)] for own in (values(first), values(second)))
+        if len(x) and len(y):
+            found.append(compare(name, x, y, lower_is_better, settings.confidence))
     return found

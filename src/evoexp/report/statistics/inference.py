@@ -1,25 +1,22 @@
-"""Statistics over replicates, whose unit is the seed.
+"""Statistics over replicates, which are independent samples of their conditions.
 
-Replicates of two conditions with one index share a seed. Costs may be infinite (infeasible);
-medians, ranks and effect sizes are defined all the same, and nothing here takes a mean.
+Costs may be infinite (infeasible); medians, ranks and effect sizes are defined all the same, and
+nothing here takes a mean.
 """
 
 import functools
-import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import optimize, special, stats
 
 from evoexp.records import FloatArray
 
-EXACT_PAIRS = 200  # up to here the signed-rank distribution is exact, beyond it approximated
-EXACT_VALUES = 100  # of both samples together: the same of the rank-sum distribution
-MOST_CHOSEN = 9  # tied values of both samples that are all permuted: at most 126 ways
-MOST_AT_ONCE = 50_000  # weights of resamples that are worked on at a time
-BOOTSTRAP_SEED = 20_250_419  # of the report's own generator; any fixed number
+LEAST_FOR_T = 10  # runs of each sample from which Brunner and Munzel's t distribution holds
+SMALLEST_SHARE = 1e-9  # of pairs of runs; no samples are so large
+BOOTSTRAP_SEED = 20_250_419  # of the report's own generators; any fixed number
 
 
 class Interval(NamedTuple):
@@ -36,25 +33,6 @@ class Spread(NamedTuple):
     lower: float  # first quartile
     upper: float  # third quartile
     num_values: int  # values that are not NaN
-
-
-class SignedRank(NamedTuple):
-    """Wilcoxon's signed-rank test of paired values."""
-
-    num_pairs: int  # pairs that differ; equal ones say nothing
-    positive_ranks: float  # W+, the sum of ranks of the positive differences
-    p_value: float  # two-sided
-
-    @property
-    def share(self) -> float:
-        """W+ over the sum of all ranks, in [0, 1]; 1/2 without a difference."""
-        return 2.0 * self.positive_ranks / (self.num_pairs * (self.num_pairs + 1) or 1)
-
-    @property
-    def direction(self) -> int:
-        """1 if ranks of positive differences prevail, −1 if those of negative ones do, else 0."""
-        twice, total = 4.0 * self.positive_ranks, self.num_pairs * (self.num_pairs + 1)
-        return int(twice > total) - int(twice < total)
 
 
 class Proportion(NamedTuple):
@@ -89,18 +67,17 @@ class Proportion(NamedTuple):
         return f"{self.having} of {self.total} = {share} % [{low}, {high}]"
 
 
-class RankSum(NamedTuple):
-    """Mann and Whitney's test of two independent samples."""
-
-    u: float  # pairs (x, y) with x > y, and half of those with x = y
-    p_value: float  # two-sided
-
-
 class Effect(NamedTuple):
-    """Vargha and Delaney's A12 = P(x > y) + P(x = y) / 2, with a bootstrap interval."""
+    """Vargha and Delaney's A12 = P(x > y) + P(x = y) / 2 of two independent samples, tested."""
 
-    a12: float
+    a12: float  # NaN if a sample is empty
     interval: Interval
+    p_value: float  # two-sided, of A12 = 1/2
+
+    @property
+    def direction(self) -> int:
+        """1 if the first sample tends to be greater, −1 if smaller, else 0."""
+        return int(self.a12 > 0.5) - int(self.a12 < 0.5)
 
 
 def quantile(values: FloatArray, share: float) -> float:
@@ -146,62 +123,6 @@ def spread(values: FloatArray) -> Spread:
     return Spread(median, lower, upper, int(np.count_nonzero(~np.isnan(values))))
 
 
-def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
-    """Test whether paired values (pairs,) differ (Wilcoxon 1945); ties share their mean rank.
-
-    Infinite values are compared as such, equal pairs are left out. The p-value is the same for
-    (y, x): it is summed over the lower tail, which W+ of one order and W− of the other share.
-    """
-    differing = x != y
-    difference = x[differing] - y[differing]
-    if not len(difference):
-        return SignedRank(0, 0.0, 1.0)
-    ranks = stats.rankdata(np.abs(difference))
-    positive, negative = (float(ranks[sign * difference > 0.0].sum()) for sign in (1.0, -1.0))
-    if len(difference) > EXACT_PAIRS:
-        method: Any = "asymptotic"  # scipy's stubs do not know it with every other argument
-        p_value = float(stats.wilcoxon(difference, method=method, correction=True).pvalue)
-    else:
-        p_value = min(1.0, 2.0 * _lower_tail(ranks, min(positive, negative)))
-    return SignedRank(len(difference), positive, p_value)
-
-
-def _lower_tail(ranks: FloatArray, limit: float) -> float:
-    """Return the probability that ranks with random signs give a W+ up to a limit.
-
-    The exact distribution, built rank by rank: sums of positive numbers alone, so that no digit is
-    lost however small they are. All numbers are multiples of 1/2.
-    """
-    share = np.zeros(int(2.0 * limit) + 1)  # by twice the sum
-    share[0] = 1.0
-    for rank in np.rint(2.0 * ranks).astype(np.int64):
-        more = np.zeros_like(share)
-        more[rank:] = share[: max(len(share) - rank, 0)]
-        share = 0.5 * (share + more)
-    return float(share.sum())
-
-
-def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
-    """Test whether two samples (n,) and (m,) differ (Mann and Whitney 1947).
-
-    Ties share their mean rank, infinite values are compared as such.
-    """
-    values = np.concatenate([x, y])
-    if not len(x) or not len(y) or (values == values[0]).all():
-        return RankSum(0.5 * len(x) * len(y), 1.0)
-    if len(np.unique(values)) == len(values) <= EXACT_VALUES:
-        found = stats.mannwhitneyu(x, y, method="exact")
-    elif len(values) <= MOST_CHOSEN:  # with ties: every choice of the first sample's ranks
-        ranks, size = stats.rankdata(values), len(x)
-        observed = float(ranks[:size].sum())
-        sums = np.array([sum(chosen) for chosen in itertools.combinations(ranks, size)])
-        p_value = 2.0 * min(float(np.mean(sums <= observed)), float(np.mean(sums >= observed)))
-        return RankSum(observed - 0.5 * size * (size + 1), min(1.0, p_value))
-    else:  # corrected for ties and continuity
-        found = stats.mannwhitneyu(x, y, method="asymptotic")
-    return RankSum(float(found.statistic), float(found.pvalue))
-
-
 def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
     """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10).
 
@@ -235,33 +156,70 @@ def vargha_delaney(x: FloatArray, y: FloatArray) -> float:
     """Return A12 = P(x > y) + P(x = y) / 2 of values (n,) and (m,); NaN if either is empty."""
     if not len(x) or not len(y):
         return math.nan
-    below, up_to = _ranks(x, y)
-    return float(0.5 * (int(below.sum()) + int(up_to.sum())) / (len(x) * len(y)))
+    return float(np.sum(_placements(x, y)) / (len(x) * len(y)))  # halves add without rounding
 
 
-def _ranks(x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many of y (m,) lie below each of x (n,), and how many up to it; none of a NaN."""
-    ordered, known = np.sort(y), ~np.isnan(x)
+def _placements(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return how many of y (m,) lie below each of x (n,); equal ones count half."""
+    ordered = np.sort(y)
     below, up_to = (np.searchsorted(ordered, x, side) for side in ("left", "right"))
-    return np.where(known, below, 0), np.where(known, up_to, 0)
+    return np.asarray(0.5 * (below + up_to))
 
 
-def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) -> Effect:
-    """Return A12 of paired values (pairs,) with a percentile interval over resampled pairs."""
-    if not len(x):
-        return Effect(math.nan, Interval(math.nan, math.nan))
-    (below, up_to), order = _ranks(x, y), np.argsort(y, kind="stable")
-    weights = _weights(len(x), num_resamples)
-    resampled = np.empty(num_resamples)
-    some = max(1, MOST_AT_ONCE // len(x))  # resamples at a time
-    passed = np.zeros((some, len(x) + 1))  # pairs of a resample whose y is among the k lowest
-    for k in range(0, num_resamples, some):
-        own = weights[k : k + some]
-        here = passed[: len(own)]
-        np.cumsum(own[:, order], axis=1, out=here[:, 1:])
-        # multiples of 1/2 are exact in any order
-        resampled[k : k + some] = 0.5 * np.sum(own * (here[:, below] + here[:, up_to]), axis=1)
-    return Effect(vargha_delaney(x, y), percentiles(resampled / len(x) ** 2, confidence))
+def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
+    """Compare two independent samples (n,) and (m,) without NaN (Brunner and Munzel 2000).
+
+    Values are ranked: an infinite one, of a run that never got there, is the worst and no more.
+    Small samples are tested by Mann and Whitney, and separated ones, in which every x lies on one
+    side of every y, by the number of ways to choose the first; these have Newcombe's interval, as
+    their placements do not vary.
+    """
+    a12, smallest = vargha_delaney(x, y), min(len(x), len(y))
+    if smallest == 0:
+        return Effect(a12, Interval(a12, a12), 1.0)
+    # squared standard errors of A12, from the places of either sample in the other
+    errors = [_squared_error(*samples) for samples in ((x, y), (y, x))]
+    if smallest == 1 or sum(errors) == 0.0:
+        is_separated = a12 in (0.0, 1.0)
+        p_value = 2.0 / math.comb(len(x) + len(y), len(x)) if is_separated else 1.0
+        interval = _newcombe_interval(a12, len(x), len(y), confidence)
+        return Effect(a12, interval, min(1.0, p_value))
+    error = math.sqrt(sum(errors))
+    degrees = sum(errors) ** 2 / (errors[0] ** 2 / (len(x) - 1) + errors[1] ** 2 / (len(y) - 1))
+    # symmetric in log(a12 / (1 - a12)): near 0 and 1 the plain interval holds A12 too seldom
+    half = special.stdtrit(degrees, 0.5 + 0.5 * confidence) * error / (a12 * (1.0 - a12))
+    low, high = special.expit(special.logit(a12) + half * np.array([-1.0, 1.0]))
+    if smallest < LEAST_FOR_T:
+        p_value = float(stats.mannwhitneyu(x, y).pvalue)
+    else:
+        p_value = 2.0 * float(special.stdtr(degrees, -abs(a12 - 0.5) / error))
+    return Effect(a12, Interval(float(low), float(high)), p_value)
+
+
+def _squared_error(x: FloatArray, y: FloatArray) -> float:
+    if len(x) < 2:
+        return 0.0
+    return float(np.var(_placements(x, y), ddof=1)) / (len(x) * len(y) ** 2)
+
+
+def _newcombe_interval(a12: float, n: int, m: int, confidence: float) -> Interval:
+    """Return an interval of A12 that has a width for separated samples, too.
+
+    Newcombe 2006, method 5: all values whose own standard error reaches to A12.
+    """
+    z, more = float(stats.norm.ppf(0.5 + 0.5 * confidence)), 0.5 * (n + m) - 1.0
+
+    def excess(value: float) -> float:
+        shape = (1.0 - value) / (2.0 - value) + value / (1.0 + value)
+        variance = value * (1.0 - value) * (1.0 + more * shape) / (n * m)
+        return abs(value - a12) - z * math.sqrt(variance)
+
+    inside = min(
+        max(a12, SMALLEST_SHARE), 1.0 - SMALLEST_SHARE
+    )  # where the standard error is not 0
+    low = optimize.brentq(excess, 0.0, inside) if a12 > 0.0 else 0.0
+    high = optimize.brentq(excess, inside, 1.0) if a12 < 1.0 else 1.0
+    return Interval(float(low), float(high))
 
 
 def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
@@ -309,21 +267,6 @@ def effort_ratio(
     above = _resampled_effort(effort_one, solved_one, num_resamples)
     below = _resampled_effort(effort_two, solved_two, num_resamples, stream=1)
     return percentiles(above / below, confidence)
-
-
-@functools.lru_cache(maxsize=8)
-def _weights(size: int, num_resamples: int) -> np.ndarray:
-    """Return how often each of `size` runs is drawn, (resamples, size)."""
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    weights = np.empty((num_resamples, size), dtype=np.uint16 if size < 2**16 else np.int32)
-    for own in weights:
-        own[:] = np.bincount(rng.integers(0, size, size), minlength=size)
-    return weights
-
-
-def forget_resamples() -> None:
-    """Free the resamples that comparisons share: of thousands of runs they take tens of MB."""
-    _weights.cache_clear()
 
 
 def _resampled_effort(

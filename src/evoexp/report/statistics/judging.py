@@ -48,7 +48,7 @@ class Hearing(NamedTuple):
         """Judge a claim that the first condition of a comparison is better than the second.
 
         Args:
-            row: The comparison; None where the two share no seed.
+            row: The comparison; None where one of the two has no run.
             word: Of the one that is better: "lower", "earlier".
             told: The evidence; its {} stands for the comparison in words.
         """
@@ -57,7 +57,7 @@ class Hearing(NamedTuple):
         heard = self._replace(
             rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         )
-        counted = row and row.num_seeds
+        counted = row and row.num_runs
         return heard._claim("better", told.replace("{}", words), counted, says == 1, says == -1)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
@@ -66,7 +66,7 @@ class Hearing(NamedTuple):
         One that is significantly better contradicts; all must be significantly worse to reproduce.
         """
         says = {row.says(self.significance) for row in rows}
-        return self._claim("better than all", evidence, _seeds(rows), says == {1}, -1 in says)
+        return self._claim("better than all", evidence, _runs(rows), says == {1}, -1 in says)
 
     def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
         """Judge a claim that one of several settings is the best.
@@ -77,7 +77,7 @@ class Hearing(NamedTuple):
         """
         says = {row.says(self.significance) for row in rows}
         holds = best_median and 1 in says
-        return self._claim("best", evidence, _seeds(rows), holds, -1 in says)
+        return self._claim("best", evidence, _runs(rows), holds, -1 in says)
 
     def greater(
         self, evidence: Evidence, one: Proportion, two: Proportion, p_adjusted: float | None = None
@@ -134,9 +134,9 @@ class Hearing(NamedTuple):
         return Claim(rule.claim, rule.source, told, verdict, rule.name, rule.text, counted)
 
 
-def _seeds(rows: Sequence[Comparison]) -> str:
-    """Return the numbers of common seeds: "20", or "18 to 20"."""
-    counts = sorted({row.num_seeds for row in rows})
+def _runs(rows: Sequence[Comparison]) -> str:
+    """Return the numbers of runs that were compared: "20", or "18 to 20"."""
+    counts = sorted({count for row in rows for count in (row.num_first, row.num_second)})
     return " to ".join(map(str, counts if len(counts) < 2 else (counts[0], counts[-1]))) or "0"
 
 
@@ -170,7 +170,7 @@ class Judge(NamedTuple):
     def compared(
         self, first: ConditionResults, second: ConditionResults, values: Values
     ) -> Comparison | None:
-        """Compare two conditions in a quantity, lower is better; None: they share no seed."""
+        """Compare two conditions in a quantity, lower is better; None: one has no run."""
         return next(iter(compared([(first, second)], values, self.settings)), None)
 
     def share(self, proportion: Proportion, decimals: int = 0) -> str:
@@ -240,15 +240,9 @@ def fisher_evidence(one: Proportion, two: Proportion) -> str:
 
 
 def evidence(comparison: Comparison, better: str) -> str:
-    """Return a comparison in words: "lower by 97 % of the signed ranks (…), in 80 % of all …".
-
-    The signed ranks come first: the verdict follows them. The two may differ where more runs are
-    better, but those that are worse are worse by more.
-    """
-    low, high = comparison.better.interval
+    """Return a comparison in words: "lower in 80 % of all pairs of runs (A12 0.801 …"."""
+    a12, (low, high) = comparison.better.a12, comparison.better.interval
     return (
-        f"{better} by {100 * comparison.test.share:.0f} % of the signed ranks of seeds (p = "
-        f"{markdown.p_value(comparison.p_adjusted)}), in {100 * comparison.better.a12:.0f} % of "
-        f"all pairs of runs (A12 {comparison.better.a12:.3f} [{low:.3f}, {high:.3f}], rank-sum "
-        f"p = {markdown.p_value(comparison.unpaired_adjusted)})"
+        f"{better} in {100 * a12:.0f} % of all pairs of runs (A12 {a12:.3f} [{low:.3f}, "
+        f"{high:.3f}], p = {markdown.p_value(comparison.p_adjusted)})"
     )

@@ -21,9 +21,9 @@ from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import judging
 from evoexp.report.statistics.judging import (
     CONTRADICTED,
-    INCONCLUSIVE,
     NOT_JUDGED,
     REPRODUCED,
+    UNDECIDED,
     Judge,
 )
 from report_samples import REPORT
@@ -88,14 +88,13 @@ def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
         == REPRODUCED
     )
     assert (
-        verdict(claims, "Larger populations do not plan faster, on any task: cycles")
-        == INCONCLUSIVE
+        verdict(claims, "Larger populations do not plan faster, on any task: cycles") == UNDECIDED
     )
     assert (
         verdict(claims, "Smaller populations increase planning times over-proportionally: cycles")
         == CONTRADICTED
     )
-    assert verdict(claims, "Smaller populations reduce convergence") == INCONCLUSIVE
+    assert verdict(claims, "Smaller populations reduce convergence") == UNDECIDED
     assert verdict(claims, "100 individuals are reasonable: cycles") == REPRODUCED
     assert (
         verdict(claims, "100 individuals are reasonable: evaluations") == CONTRADICTED
@@ -148,9 +147,9 @@ def test_what_100_never_solves_and_more_do_contradicts_it() -> None:
 
 def test_nothing_solved_says_nothing() -> None:
     claims = study(lambda task, size: (20.0, 0))
-    assert {claim.verdict for claim in claims.values()} <= {INCONCLUSIVE, CONTRADICTED}
-    assert verdict(claims, "100 individuals are reasonable: cycles") == INCONCLUSIVE
-    assert verdict(claims, "Smaller populations reduce convergence") == INCONCLUSIVE
+    assert {claim.verdict for claim in claims.values()} <= {UNDECIDED, CONTRADICTED}
+    assert verdict(claims, "100 individuals are reasonable: cycles") == UNDECIDED
+    assert verdict(claims, "Smaller populations reduce convergence") == UNDECIDED
 
 
 def task_rows(having: dict[str, int], free: int = RUNS) -> Callable[[str], dict[str, object]]:
@@ -177,7 +176,7 @@ def judged(name: str, rows: Callable[[str], dict[str, object]]) -> dict[str, str
 def test_a_wall_that_a_subgoal_opens_is_a_local_minimum() -> None:
     text = "wall: the search gets stuck in a local minimum, which a sub-goal opens"
     assert judged("corsepius_wall", task_rows({"wall": 0}))[text] == REPRODUCED
-    assert judged("corsepius_wall", task_rows({}))[text] == INCONCLUSIVE
+    assert judged("corsepius_wall", task_rows({}))[text] == UNDECIDED
     assert judged("corsepius_wall", task_rows({"with a sub-goal": 0}))[text] == CONTRADICTED
 
 
@@ -206,7 +205,7 @@ def test_one_certified_path_is_enough_for_redundant_arms() -> None:
     [
         ({"wall": 0}, REPRODUCED),
         ({"wall": 0, "wall, empty scene": 0}, CONTRADICTED),
-        ({"wall": RUNS - 1}, INCONCLUSIVE),
+        ({"wall": RUNS - 1}, UNDECIDED),
         ({}, CONTRADICTED),
     ],
 )

@@ -302,7 +302,7 @@ def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path) -> None:
         (judged,) = compared_settings.of_sweep(judge, results, [first_one._replace(rows=rows)])
         found.append(judged.verdict)
         assert "constant 2 (A12" in judged.evidence
-    assert found == [judging.REPRODUCED, judging.CONTRADICTED, judging.INCONCLUSIVE]
+    assert found == [judging.REPRODUCED, judging.CONTRADICTED, judging.UNDECIDED]
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:

@@ -22,9 +22,9 @@ from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.inference import Proportion, fisher_exact
 from evoexp.report.statistics.judging import (
     CONTRADICTED,
-    INCONCLUSIVE,
     NOT_JUDGED,
     REPRODUCED,
+    UNDECIDED,
     Judge,
     judge,
 )
@@ -94,14 +94,14 @@ def test_four_percentages_are_one_family_of_tests() -> None:
     [
         (Proportion(999, 1000), Proportion(964, 1000), REPRODUCED),
         (Proportion(964, 1000), Proportion(999, 1000), CONTRADICTED),
-        (Proportion(1000, 1000), Proportion(998, 1000), INCONCLUSIVE),
-        (Proportion(0, 0), Proportion(1, 1), INCONCLUSIVE),
+        (Proportion(1000, 1000), Proportion(998, 1000), UNDECIDED),
+        (Proportion(0, 0), Proportion(1, 1), UNDECIDED),
     ],
 )
 def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: str) -> None:
     judged = hearing("greater").greater("", one, two)
     assert judged.verdict == verdict
-    assert hearing("greater").greater("", one, two, 0.06).verdict == INCONCLUSIVE
+    assert hearing("greater").greater("", one, two, 0.06).verdict == UNDECIDED
 
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
@@ -133,10 +133,10 @@ def test_a_run_without_a_solution_has_no_error_below_anything() -> None:
         ("7-DOF", 0, REPRODUCED),
         ("7-DOF", 2, REPRODUCED),  # the paper prints as many
         ("7-DOF", 5, REPRODUCED),
-        ("7-DOF", 11, INCONCLUSIVE),
+        ("7-DOF", 11, UNDECIDED),
         ("7-DOF", 30, CONTRADICTED),
         ("10-DOF", 1, REPRODUCED),  # one run without a solution contradicts nothing
-        ("10-DOF", 6, INCONCLUSIVE),
+        ("10-DOF", 6, UNDECIDED),
         ("10-DOF", 25, CONTRADICTED),
     ],
 )
@@ -159,7 +159,7 @@ def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
     below_1, below_2 = claims.more_joints_are_better(
         judge(results, SETTINGS, RULES), results.conditions
     )
-    assert (below_1.verdict, below_2.verdict) == (REPRODUCED, INCONCLUSIVE)
+    assert (below_1.verdict, below_2.verdict) == (REPRODUCED, UNDECIDED)
     assert "Fisher's exact p = 4.1e−10" in below_1.evidence
     alone = results._replace(conditions=results.conditions[:1])
     assert (
@@ -228,7 +228,7 @@ def test_smaller_stopping_values_are_judged_step_by_step() -> None:
     few[:30] = np.nan
     errors[labels["1.0", 100]] = few
     first, second, more = sweep(made_up(errors, "lavoie_stopping"))
-    assert (first.verdict, second.verdict, more.verdict) == (INCONCLUSIVE, INCONCLUSIVE, REPRODUCED)
+    assert (first.verdict, second.verdict, more.verdict) == (UNDECIDED, UNDECIDED, REPRODUCED)
     assert "at most 100 generations" in first.text
     assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3303 below 1" in first.evidence
     assert "70 of 100" in more.evidence
@@ -248,9 +248,9 @@ def test_codings_are_compared_arm_by_arm() -> None:
     start = "Real coding performs better than binary coding, judged by"
     assert found == {
         f"{start} position error: real against binary": REPRODUCED,
-        f"{start} evaluations to a solution: real against binary": INCONCLUSIVE,
+        f"{start} evaluations to a solution: real against binary": UNDECIDED,
         f"{start} position error: 10-DOF, real against 10-DOF, binary": CONTRADICTED,
-        f"{start} evaluations to a solution: 10-DOF, real against 10-DOF, binary": INCONCLUSIVE,
+        f"{start} evaluations to a solution: 10-DOF, real against 10-DOF, binary": UNDECIDED,
     }
 
 
@@ -268,11 +268,11 @@ def test_the_algorithm_is_compared_with_the_best_of_its_controls() -> None:
     claims_found = sweep(results, {"7-DOF, blind": 186, "10-DOF, blind": 3, "7-DOF": 20})
     assert [(claim.name, claim.text.split(": ")[0], claim.verdict) for claim in claims_found] == [
         ("blind_collides", "An arm that ignores obstacles collides", REPRODUCED),
-        ("blind_collides", "An arm that ignores obstacles collides", INCONCLUSIVE),
+        ("blind_collides", "An arm that ignores obstacles collides", UNDECIDED),
         ("more_solutions", "7-DOF", REPRODUCED),
         ("less_effort", "7-DOF", REPRODUCED),
-        ("more_solutions", "10-DOF", INCONCLUSIVE),  # its control solves every run, too
-        ("less_effort", "10-DOF", INCONCLUSIVE),
+        ("more_solutions", "10-DOF", UNDECIDED),  # its control solves every run, too
+        ("less_effort", "10-DOF", UNDECIDED),
     ]
     more, less = claims_found[2:4]
     assert more.text.endswith("than its best control, 7-DOF, sub-paths drawn")
@@ -306,7 +306,7 @@ def test_positions_and_chords_are_judged_with_adjusted_p_values() -> None:
         found[f"{fewer}: 7-DOF, M = 10, chords against 7-DOF, M = 10, none"].verdict == REPRODUCED
     )
     middle = found[f"{fewer}: 7-DOF, M = 50, chords against 7-DOF, M = 10, chords"]
-    assert middle.verdict == INCONCLUSIVE  # 0.053 alone
+    assert middle.verdict == UNDECIDED  # 0.053 alone
     assert (
         found[f"{fewer}: 7-DOF, M = 100, chords against 7-DOF, M = 10, chords"].verdict
         == REPRODUCED

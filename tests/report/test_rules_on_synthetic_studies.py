@@ -23,7 +23,7 @@ from evoexp.report.statistics.inference import (
     holm,
     newcombe,
 )
-from evoexp.report.statistics.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED
+from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED, UNDECIDED
 from matrix import examples, matrices_are_asked_for
 from report_samples import hearing
 
@@ -130,7 +130,7 @@ def test_where_nothing_differs_better_is_seldom_said(draw: Draw, runs: int) -> N
     rng, said = np.random.default_rng(runs), []
     for _ in range(STUDIES):
         found = compare("cost", draw(rng, runs), draw(rng, runs), True, LEVEL)
-        said.append(judge_better(found) != INCONCLUSIVE)
+        said.append(judge_better(found) != UNDECIDED)
     assert coverage(said) <= MOST
 
 
@@ -149,8 +149,8 @@ def test_of_six_equal_settings_none_is_said_to_be_better_or_best() -> None:
         own, *others = (smooth(rng, 20) for _ in range(6))
         rows = adjusted([compare("cost", own, other, True, LEVEL) for other in others])
         median = bool(np.median(own) <= min(np.median(other) for other in others))
-        better.append(hearing("better than all").better_than_all("", rows).verdict != INCONCLUSIVE)
-        best.append(hearing("best").best("", rows, median).verdict != INCONCLUSIVE)
+        better.append(hearing("better than all").better_than_all("", rows).verdict != UNDECIDED)
+        best.append(hearing("best").best("", rows, median).verdict != UNDECIDED)
     assert coverage(better) <= MOST
     assert coverage(best) <= MOST
 
@@ -163,7 +163,7 @@ def test_of_equal_shares_none_is_said_to_be_greater(share: float, runs: int) -> 
         one, two = (Proportion(k, runs) for k in pair)
         key = one, two
         verdicts[key] = verdicts.get(key) or hearing("greater").greater("", one, two).verdict
-        said.append(verdicts[key] != INCONCLUSIVE)
+        said.append(verdicts[key] != UNDECIDED)
     assert coverage(said) <= MOST
 
 

@@ -1,12 +1,16 @@
+import math
+import re
+
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.report.statistics import judging
 from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
-from evoexp.report.statistics.inference import Proportion, fisher_exact
-from evoexp.report.statistics.judging import CONTRADICTED, INCONCLUSIVE, REPRODUCED, greater
+from evoexp.report.statistics.inference import Proportion, fisher_exact, runs_for_effect
+from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED, UNDECIDED, greater
 from report_samples import hearing
 
 LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
@@ -23,9 +27,9 @@ def judge_better(comparison: Comparison, significance: float = 0.05) -> str:
         (19, 20, 20, CONTRADICTED),
         (0, 20, 20, CONTRADICTED),
         (3, 4, 20, CONTRADICTED),  # one counter-example is enough
-        (4, 4, 20, INCONCLUSIVE),  # but only all runs reproduce
-        (0, 0, 20, INCONCLUSIVE),
-        (0, 0, 0, INCONCLUSIVE),
+        (4, 4, 20, UNDECIDED),  # but only all runs reproduce
+        (0, 0, 20, UNDECIDED),
+        (0, 0, 0, UNDECIDED),
     ],
 )
 def test_a_claim_about_every_run(holds: int, done: int, planned: int, verdict: str) -> None:
@@ -37,8 +41,8 @@ def test_a_claim_about_being_better() -> None:
     same = compare("cost", LOW, LOW, True, 0.95)
     assert judge_better(better) == REPRODUCED
     assert judge_better(worse) == CONTRADICTED
-    assert judge_better(same) == INCONCLUSIVE
-    assert judge_better(better, 1e-9) == INCONCLUSIVE
+    assert judge_better(same) == UNDECIDED
+    assert judge_better(better, 1e-9) == UNDECIDED
 
 
 def test_a_comparison_knows_which_way_is_better() -> None:
@@ -75,9 +79,9 @@ def test_a_comparison_says_who_is_better() -> None:
     ("comparisons", "verdict"),
     [
         ([BETTER, BETTER], REPRODUCED),
-        ([BETTER, EQUAL], INCONCLUSIVE),
+        ([BETTER, EQUAL], UNDECIDED),
         ([BETTER, WORSE], CONTRADICTED),
-        ([EQUAL], INCONCLUSIVE),
+        ([EQUAL], UNDECIDED),
     ],
 )
 def test_a_claim_about_being_better_than_each(comparisons: list[Comparison], verdict: str) -> None:
@@ -89,8 +93,8 @@ def test_a_claim_about_being_better_than_each(comparisons: list[Comparison], ver
     ("comparisons", "best_median", "verdict"),
     [
         ([BETTER, EQUAL], True, REPRODUCED),  # a neighbour may be as good
-        ([BETTER, EQUAL], False, INCONCLUSIVE),
-        ([EQUAL, EQUAL], True, INCONCLUSIVE),  # then none matters
+        ([BETTER, EQUAL], False, UNDECIDED),
+        ([EQUAL, EQUAL], True, UNDECIDED),  # then none matters
         ([BETTER, WORSE], True, CONTRADICTED),
     ],
 )
@@ -153,4 +157,34 @@ def test_shares_are_told_apart_in_their_own_direction(a: int, b: int, c: int, d:
 def test_equal_shares_contradict_nothing() -> None:
     """Also where p comes from elsewhere: an adjusted one, of several tests."""
     half = Proportion(5, 10)
-    assert hearing("greater").greater("", half, half, 0.01).verdict == INCONCLUSIVE
+    assert hearing("greater").greater("", half, half, 0.01).verdict == UNDECIDED
+
+
+def test_an_undecided_claim_says_how_many_runs_would_decide() -> None:
+    """As many as are needed for a power of 0.8, tried on simulated studies of that size."""
+    rng, shift = np.random.default_rng(1), 0.4
+    first, second = np.sort(rng.normal(0.0, size=12)), np.sort(rng.normal(shift, size=12))
+    claim = hearing("better").better(compare("x", first, second, True, 0.95), "lower")
+    assert claim.verdict == UNDECIDED
+    assert re.search(r"; about \d+0 runs of each would decide$", claim.evidence)
+    truth = float(scipy.stats.norm.cdf(shift / math.sqrt(2.0)))
+    needed = math.ceil(runs_for_effect(truth, 0.05))
+    studies = [
+        compare("x", *rng.normal([[0.0], [shift]], size=(2, needed)), True, 0.95)
+        for _ in range(400)
+    ]
+    assert 0.74 < np.mean([study.says(0.05) == 1 for study in studies]) < 0.86
+
+
+def test_equal_conditions_would_never_be_told_apart() -> None:
+    claim = hearing("better").better(compare("x", LOW, LOW, True, 0.95), "lower")
+    assert claim.evidence.endswith("; more than 10,000 runs of each would be needed to decide")
+    decided = hearing("better").better(BETTER, "lower")
+    assert "would" not in decided.evidence
+
+
+def test_shares_say_how_many_runs_would_decide() -> None:
+    one, two = Proportion(16, 20), Proportion(12, 20)
+    claim = hearing("greater").greater("", one, two)
+    assert claim.verdict == UNDECIDED and claim.evidence == "about 90 runs of each would decide"
+    assert hearing("greater").greater("", Proportion(0, 0), two).evidence == ""

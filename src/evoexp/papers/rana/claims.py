@@ -190,7 +190,9 @@ def _told(
         with_it, without = (markdown.number(float(np.median(measures.unevenness(c)))) for c in pair)
         medians = f"{with_it}{shown} with, {without}{shown} without, "
     difference = markdown.number(row.median_difference)
-    return f"{name}: {medians}difference of medians {difference}{shown}, {kit.evidence(row, 'lower')}"
+    return (
+        f"{name}: {medians}difference of medians {difference}{shown}, {kit.evidence(row, 'lower')}"
+    )
 
 
 def extensions(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Claim]:

@@ -11,7 +11,7 @@ from evoexp.report.figures import groups, records, style
 from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED
 
 WRAPPED = 30  # characters of a quantity's name, per line
-OTHERWISE = "inconclusive or not judged"
+OTHERWISE = "undecided or not judged"
 MARKS: dict[str, dict[str, Any]] = {
     REPRODUCED: {"marker": "o", "mfc": style.ARM_COLOURS[0]},
     CONTRADICTED: {"marker": "X", "mfc": style.ARM_COLOURS[1], "mec": style.ARM_COLOURS[1]},

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # loaded only where a page is written
 HTML = "index.html"
 FEW = 3  # failures named at the top
 PIXELS_PER_POINT = 4.0 / 3.0
-VERDICTS = ("reproduced", "contradicted", "inconclusive", "not")  # their first words, in order
+VERDICTS = ("reproduced", "contradicted", "undecided", "not")  # their first words, in order
 TELLING = ("snapshot", "scene", "motion", "stages", "operational", "posture", "path")
 """Parts of the names of figures that show what an experiment is about, the best one first."""
 NO_VALUE = ("–", "")  # cells of a column of numbers that hold none

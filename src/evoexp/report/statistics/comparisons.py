@@ -9,7 +9,13 @@ from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import ConditionResults, Results, wrapped
-from evoexp.report.statistics.inference import Effect, effect, holm, quantile
+from evoexp.report.statistics.inference import (
+    Effect,
+    effect,
+    holm,
+    quantile,
+    runs_for_effect,
+)
 
 Values = Callable[[ConditionResults], FloatArray]
 Pair = tuple[ConditionResults, ConditionResults]
@@ -34,6 +40,15 @@ class Comparison(NamedTuple):
     def says(self, significance: float) -> int:
         """Return 1 if the first is significantly better, −1 if significantly worse, else 0."""
         return self.better.direction if self.p_adjusted < significance else 0
+
+    def runs_to_decide(self, significance: float) -> float:
+        """Return how many runs of each would decide it if A12 stays: more than there are.
+
+        The level of a single test is that which Holm leaves it.
+        """
+        level = significance * (self.better.p_value / self.p_adjusted if self.p_adjusted else 1.0)
+        least = max(self.num_first, self.num_second) + 1
+        return max(float(least), runs_for_effect(self.better.a12, level))
 
 
 class Measure(NamedTuple):

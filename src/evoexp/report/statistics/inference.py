@@ -14,6 +14,7 @@ from scipy import optimize, special, stats
 
 from evoexp.records import FloatArray
 
+POWER = 0.8  # [-] of a test whose runs are planned
 LEAST_FOR_T = 10  # runs of each sample from which Brunner and Munzel's t distribution holds
 SMALLEST_SHARE = 1e-9  # of pairs of runs; no samples are so large
 BOOTSTRAP_SEED = 20_250_419  # of the report's own generators; any fixed number
@@ -141,6 +142,27 @@ def fisher_exact(one: Proportion, two: Proportion) -> float:
     """Return the two-sided p of Fisher's exact test: all tables at most as likely as this one."""
     table = np.array([[each.having, each.total - each.having] for each in (one, two)])
     return float(stats.fisher_exact(table).pvalue)
+
+
+def runs_for_effect(a12: float, significance: float) -> float:
+    """Return the runs of each sample that show this A12 with the usual power (Noether 1987)."""
+    beyond = float(stats.norm.isf(0.5 * significance) + stats.norm.ppf(POWER))
+    return 0.5 * beyond**2 / (3.0 * (a12 - 0.5) ** 2) if a12 != 0.5 else math.inf
+
+
+def runs_for_shares(one: Proportion, two: Proportion, significance: float) -> float:
+    """Return the runs of each that show this difference of shares with the usual power.
+
+    As many as there are at least; inf if the shares are equal.
+    """
+    p, q = one.share, two.share
+    if p == q:
+        return math.inf
+    both = 0.5 * (p + q)
+    beyond = stats.norm.isf(0.5 * significance) * math.sqrt(2.0 * both * (1.0 - both))
+    missed = stats.norm.ppf(POWER) * math.sqrt(p * (1.0 - p) + q * (1.0 - q))
+    needed = float((beyond + missed) ** 2) / (p - q) ** 2
+    return max(needed, max(one.total, two.total) + 1.0)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

@@ -1,5 +1,6 @@
 """Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -11,15 +12,16 @@ from evoexp.report.results.parameters import option, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules, registered_rules
 from evoexp.report.statistics.comparisons import Comparison, Values, compared
-from evoexp.report.statistics.inference import Proportion, fisher_exact
+from evoexp.report.statistics.inference import Proportion, fisher_exact, runs_for_shares
 from evoexp.shipped import config_directory, shipped
 
-REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
+REPRODUCED, CONTRADICTED, UNDECIDED, NOT_JUDGED = (
     "reproduced",
     "contradicted",
-    "inconclusive",
+    "undecided",
     "not judged",
 )
+MANY_RUNS = 10_000  # beyond which nobody waits for a verdict
 ONLY_CONTROLS = "only a control was run"
 Evidence = str | Mapping[str, object]
 """The words of the rule's sentence of evidence, or a whole text."""
@@ -57,8 +59,9 @@ class Hearing(NamedTuple):
         heard = self._replace(
             rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         )
-        counted = row and row.num_runs
-        return heard._claim("better", told.replace("{}", words), counted, says == 1, says == -1)
+        counted, would_do = row and row.num_runs, row and row.runs_to_decide(self.significance)
+        judged = counted, says == 1, says == -1, would_do
+        return heard._claim("better", told.replace("{}", words), *judged)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
         """Judge a claim that a condition is better than each of several others.
@@ -66,7 +69,10 @@ class Hearing(NamedTuple):
         One that is significantly better contradicts; all must be significantly worse to reproduce.
         """
         says = {row.says(self.significance) for row in rows}
-        return self._claim("better than all", evidence, _runs(rows), says == {1}, -1 in says)
+        undecided = [row for row in rows if not row.says(self.significance)]
+        would_do = max((row.runs_to_decide(self.significance) for row in undecided), default=None)
+        judged = _runs(rows), says == {1}, -1 in says, would_do
+        return self._claim("better than all", evidence, *judged)
 
     def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
         """Judge a claim that one of several settings is the best.
@@ -89,7 +95,9 @@ class Hearing(NamedTuple):
         p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
         says = greater(one, two, p_value, self.significance)
         counted = f"{one.total} and {two.total}"
-        return self._claim("greater", evidence, counted, says == 1, says == -1)
+        is_known = one.total > 0 and two.total > 0
+        would_do = runs_for_shares(one, two, self.significance) if is_known else None
+        return self._claim("greater", evidence, counted, says == 1, says == -1, would_do)
 
     def same_share(
         self, evidence: Evidence, own: Proportion, printed: Proportion, p_adjusted: float
@@ -116,7 +124,13 @@ class Hearing(NamedTuple):
         return self.made(evidence, "–", NOT_JUDGED)
 
     def _claim(
-        self, kind: str, evidence: Evidence, n: object, reproduced: bool, contradicted: bool
+        self,
+        kind: str,
+        evidence: Evidence,
+        n: object,
+        reproduced: bool,
+        contradicted: bool,
+        would_decide: float | None = None,  # runs of each condition
     ) -> Claim:
         if kind != self.rule.kind:
             raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
@@ -124,8 +138,15 @@ class Hearing(NamedTuple):
         reason = self.reason or ("nothing to compare" if n in (None, "0") else "")
         if reason:
             return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
-        verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else INCONCLUSIVE
-        return self.made(evidence, n, verdict)
+        verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else UNDECIDED
+        claim = self.made(evidence, n, verdict)
+        if verdict != UNDECIDED or would_decide is None:
+            return claim
+        if would_decide > MANY_RUNS:
+            words = f"more than {MANY_RUNS:,} runs of each would be needed to decide"
+        else:
+            words = f"about {10 * math.ceil(would_decide / 10)} runs of each would decide"
+        return claim._replace(evidence="; ".join(filter(None, (claim.evidence, words))))
 
     def made(self, evidence: Evidence, n: object, verdict: str) -> Claim:
         """Return the claim with this evidence and verdict."""

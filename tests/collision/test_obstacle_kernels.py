@@ -33,12 +33,13 @@ def coal_distances(
     collision: SphereCollision, obstacles: tuple[object, ...], q_deg: np.ndarray
 ) -> np.ndarray:
     """All distances of spheres and obstacles, (spheres, obstacles)."""
-    assembly, geometry = collision.assembly, collision.geometry
-    data, placed = assembly.model.createData(), geometry.createData()
-    pin.updateGeometryPlacements(assembly.model, data, geometry, placed, np.deg2rad(q_deg))
+    model, shapes = collision.assembly.model, collision.shapes
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.deg2rad(q_deg))
     found = []
-    for one, place in zip(geometry.geometryObjects, placed.oMg, strict=True):
-        sphere = coal.CollisionObject(one.geometry, place.rotation, place.translation)
+    for joint, center, radius in zip(shapes.joint, shapes.start, shapes.radius, strict=True):
+        place = data.oMi[int(joint)].act(center)
+        sphere = coal.CollisionObject(coal.Sphere(radius), np.eye(3), place)
         for obstacle in obstacles:
             shape, at = coal_obstacle(obstacle)
             result = coal.DistanceResult()
@@ -50,7 +51,7 @@ def coal_distances(
                     result,
                 )
             )
-    return np.array(found).reshape(geometry.ngeoms, len(obstacles))
+    return np.array(found).reshape(len(shapes.joint), len(obstacles))
 
 
 @pytest.mark.examples(2)

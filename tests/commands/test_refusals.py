@@ -35,7 +35,7 @@ CHOSEN = f"must be chosen: experiment=NAME, one of {len(options('experiment'))}:
         (
             "ga.mutation_rat=1",
             "ga.mutation_rat: unknown setting; did you mean 'mutation_rate'? (known here: "
-            "crossover_rate",
+            "crossover, crossover_rate",
         ),
         ("gaa.mutation_rate=1", "gaa: unknown setting; did you mean 'ga'?"),
         ("mutation_rate=1", "mutation_rate: unknown setting; did you mean 'ga.mutation_rate'?"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.objectives.string_fitness import StringFitness, count_collisions, fill_wheel, weigh
+from evoexp.objectives.string_fitness import StringFitness, count_collisions, weigh
 
 PAPER = StringFitness(
     length_weight=0.5, unevenness_weight=0.005, collision_weight=100.0, fitness_offset=500.0
@@ -21,12 +21,6 @@ def test_cost_is_the_bracket_of_equation_7() -> None:
 def test_collisions_lower_the_fitness() -> None:
     """The printed sign of Eq. 7 would reward them."""
     assert PAPER.fitness(np.array([300.0]))[0] < PAPER.fitness(np.array([200.0]))[0]
-
-
-def test_roulette_weights_are_never_negative() -> None:
-    weights = np.empty(3)
-    fill_wheel(PAPER.fitness_offset, np.array([499.0, 501.0, np.inf]), weights)
-    assert weights.tolist() == [1.0, 0.0, 0.0]
 
 
 def test_an_instant_collides_if_any_of_its_substeps_does() -> None:

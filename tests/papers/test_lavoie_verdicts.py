@@ -225,12 +225,12 @@ def test_smaller_stopping_values_are_judged_step_by_step() -> None:
     errors = {label: float(stop) / 4.0 + spread for (stop, _), label in labels.items()}
     errors[labels["1.0", 300]] = errors[labels["1.5", 300]]  # the last step brings nothing
     few = errors[labels["1.0", 100]].copy()
-    few[:30] = np.nan
+    few[:45] = np.nan  # runs without a solution, the worst class
     errors[labels["1.0", 100]] = few
     first, second, more = sweep(made_up(errors, "lavoie_stopping"))
     assert (first.verdict, second.verdict, more.verdict) == (UNDECIDED, UNDECIDED, REPRODUCED)
     assert "at most 100 generations" in first.text
-    assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3303 below 1" in first.evidence
+    assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3455 below 1" in first.evidence
     assert "70 of 100" in more.evidence
     errors[labels["1.0", 100]] = 0.25 + spread
     assert sweep(made_up(errors, "lavoie_stopping"))[0].verdict == REPRODUCED

@@ -29,7 +29,8 @@ class Comparison(NamedTuple):
     num_second: int  # the same of the second
     median_difference: float  # the first's median minus the second's
     better: Effect  # a12 of the first being better than the second
-    p_adjusted: float  # by Holm over all that are compared; the plain one until `adjusted`
+    # of `better`, by Holm over all that are compared; before `adjusted` it is the plain p-value
+    p_adjusted: float
 
     @property
     def num_runs(self) -> str:

@@ -231,7 +231,7 @@ def test_smaller_stopping_values_are_judged_step_by_step() -> None:
     assert (first.verdict, second.verdict, more.verdict) == (UNDECIDED, UNDECIDED, REPRODUCED)
     assert "at most 100 generations" in first.text
     assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3455 below 1" in first.evidence
-    assert "70 of 100" in more.evidence
+    assert "55 of 100" in more.evidence
     errors[labels["1.0", 100]] = 0.25 + spread
     assert sweep(made_up(errors, "lavoie_stopping"))[0].verdict == REPRODUCED
 

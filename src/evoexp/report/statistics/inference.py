@@ -201,11 +201,10 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
         return Effect(a12, Interval(a12, a12), 1.0)
     # squared standard errors of A12, from the places of either sample in the other
     errors = [_squared_error(*samples) for samples in ((x, y), (y, x))]
+    least_p = min(1.0, 2.0 / math.comb(len(x) + len(y), len(x)))  # that of separated samples
     if smallest == 1 or sum(errors) == 0.0:
-        is_separated = a12 in (0.0, 1.0)
-        p_value = 2.0 / math.comb(len(x) + len(y), len(x)) if is_separated else 1.0
-        interval = _newcombe_interval(a12, len(x), len(y), confidence)
-        return Effect(a12, interval, min(1.0, p_value))
+        p_value = least_p if a12 in (0.0, 1.0) else 1.0
+        return Effect(a12, _newcombe_interval(a12, len(x), len(y), confidence), p_value)
     error = math.sqrt(sum(errors))
     degrees = sum(errors) ** 2 / (errors[0] ** 2 / (len(x) - 1) + errors[1] ** 2 / (len(y) - 1))
     # symmetric in log(a12 / (1 - a12)): near 0 and 1 the plain interval holds A12 too seldom
@@ -215,7 +214,7 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
         p_value = float(stats.mannwhitneyu(x, y).pvalue)
     else:
         p_value = 2.0 * float(special.stdtr(degrees, -abs(a12 - 0.5) / error))
-    return Effect(a12, Interval(float(low), float(high)), p_value)
+    return Effect(a12, Interval(float(low), float(high)), max(p_value, least_p))
 
 
 def _squared_error(x: FloatArray, y: FloatArray) -> float:

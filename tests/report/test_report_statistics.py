@@ -126,6 +126,12 @@ def test_effect_of_separated_samples(n: int, m: int) -> None:
     assert markdown.p_value(above.p_value) not in ("0", "0.0e+00")
 
 
+@pytest.mark.parametrize("shift", [0.1, 1e4])
+def test_thousands_of_runs_are_compared(shift: float) -> None:
+    x = np.arange(3000.0)
+    assert 0.0 < effect(x + shift, x, 0.95).p_value <= 1.0
+
+
 def test_no_effect_is_clearer_than_that_of_separated_samples() -> None:
     x, y = np.arange(20.0) + 19.5, np.arange(20.0)
     x[0] = 18.5  # below one of the others

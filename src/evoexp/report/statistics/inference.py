@@ -6,6 +6,7 @@ nothing here takes a mean.
 
 import functools
 import math
+import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -201,7 +202,7 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
         return Effect(a12, Interval(a12, a12), 1.0)
     # squared standard errors of A12, from the places of either sample in the other
     errors = [_squared_error(*samples) for samples in ((x, y), (y, x))]
-    least_p = min(1.0, 2.0 / math.comb(len(x) + len(y), len(x)))  # that of separated samples
+    least_p = _separated_p_value(len(x), len(y))
     if smallest == 1 or sum(errors) == 0.0:
         p_value = least_p if a12 in (0.0, 1.0) else 1.0
         return Effect(a12, _newcombe_interval(a12, len(x), len(y), confidence), p_value)
@@ -215,6 +216,15 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
     else:
         p_value = 2.0 * float(special.stdtr(degrees, -abs(a12 - 0.5) / error))
     return Effect(a12, Interval(float(low), float(high)), max(p_value, least_p))
+
+
+def _separated_p_value(n: int, m: int) -> float:
+    """Return the p-value of separated samples: two of all ways to choose the first one's ranks.
+
+    Of thousands of runs there are more ways than a float can count.
+    """
+    ways = math.lgamma(n + m + 1) - math.lgamma(n + 1) - math.lgamma(m + 1)  # their logarithm
+    return min(1.0, max(2.0 * math.exp(-ways), sys.float_info.min))
 
 
 def _squared_error(x: FloatArray, y: FloatArray) -> float:

@@ -223,7 +223,8 @@ def _separated_p_value(n: int, m: int) -> float:
 
     Of thousands of runs there are more ways than a float can count.
     """
-    ways = math.lgamma(n + m + 1) - math.lgamma(n + 1) - math.lgamma(m + 1)  # their logarithm
+    # their logarithm, the same in either order
+    ways = math.lgamma(n + m + 1) - (math.lgamma(n + 1) + math.lgamma(m + 1))
     return min(1.0, max(2.0 * math.exp(-ways), sys.float_info.min))
 
 
@@ -245,9 +246,8 @@ def _newcombe_interval(a12: float, n: int, m: int, confidence: float) -> Interva
         variance = value * (1.0 - value) * (1.0 + more * shape) / (n * m)
         return abs(value - a12) - z * math.sqrt(variance)
 
-    inside = min(
-        max(a12, SMALLEST_SHARE), 1.0 - SMALLEST_SHARE
-    )  # where the standard error is not 0
+    # where the standard error is not 0
+    inside = min(max(a12, SMALLEST_SHARE), 1.0 - SMALLEST_SHARE)
     low = optimize.brentq(excess, 0.0, inside) if a12 > 0.0 else 0.0
     high = optimize.brentq(excess, inside, 1.0) if a12 < 1.0 else 1.0
     return Interval(float(low), float(high))

@@ -16,9 +16,14 @@ from evoexp.commands.command_process import (
     refuse_too_little_memory,
     use_temporary_folder,
 )
-from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
-from evoexp.commands.standard_streams import OUTPUT, complain, open_streams, settle_streams
+from evoexp.commands.standard_streams import (
+    OUTPUT,
+    complain,
+    damage_in_lines,
+    open_streams,
+    settle_streams,
+)
 from evoexp.errors import EvoexpError
 
 KEPT = "finished replicates are kept, the same command runs the others"

@@ -13,7 +13,7 @@ import numpy as np
 
 from evoexp.attachments import SHA256, attached, keep, with_files
 from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting, brief
-from evoexp.registry import component_class
+from evoexp.registry import component_class, components_in
 from evoexp.validation import LARGEST, MOST_QUERIES, TARGET, Component, build
 
 # Of robots and scenarios: coal's distances between bodies ten times as far apart or as large as
@@ -221,11 +221,7 @@ class Condition(NamedTuple):
         return _prepare(self)
 
     def notes(self) -> list[str]:
-        """Return the remarks of robot, planner and scenario, one per line.
-
-        Raises:
-            SettingError: If the parts contradict each other.
-        """
+        """Return the remarks of robot, planner and scenario, one per line."""
         from evoexp.robots.assembly import Robot  # and Pinocchio
 
         planner, problem = self.prepare()
@@ -283,16 +279,8 @@ def _prepare(condition: Condition) -> Prepared:
     return Prepared(condition.planner, prepared)
 
 
-def revisions(config: Any, field: str = "") -> list[tuple[str, Any, int]]:
-    """Return (field, stored revision, installed revision) of every component in plain data."""
-    found: list[tuple[str, Any, int]] = []
-    if isinstance(config, dict):
-        if TARGET in config:
-            kind = component_class(str(config[TARGET]), field or "config")
-            found.append((field or "config", config.get("revision"), kind.revision))
-        for key, value in config.items():
-            found += revisions(value, f"{field}.{key}" if field else str(key))
-    elif isinstance(config, list):
-        for k, value in enumerate(config):
-            found += revisions(value, f"{field}[{k}]")
-    return found
+def revisions(config: Any) -> Iterator[tuple[str, Any, int]]:
+    """Yield (field, stored revision, installed revision) of every component in plain data."""
+    for field, settings in components_in(config):
+        kind = component_class(str(settings[TARGET]), field or "config")
+        yield field or "config", settings.get("revision"), kind.revision

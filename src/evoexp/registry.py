@@ -61,11 +61,7 @@ class Registration(NamedTuple):
         return resources.files(package).joinpath(name) if name.endswith(".yaml") else None
 
     def load(self) -> Any:
-        """Import and return the class or function.
-
-        Raises:
-            RegistrationError: If it cannot be imported.
-        """
+        """Import and return the class or function."""
         module, _, attribute = self.target.partition(":")
         try:
             return getattr(importlib.import_module(module), attribute)
@@ -151,25 +147,23 @@ def component_class(name: str, field: str = TARGET) -> type[Component]:
     return cast(type[Component], registration.load())
 
 
-def component_names(config: Any) -> Iterator[str]:
-    """Yield the names of all components in plain configuration data."""
+def components_in(config: Any, field: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (dotted field, settings) of all components in plain configuration data."""
     if isinstance(config, dict):
         if TARGET in config:
-            yield str(config[TARGET])
-        config = list(config.values())
-    if isinstance(config, list):
-        for value in config:
-            yield from component_names(value)
+            yield field, config
+        for key, value in config.items():
+            yield from components_in(value, f"{field}.{key}" if field else str(key))
+    elif isinstance(config, list):
+        for k, value in enumerate(config):
+            yield from components_in(value, f"{field}[{k}]")
 
 
 @functools.lru_cache(maxsize=64)
 def guests(config_json: bytes) -> dict[str, str]:
-    """Return component → `distribution version` of a condition's components that are not evoexp's.
-
-    Args:
-        config_json: The condition's canonical form.
-    """
-    found = (registered(COMPONENTS, name) for name in component_names(json.loads(config_json)))
+    """Return component → `distribution version` of a condition's components of guests."""
+    named = (str(settings[TARGET]) for _, settings in components_in(json.loads(config_json)))
+    found = (registered(COMPONENTS, name) for name in named)
     return {each.name: each.package for each in found if each is not None and not each.is_own}
 
 

@@ -36,7 +36,6 @@ from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.records import FrontRow
 from evoexp.store import log_bounds, log_reader
 from evoexp.store.log_reader import (
-    array_names,
     generation_columns,
     read_array,
     read_log,
@@ -50,7 +49,7 @@ READERS: tuple[Callable[[Any], object], ...] = (
     read_summary,
     read_solution,
     generation_columns,
-    lambda content: [read_array(content, name) for name in array_names(content)],
+    lambda content: [read_array(content, name) for name in read_log(content).arrays()],
     lambda content: read_log(content).arrays(),
 )
 NUM_LOGS = counts(10_000, 100_000) if matrices_are_asked_for() else 300

@@ -45,10 +45,6 @@ def _memory(generations: int, memory: float) -> int:
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates would take too much memory, or too long a log.
 
-    Args:
-        allowed: Memory of one replicate [B].
-        label: Of the condition, for the error.
-
     Raises:
         SettingError: If they would, or if the condition contradicts itself.
     """

@@ -41,10 +41,6 @@ class ReplicateLimits(NamedTuple):
 def limited(limits: ReplicateLimits, *, in_worker: bool) -> Iterator[None]:
     """Keep the body within limits.
 
-    Args:
-        limits: Of time and memory.
-        in_worker: Whether this process is a worker, which may be ended and whose memory is limited.
-
     Raises:
         TookTooLong: The body took too long.
         MemoryError: It took too much memory.

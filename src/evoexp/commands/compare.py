@@ -152,11 +152,7 @@ def _write_files(
 
 
 def _asked(arguments: argparse.Namespace) -> ReportRequest:
-    """Return the request of the page.
-
-    Raises:
-        EvoexpError: As `report_requests.chosen`.
-    """
+    """Return the request of the page."""
     words = shlex.join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
     words += f" --only {shlex.quote(','.join(arguments.only))}" if arguments.only else ""
     words = " ".join([words, *folder_words(arguments.config_dir)])

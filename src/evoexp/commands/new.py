@@ -66,13 +66,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _check(name: str, root: Path) -> None:
-    """Refuse a name that cannot be, or that something has already.
-
-    Raises:
-        SettingError: If the name is no name of a package, or evoexp has a component or an option of
-            this name.
-        PackageExists: If a directory or a module has it.
-    """
+    """Refuse a name that cannot be, or that something has already."""
     if not re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
         must = "a word of lower-case letters, digits and _ that begins with a letter"
         raise SettingError("NAME", must, name)

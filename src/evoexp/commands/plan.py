@@ -200,13 +200,7 @@ class StoredTimes:
         return tuple(other[:12] for other in same if other != condition_id)
 
     def estimate(self, condition: Condition, run: RunDirectory, settings: Any) -> Estimate:
-        """Estimate the CPU time of a replicate: from its own ones, else from runs like it.
-
-        Args:
-            condition: Of which replicates shall be run.
-            run: Where those that were run are stored.
-            settings: Of the condition, as plain data.
-        """
+        """Estimate the CPU time of a replicate: from its own ones, else from runs like it."""
         if (own := _times(run)).cpu_s:
             widening = 1.0 if len(own.cpu_s) >= FEW else 2.0
             least, most = min(own.cpu_s) / widening, max(own.cpu_s) * widening

@@ -73,12 +73,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _main_of_all(arguments: argparse.Namespace) -> int:
-    """Draw all reports and the home page, or check them.
-
-    Raises:
-        SettingError: If words are given, too.
-        NothingStored: If nothing is stored.
-    """
+    """Draw all reports and the home page, or check them."""
     given = [*arguments.overrides, *arguments.only, *(["-m"] if arguments.multirun else [])]
     if given:
         raise SettingError("--all", "given alone", " ".join(given))
@@ -100,11 +95,7 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
 
 
 def _check(reports: Iterable[build.ReportFiles]) -> int:
-    """Compare reports with what is on disk, and name every file that is not the same.
-
-    Returns:
-        The exit code: 1 if a file differs, is missing or left over.
-    """
+    """Compare reports with what is on disk, and name every file that is not the same."""
     num_reports = num_files = num_wrong = 0
     for report in reports:
         for line in _differences(report):
@@ -137,9 +128,6 @@ def _with_assumptions(words: Sequence[str]) -> list[str]:
     """Return the words with `assumptions` replaced by the papers' experiments of that name.
 
     An experiment that nothing is stored of is named instead, with the command that runs it.
-
-    Raises:
-        NothingStored: If nothing is stored of any of them.
     """
     every = [name for name in options("experiment") if name.endswith(f"_{ASSUMPTIONS}")]
     table, outputs = shipped(), outputs_root()
@@ -239,12 +227,7 @@ def _notes(run: RunDirectory) -> dict[str, Any]:
 
 
 def _again(folder: str, command: str) -> build.ReportFiles:
-    """Draw a report by the command that its page names; nothing is written.
-
-    Raises:
-        StoreError: If it names no command that draws a report.
-        EvoexpError: If that cannot be done any more.
-    """
+    """Draw a report by the command that its page names; nothing is written."""
     name, *words = _words(command)
     if name not in ("report", "compare"):
         raise StoreError(f"{folder}: names no command that draws it")

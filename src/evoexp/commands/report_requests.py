@@ -80,11 +80,7 @@ def chosen(arguments: argparse.Namespace) -> Chosen:
 
 
 def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str], list[str]]:
-    """Read `rana_planar@smoke`, as the folder of a report is named, as its words.
-
-    Raises:
-        SettingError: If experiments are named with several budgets.
-    """
+    """Read `rana_planar@smoke`, as the folder of a report is named, as its words."""
     parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
     budgets = {f"budget={budget}" for _, at, budget in parted if at}
     if not budgets:
@@ -96,11 +92,7 @@ def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str],
 
 
 def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
-    """Return a report of every named experiment, or a single report of all named runs.
-
-    Raises:
-        EvoexpError: As `chosen`.
-    """
+    """Return a report of every named experiment, or a single report of all named runs."""
     runs, experiments, overrides, settings = chosen(arguments)
     if runs:
         name = "+".join(runs)

@@ -109,11 +109,7 @@ def _command(arguments: argparse.Namespace) -> str:
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:
-    """Return the conditions of an experiment, without those that need an extra that is not there.
-
-    Raises:
-        SettingError: If all of them do.
-    """
+    """Return the conditions of an experiment that need no extra that is not there."""
     lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
     for label, what in lacks.items():
         if what:

@@ -36,11 +36,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def write_site() -> None:
-    """Write the home page, and name it.
-
-    Raises:
-        NothingStored: If there is neither a report nor a run.
-    """
+    """Write the home page, and name it."""
     directory, files = home_files()
     directory.mkdir(parents=True, exist_ok=True)
     write_file(directory / HTML, files[HTML])

@@ -5,8 +5,11 @@ import os
 import shutil
 import sys
 import textwrap
+import warnings
+from collections.abc import Iterator
+from typing import Any
 
-from evoexp.errors import printable
+from evoexp.errors import DamagedStore, printable
 
 OUTPUT = "standard output"  # the file name of its errors
 
@@ -42,3 +45,22 @@ def complain(text: str) -> None:
             columns = shutil.get_terminal_size().columns
             line = textwrap.fill(line, columns, break_long_words=False, break_on_hyphens=False)
         print(line, file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def damage_in_lines() -> Iterator[None]:
+    """Print warnings of damaged files as `evoexp: …`, each line once, while the body runs."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
+            if not issubclass(category, DamagedStore):
+                shown(message, category, *place, **rest)
+            elif (text := " ".join(str(message).split())) not in said:
+                said.add(text)
+                print(f"evoexp: {printable(text)}", file=sys.stderr)
+
+        warnings.simplefilter("always", DamagedStore)
+        warnings.showwarning = show
+        yield

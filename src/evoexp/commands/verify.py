@@ -20,7 +20,7 @@ from evoexp.commands.console import (
 )
 from evoexp.commands.stored_runs import stored_run
 from evoexp.store.identity import CONFIG
-from evoexp.store.integrity import LogCheck, RunCheck, check_logs, check_rows, check_run
+from evoexp.store.integrity import LogCheck, RunCheck, check_log, check_rows, check_run
 from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, run_names
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
@@ -125,7 +125,7 @@ def _by_run(
 def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:
     from evoexp.batch.stored_solutions import contradictions  # planners, which take long to load
 
-    return check_logs(paths, condition_id, contradictions)
+    return [check_log(path, condition_id, contradictions) for path in paths]
 
 
 def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:

@@ -75,11 +75,7 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
 
 
 def planned_replicates(count: Any, budget: Budget) -> int:
-    """Return the number of replicates, capped by the budget.
-
-    Raises:
-        SettingError: If it is no number of replicates.
-    """
+    """Return the number of replicates, capped by the budget."""
     if type(count) is not int or count < 1:
         raise SettingError("num_replicates", "a whole number, at least 1", count)
     if count > MOST_REPLICATES:
@@ -88,11 +84,7 @@ def planned_replicates(count: Any, budget: Budget) -> int:
 
 
 def build_settings(kind: type[AnySettings], config: dict[str, Any], group: str) -> AnySettings:
-    """Build the settings of a group that is no component.
-
-    Raises:
-        EvoexpError: For a value that cannot be, or an unknown setting.
-    """
+    """Build the settings of a group that is no component."""
     if TARGET in config:
         raise UnknownSetting(f"{group}.{TARGET}", kind.model_fields)
     values = build(config, component_class, group)

@@ -95,11 +95,7 @@ def expand(
 
 
 def parse(text: str) -> Override:
-    """Read one override.
-
-    Raises:
-        SettingError: If it is none.
-    """
+    """Read one override."""
     key, _, typed = text.partition("=")
     if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
         return Override("", key, (Value(typed, typed),), False, text)
@@ -153,11 +149,7 @@ class Composer:
         self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
 
     def __call__(self, overrides: Choice) -> Composed:
-        """Return the options that overrides choose, with the settings that overrides change.
-
-        Raises:
-            EvoexpError: If they cannot be composed.
-        """
+        """Return the options that overrides choose, with the settings that overrides change."""
         base = self.chosen(overrides)
         config = copy.deepcopy(base.config)
         assign_all(config, {key: each for key, each in overrides.items() if key not in groups()})

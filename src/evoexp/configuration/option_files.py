@@ -14,11 +14,7 @@ MOST_VALUES = 100_000  # once every alias (`*name`) stands for a copy of what it
 
 
 def check_files(folder: Path) -> None:
-    """Check all options in the groups of a folder.
-
-    Raises:
-        SettingError: As `check_file`.
-    """
+    """Check all options in the groups of a folder."""
     for path in sorted(folder.glob("*/*.yaml")):
         check_file(path)
 
@@ -27,9 +23,6 @@ def check_file(path: Path) -> None:
     """Refuse an option file that is too large, or that unfolds to too many values.
 
     Whether it can be composed otherwise is not looked at.
-
-    Raises:
-        SettingError: Naming it.
     """
     try:
         content = read_bounded(path, MAX_FILE)

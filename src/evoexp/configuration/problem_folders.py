@@ -27,9 +27,6 @@ class ProblemFiles(NamedTuple):
 def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
     """Yield label and overrides of every problem of a folder; without one, the overrides as given.
 
-    Args:
-        choice: Overrides by key, each with one value.
-
     Raises:
         SettingError: If the folder holds no problem, or a scene is named beside it.
     """

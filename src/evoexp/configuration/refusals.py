@@ -22,11 +22,7 @@ def chosen(group: str) -> str:
 
 
 def unparsed(text: str) -> SettingError:
-    """Return the refusal of an override that cannot be read.
-
-    Args:
-        text: As typed.
-    """
+    """Return the refusal of an override that cannot be read."""
     key, equals, value = text.partition("=")
     if not equals or not re.fullmatch(r"[~+]*[A-Za-z_][\w.\[\]]*", key):
         return SettingError("override", "key=value", text)

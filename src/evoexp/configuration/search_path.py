@@ -44,9 +44,6 @@ def searched_first(directories: Iterable[str]) -> Iterator[None]:
 
     Args:
         directories: As typed after `--config-dir`, the first one to be searched first.
-
-    Raises:
-        SettingError: If one is no folder.
     """
     token = _given.set(tuple(directories))
     try:
@@ -109,10 +106,6 @@ def options(group: str) -> list[str]:
 
 def find(group: str, name: str) -> Option:
     """Return an option: its file and where it comes from.
-
-    Args:
-        group: `ga`, say.
-        name: Of the option; of an experiment its file, too.
 
     Raises:
         UnknownOption: If there is none of this name; lists those that there are.

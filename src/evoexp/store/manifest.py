@@ -51,11 +51,7 @@ class Difference(NamedTuple):
 
 
 def manifest(condition_id: str, components: Mapping[str, str] = _NO_COMPONENTS) -> dict[str, Any]:
-    """Return the manifest of a run: its full hash, the environment, the state of the code.
-
-    Args:
-        condition_id: 64 hex digits.
-    """
+    """Return the manifest of a run: its full hash, the environment, the state of the code."""
     return {"condition": condition_id, **environment(components), "git": git_state()}
 
 

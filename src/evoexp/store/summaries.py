@@ -192,9 +192,6 @@ def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -
     """Return the logs whose row in `summary.parquet` does not repeat the summary they hold.
 
     Rows of logs that changed since the table was written are not looked at.
-
-    Args:
-        summaries: The logs' own, by the names of their files.
     """
     stored, stamps = _stored(run), _stamps(run)
     if stored is None:

@@ -88,11 +88,7 @@ class ConditionResults:
         return read_log(self.run.log_path(self.best_replicate)).solutions[0].values
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array attached to the log of the best replicate.
-
-        Raises:
-            KeyError: If there is none of this name.
-        """
+        """Return an array attached to the log of the best replicate."""
         return read_array(self.run.log_path(self.best_replicate), name)
 
     @property

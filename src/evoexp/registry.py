@@ -16,6 +16,7 @@ package's: the distribution `my-planner` may register `my_planner` and `my_plann
 import functools
 import importlib
 import importlib.metadata
+import importlib.util
 import json
 import re
 from collections.abc import Iterator, Mapping
@@ -29,6 +30,8 @@ from evoexp.validation import TARGET, Component
 COMPONENTS, PAGES = "evoexp.components", "evoexp.pages"
 CLAIMS, CONF = "evoexp.claims", "evoexp.conf"
 OWN = "evoexp"  # the distribution whose names are free
+EXTRAS = {"nsga2": ("pymoo", "baselines"), "ompl": ("ompl", "baselines")}
+"""Component → the package that it needs, and the extra of evoexp that brings it."""
 
 
 class Registration(NamedTuple):
@@ -175,3 +178,16 @@ def missing(components: Mapping[str, str]) -> list[str]:
     """
     known = names(COMPONENTS)
     return sorted({package for name, package in components.items() if name not in known})
+
+
+def lacking(config_json: bytes) -> str:
+    """Return how to install what a condition needs and is not there; nothing if all is.
+
+    Args:
+        config_json: The condition's canonical form.
+    """
+    for component, (package, extra) in EXTRAS.items():
+        is_used = f'"_target_":"{component}"'.encode() in config_json
+        if is_used and importlib.util.find_spec(package) is None:
+            return f"{component} needs pip install 'evoexp[{extra}]'"
+    return ""

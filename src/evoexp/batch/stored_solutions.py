@@ -53,7 +53,7 @@ def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterato
                 return
             continue  # what costs inf may be no solution at all
         yield from _unlike(row.terms, terms, f"{name}: ")
-        cost = float(getattr(planner, "cost_of_terms", _unknown)(terms))
+        cost = float(getattr(planner, "cost_of_terms", lambda terms: math.nan)(terms))
         if math.isfinite(solution.cost) and not math.isnan(cost):
             yield from _unlike({"cost": solution.cost}, {"cost": cost}, f"{name}: ")
     yield from _unlike(log.summary.terms, terms, "last solution: ")
@@ -68,10 +68,6 @@ def _terms(planner: Planner, problem: Any, solution: SolutionRow) -> dict[str, f
     if not (np.abs(solution.values) <= LARGEST).all():  # NaN, too
         raise ValueError(f"its numbers must be finite and at most {LARGEST:g}")
     return planner.evaluate(problem, solution.values)
-
-
-def _unknown(terms: Mapping[str, float]) -> float:
-    return math.nan
 
 
 def _unlike(

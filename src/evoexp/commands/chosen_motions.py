@@ -11,7 +11,7 @@ import numpy as np
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
-from evoexp.commands.stored_runs import stored_or_shipped
+from evoexp.commands.stored_runs import stored_run
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import (
@@ -28,12 +28,13 @@ from evoexp.playback.timing import SpeedLimits
 from evoexp.playback.trajectory_files import Columns, JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.store.chosen_logs import CHOICES, chosen_log
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.summaries import summary_table
 
+CHOICES = ("best", "worst", "refuted")  # among the replicates of a run
 FOLDER = "motions"  # of the outputs
 MANY = 4  # motions on one page
 JUDGED = "a joint trajectory: judged by its bodies, not by where it begins and ends"
@@ -99,10 +100,46 @@ def named_log(word: str, choice: str | int | None) -> tuple[Path, RunDirectory |
     path = Path(word)
     if path.suffix == ".mcap" or path.is_file():
         return path, None
-    run = stored_or_shipped(word)
-    if isinstance(run, RunDirectory):
-        return chosen_log(run, CHOICES[0] if choice is None else choice), run
-    raise NothingStored(f"condition {run.condition_id[:12]}: not run here; run it: {run.command}")
+    run = stored_run(word)
+    return chosen_log(run, CHOICES[0] if choice is None else choice), run
+
+
+def chosen_log(run: RunDirectory, choice: str | int) -> Path:
+    """Return the log of one replicate of a run.
+
+    Args:
+        choice: Index of the replicate, or "best" or "worst" (by cost), or "refuted": the first
+            replicate that the certifier refutes.
+
+    Raises:
+        NothingStored: If there is no such replicate.
+    """
+    if isinstance(choice, int):
+        finished = sorted(run.completed())
+        if choice not in finished:
+            names = [*map(str, finished[:8]), *(["…"] if finished[8:] else [])]
+            there = ", ".join(names) or "none"
+            raise NothingStored(
+                f"run {run.hash12}: no finished replicate {choice} (finished: {there})"
+            )
+        return run.log_path(choice)
+    table = summary_table(run, thorough=True).to_pylist()
+    done = [row for row in table if row["status"] == "done"]
+    if choice == "refuted":
+        rows = [row for row in done if row["certified"] is False]
+    else:
+        sign = 1.0 if choice == "best" else -1.0
+        rows = sorted(done, key=lambda row: _rank(row["best_cost"], sign))
+    if not rows:
+        what = "refuted replicate" if choice == "refuted" else "finished replicate"
+        raise NothingStored(f"run {run.hash12}: no {what} among {len(done)}")
+    return run.log_path(rows[0]["replicate"])
+
+
+def _rank(cost: float | None, sign: float) -> tuple[bool, float]:
+    """Return the key by which replicates are sorted: those of no finite cost come last."""
+    is_finite = cost is not None and math.isfinite(cost)
+    return not is_finite, sign * cost if cost is not None and is_finite else 0.0
 
 
 def recordings(arguments: argparse.Namespace) -> list[Recording]:

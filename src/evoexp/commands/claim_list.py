@@ -7,12 +7,12 @@ from typing import Any
 from rich.table import Column, Table
 
 from evoexp.commands.console import new_table, print_json, say
+from evoexp.commands.report_requests import request_of
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages import page_of
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.results.stored_results import gather
 from evoexp.report.statistics.claim_rules import Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 
@@ -88,16 +88,8 @@ def judged(name: str) -> tuple[Claim, ...]:
         NothingStored: If nothing of it has been run.
     """
     (experiment,) = compose.expand([f"experiment={name}"])
-    results = gather(
-        outputs_root(),
-        experiment.conditions,
-        experiment.num_replicates,
-        experiment.name,
-        experiment.budget,
-        f"evoexp run experiment={name}",
-        experiment.options,
-    )
-    return page_of(results, experiment.report).claims
+    request, settings, num_replicates = request_of(experiment, [])
+    return page_of(request.results(outputs_root(), num_replicates), settings).claims
 
 
 def _rules(paper: str) -> Rules:

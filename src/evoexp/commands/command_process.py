@@ -8,16 +8,17 @@ Where addresses are limited (`ulimit -v`), a library that cannot be loaded is an
 thread that cannot be started a `RuntimeError`, and some libraries end the process by themselves.
 """
 
-import atexit
 import contextlib
 import errno
 import fcntl
 import os
-import resource
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+
+from evoexp.batch.replicate_limits import allowed_addresses, used_addresses
+from evoexp.numeric.cache_folder import remove_at_exit
 
 PREFIX = "evoexp-command-"
 LOCK = "owner.lock"
@@ -25,7 +26,6 @@ MEGABYTE = 10**6
 LEAST_MB = 2_500  # [MB] of addresses; a shipped run that compiles its kernels took 2,219
 LARGEST_MB = 400  # [MB] of addresses that loading one library and its kernels takes, at most
 _TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new thread", "bad_alloc")
-_STATUS = Path("/proc/self/statm")
 
 
 def use_temporary_folder() -> None:
@@ -41,7 +41,7 @@ def use_temporary_folder() -> None:
         lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)  # held until the process ends
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if (folder / LOCK).exists():  # else another command has just removed it
-            atexit.register(_remove, folder, os.getpid())
+            remove_at_exit(folder)
             os.environ["TMPDIR"] = tempfile.tempdir = str(folder)
 
 
@@ -57,18 +57,13 @@ def remove_abandoned(place: Path) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
-def _remove(folder: Path, process: int) -> None:
-    if os.getpid() == process:  # and not a copy of it
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def refuse_too_little_memory() -> None:
     """Refuse limits with which libraries or the compiler end the process, or never come back.
 
     Raises:
         MemoryError: If a limit is below `LEAST_MB`.
     """
-    allowed = _allowed()
+    allowed = allowed_addresses()
     if allowed is not None and allowed < LEAST_MB * MEGABYTE:
         raise MemoryError(f"a command needs {LEAST_MB:,} MB of addresses at least")
 
@@ -76,9 +71,9 @@ def refuse_too_little_memory() -> None:
 def memory_shortage(error: BaseException) -> str:
     """Describe the lack of memory that an error means; empty if it means something else."""
     texts = [text for each in _chain(error) if (text := _shortage(each))]
-    allowed = _allowed()
+    allowed = allowed_addresses()
     if not texts and isinstance(error, ImportError | OSError | RuntimeError | SystemError):
-        is_little = allowed is not None and allowed - _used() < LARGEST_MB * MEGABYTE
+        is_little = allowed is not None and allowed - used_addresses() < LARGEST_MB * MEGABYTE
         texts = [_first_line(error)] if is_little else []
     if not texts:
         return ""
@@ -109,16 +104,3 @@ def _first_line(error: BaseException) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     named = [line for line in lines if any(text in line.lower() for text in _TEXTS)]
     return (named or lines or [""])[0]
-
-
-def _allowed() -> int | None:
-    """Return how many addresses this process may take [B]; None: no limit is set."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return None if soft in (resource.RLIM_INFINITY, -1) else soft
-
-
-def _used() -> int:
-    """Return how many addresses this process has taken [B], as far as it is known."""
-    with contextlib.suppress(OSError, ValueError):
-        return int(_STATUS.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    return 0

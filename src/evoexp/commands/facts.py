@@ -16,9 +16,8 @@ from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError
-from evoexp.extras import lacking
 from evoexp.records import flatten
-from evoexp.registry import COMPONENTS, components_in, registered
+from evoexp.registry import COMPONENTS, components_in, lacking, registered
 from evoexp.store.identity import TAKEN
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment

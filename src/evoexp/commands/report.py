@@ -4,10 +4,11 @@ import argparse
 import contextlib
 import functools
 import io
+import itertools
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from evoexp.commands import compare
 from evoexp.commands.arguments import add_experiment_arguments
@@ -24,14 +25,8 @@ from evoexp.report.pages.home_page import summaries
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
+PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
 ASSUMPTIONS = "assumptions"  # stands for the experiments of that name, one per paper
-
-
-class PlannedReport(NamedTuple):
-    """A report to be drawn: its folder's name, and the function that draws it."""
-
-    folder: str
-    draw: Callable[[], build.ReportFiles]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,7 +80,7 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
     failed: list[str] = []
     reports = _drawn(planned, failed)
     if arguments.check:
-        code = _check(_with_home(reports))
+        code = _check(itertools.chain(reports, (home_files() for _ in range(1))))
     else:
         code = 0
         for report in reports:
@@ -146,11 +141,6 @@ def _with_assumptions(words: Sequence[str]) -> list[str]:
 # all reports
 
 
-def _with_home(reports: Iterator[build.ReportFiles]) -> Iterator[build.ReportFiles]:
-    yield from reports
-    yield home_files()
-
-
 def _drawn(planned: Sequence[PlannedReport], failed: list[str]) -> Iterator[build.ReportFiles]:
     """Draw reports one after the other; name those that cannot be drawn, and leave them."""
     for folder, draw in planned:
@@ -174,10 +164,10 @@ def planned_reports(outputs: Path) -> Iterator[PlannedReport]:
             if budget != "paper":
                 folder, words = f"{name}@{budget}", [*words, f"budget={budget}"]
             seen.add(folder)
-            yield PlannedReport(folder, functools.partial(_of_experiment, words))
+            yield folder, functools.partial(_of_experiment, words)
     for each in summaries(outputs / "reports"):
         if each.folder not in seen:
-            yield PlannedReport(each.folder, functools.partial(_again, each.folder, each.command))
+            yield each.folder, functools.partial(_again, each.folder, each.command)
 
 
 def _of_experiment(words: Sequence[str]) -> build.ReportFiles:

@@ -1,6 +1,7 @@
 """`evoexp verify`: whether a store is whole, and the commands that mend it."""
 
 import argparse
+import contextlib
 import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -106,20 +107,15 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
         for start in range(0, len(own), PART)
     ]
     size = sum(path.lstat().st_size for own in paths for path in own)
-    if (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2:
-        yield from _by_run(paths, itertools.starmap(_check, parts))
-        return
-    with Workers(min(num_cores(), len(parts))) as workers:
-        yield from _by_run(paths, in_order(workers, _check, parts))
-
-
-def _by_run(
-    paths: Sequence[Sequence[Path]], checks: Iterator[list[LogCheck]]
-) -> Iterator[list[LogCheck]]:
-    """Yield the checks of every run's logs."""
-    flat = itertools.chain.from_iterable(checks)
-    for own in paths:
-        yield list(itertools.islice(flat, len(own)))
+    is_small = (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2
+    with contextlib.ExitStack() as stack:
+        checks: Iterator[list[LogCheck]] = itertools.starmap(_check, parts)
+        if not is_small:
+            workers = stack.enter_context(Workers(min(num_cores(), len(parts))))
+            checks = in_order(workers, _check, parts)
+        flat = itertools.chain.from_iterable(checks)
+        for own in paths:
+            yield list(itertools.islice(flat, len(own)))
 
 
 def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:

@@ -28,7 +28,7 @@ from evoexp.configuration.building import build_settings, planned_replicates
 from evoexp.configuration.conditions import Builder, Built, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
 from evoexp.configuration.interpolations import fill_in
-from evoexp.configuration.option_files import check_file, check_files
+from evoexp.configuration.option_files import check_file
 from evoexp.configuration.overrides import (
     ADD,
     DELETE,
@@ -145,7 +145,8 @@ class Composer:
         (root / EXPERIMENT).mkdir()
         for folder in folders():
             if folder.origin != shipped.ORIGIN:
-                check_files(folder.path)
+                for path in sorted(folder.path.glob("*/*.yaml")):
+                    check_file(path)
         self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
 
     def __call__(self, overrides: Choice) -> Composed:

@@ -13,12 +13,6 @@ MOST_NESTED = 50  # lists and mappings in each other
 MOST_VALUES = 100_000  # once every alias (`*name`) stands for a copy of what it names
 
 
-def check_files(folder: Path) -> None:
-    """Check all options in the groups of a folder."""
-    for path in sorted(folder.glob("*/*.yaml")):
-        check_file(path)
-
-
 def check_file(path: Path) -> None:
     """Refuse an option file that is too large, or that unfolds to too many values.
 

@@ -129,11 +129,6 @@ def is_file(experiment: str) -> bool:
     return experiment.endswith(SUFFIXES)
 
 
-def origin(group: str, name: str) -> str:
-    """Return where an option comes from: a folder as typed, a package with its version, evoexp."""
-    return find(group, name).origin
-
-
 def description(experiment: str) -> str:
     """Return the line of an experiment file that says what the experiment is.
 
@@ -146,8 +141,3 @@ def description(experiment: str) -> str:
         if not words.startswith(("@package", "evoexp run")):
             return words
     return ""
-
-
-def file_directories() -> list[Path]:
-    """Return the folders where files lie that options refer to: beside the scenarios."""
-    return [folder.path / "scenario" for folder in folders()]

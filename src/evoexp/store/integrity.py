@@ -44,8 +44,7 @@ from evoexp.store.identity import (
 from evoexp.store.log_reader import LogContents, checked_summary, read_log, read_summary
 from evoexp.store.run_directory import RunDirectory, is_stored, open_run
 from evoexp.store.summaries import (
-    altered_rows,
-    altered_settings,
+    altered,
     damaged_logs,
     replicate_of,
     table_damage,
@@ -84,21 +83,16 @@ class RunCheck(NamedTuple):
 
 def check_run(outputs: Path, name: str) -> RunCheck:
     """Look at a stored run's files, but for its logs."""
-    try:
-        return _check_files(outputs, name)
-    except OSError as error:
-        problem = f"{error.filename}: {error.strerror}; change its permissions"
-        return RunCheck(name, None, {"cannot be read": problem}, [])
-
-
-def _check_files(outputs: Path, name: str) -> RunCheck:
     path = outputs / "runs" / name
-    leftovers = list(_leftovers(path))
     try:
+        leftovers = list(_leftovers(path))
         run = open_run(outputs, name)
         problems = damaged_files(run)
     except StoreError as error:
         return RunCheck(name, None, {CONFIG: reason(path / CONFIG, error)}, leftovers)
+    except OSError as error:
+        problem = f"{error.filename}: {error.strerror}; change its permissions"
+        return RunCheck(name, None, {"cannot be read": problem}, [])
     if (lost := _lost(run)) and not run.is_being_written():
         problems[REPLICATES] = lost
     if damage := table_damage(run):
@@ -163,13 +157,8 @@ def _seems_whole(path: Path, condition_id: str) -> bool:
 def check_rows(run: RunDirectory, logs: list[LogCheck]) -> dict[str, str]:
     """Return file → problem where rows of the summary table do not repeat their logs."""
     whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
-    names = altered_rows(run, whole)
-    if not names:
-        columns = altered_settings(run)
-        told = f"altered: {columns[0]} is not the setting{DELETE}" if columns else ""
-        return {"summary.parquet": told} if told else {}
-    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-    return {"summary.parquet": f"altered: it does not repeat {names[0]}{more}{DELETE}"}
+    problem = altered(run, whole)
+    return {"summary.parquet": problem + DELETE} if problem else {}
 
 
 def _contradictions(log: LogContents, condition_id: str, replicate: int) -> Iterator[str]:

@@ -118,22 +118,16 @@ class _OpenLog:
 @contextmanager
 def _opened(source: Source) -> Iterator[_OpenLog]:
     """Check a log of a run and open it; a body that cannot be read is a damaged log."""
-    content, name = _content(source)
-    checked = check(content, name)
-    with unreadable_is_corrupt(name):
-        yield _OpenLog(checked, name)
-
-
-def _content(source: Source) -> tuple[bytes, str]:
-    """Return the bytes of a log and the name that errors give it."""
-    if isinstance(source, bytes):
-        return source, "log"
+    name = "log" if isinstance(source, bytes) else str(source)
     try:
-        return read_bounded(Path(source), MAX_LOG), str(source)
+        content = source if isinstance(source, bytes) else read_bounded(Path(source), MAX_LOG)
     except OSError as error:
         if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
             raise
-        raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
+        raise CorruptLog(f"{name}: cannot be read: {error.strerror or error}") from error
+    checked = check(content, name)
+    with unreadable_is_corrupt(name):
+        yield _OpenLog(checked, name)
 
 
 def read_log(source: Source) -> LogContents:

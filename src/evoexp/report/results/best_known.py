@@ -13,12 +13,12 @@ Run and replicate are those that found it.
 
 import math
 import re
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 
+import evoexp
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
 
@@ -36,8 +36,7 @@ class BestKnown(NamedTuple):
 
 def shipped_best_known() -> dict[str, BestKnown]:
     """Return the shipped file's content by the keys of problems."""
-    file = resources.files("evoexp").joinpath("assets/best_known.yaml")
-    return parsed(file.read_bytes(), "best_known.yaml")
+    return read_best_known(Path(evoexp.__file__).parent / "assets/best_known.yaml")
 
 
 def read_best_known(path: str | Path) -> dict[str, BestKnown]:

@@ -50,17 +50,12 @@ class Answer(NamedTuple):
     cpu_s: float = np.nan
 
 
-def answers(condition: ConditionResults) -> pd.DataFrame:
-    """Return the answers of all finished replicates, in order; columns of `Answer`.
+def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
+    """Return the answers of all finished replicates, by the labels of conditions.
 
     Solutions of infinite cost, and those that are no motions, such as a posture that is held, have
-    no row.
+    no row. They are judged on all cores.
     """
-    return answers_of([condition])[condition.label]
-
-
-def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
-    """Return the answers of conditions by their labels, see `answers`; judged on all cores."""
     guests = {each.module.partition(".")[0] for each in registrations(COMPONENTS)}
     loaded = sorted(name for name in guests if name in sys.modules)
     code = "".join(map(sources_key, loaded)).encode() + Path(__file__).read_bytes()
@@ -120,7 +115,7 @@ def first_reached(
     """Return the effort of every run up to its first proven answer that is so short.
 
     Args:
-        table: Of `answers`.
+        table: Of `answers_of`.
         replicates: (runs,) in order.
         longest: Length that an answer may have.
         spent: (runs,) effort of the whole runs.

@@ -28,7 +28,11 @@ class Chain:
         return state_bytes(self._rng.bit_generator)
 
     def extend(self, costs: bytes, best: bytes, state: bytes) -> str:
-        """Append a generation and return its link in hex."""
+        """Append a generation and return its link in hex.
+
+        Costs and the best solution so far come from `array_bytes`; the state is the generator's
+        behind the generation.
+        """
         self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
         return self.link.hex()
 

@@ -1,4 +1,4 @@
-"""The process of a command: a folder for its temporary files, and errors that mean no memory.
+"""The process of a command: its standard streams, its temporary files, and a lack of memory.
 
 Whatever library makes a temporary file makes it in the folder. The command holds a lock there,
 which the system releases when the process ends, however it ends: a folder of this user whose lock
@@ -13,13 +13,19 @@ import errno
 import fcntl
 import os
 import shutil
+import sys
 import tempfile
+import textwrap
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from evoexp.batch.replicate_limits import allowed_addresses, used_addresses
+from evoexp.errors import DamagedStore, printable
 from evoexp.numeric.cache_folder import remove_at_exit
 
+OUTPUT = "standard output"  # the file name of its errors
 PREFIX = "evoexp-command-"
 LOCK = "owner.lock"
 MEGABYTE = 10**6
@@ -104,3 +110,55 @@ def _first_line(error: BaseException) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     named = [line for line in lines if any(text in line.lower() for text in _TEXTS)]
     return (named or lines or [""])[0]
+
+
+def open_streams() -> None:
+    """Open closed standard streams on the null device, before one of our files gets their number.
+
+    They stay open, and are opened in the order of their numbers.
+    """
+    sys.stdin = sys.stdin or open(os.devnull)  # noqa: SIM115
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+
+
+def settle_streams() -> None:
+    """Flush what was printed; where that fails, let it vanish.
+
+    Python tries again when it ends, and what fails then changes the exit code to 120.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def complain(text: str) -> None:
+    """Print words on standard error, if it can be: one line; on a terminal, no word broken."""
+    line = f"evoexp: {printable(' '.join(text.split()))}"
+    with contextlib.suppress(OSError, ValueError):
+        if sys.stderr.isatty():
+            columns = shutil.get_terminal_size().columns
+            line = textwrap.fill(line, columns, break_long_words=False, break_on_hyphens=False)
+        print(line, file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def damage_in_lines() -> Iterator[None]:
+    """Print warnings of damaged files as `evoexp: …`, each line once, while the body runs."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
+            if not issubclass(category, DamagedStore):
+                shown(message, category, *place, **rest)
+            elif (text := " ".join(str(message).split())) not in said:
+                said.add(text)
+                print(f"evoexp: {printable(text)}", file=sys.stderr)
+
+        warnings.simplefilter("always", DamagedStore)
+        warnings.showwarning = show
+        yield

@@ -71,13 +71,6 @@ class ReportFiles(NamedTuple):
     files: dict[str, bytes]  # name → content
 
 
-def report(
-    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
-) -> Path:
-    """Write a report and return the path of its `index.html`; see `derived`."""
-    return write_report(derived(request, settings, outputs, num_replicates))
-
-
 def derived(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> ReportFiles:

@@ -237,20 +237,6 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
         }
 
 
-def read_array(source: Source, array: str) -> NDArray[Any]:
-    """Return one of the arrays that are attached to a log; nothing else is decoded.
-
-    Raises:
-        KeyError: There is none of this name.
-        CorruptLog: As `read_log`, except that the content digest is not compared.
-    """
-    with _opened(source) as log:
-        data = log.attachments.get(array + written.ARRAY)
-        if data is not None:
-            return decode_array(data)
-    raise KeyError(array)
-
-
 def decode_array(data: bytes) -> NDArray[Any]:
     """Return the array that a `.npy` attachment holds."""
     with unreadable_is_corrupt("attached array"):

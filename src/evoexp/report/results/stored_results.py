@@ -20,7 +20,7 @@ from evoexp.report.statistics.inference import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
-from evoexp.store.log_reader import read_array, read_log, read_solution
+from evoexp.store.log_reader import read_log, read_solution
 from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
@@ -89,7 +89,7 @@ class ConditionResults:
 
     def array(self, name: str) -> NDArray[Any]:
         """Return an array attached to the log of the best replicate."""
-        return read_array(self.run.log_path(self.best_replicate), name)
+        return read_log(self.run.log_path(self.best_replicate)).arrays()[name]
 
     @property
     def _finished(self) -> list[int]:

@@ -94,7 +94,9 @@ def smoke_report(outputs: Path, name: str) -> Path:
     smoke_results(outputs, name)
     experiment = smoke_experiment(name)
     request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
-    return build.report(request, page_settings(name), outputs, experiment.num_replicates).parent
+    return build.write_report(
+        build.derived(request, page_settings(name), outputs, experiment.num_replicates)
+    ).parent
 
 
 def figure_stems(directory: Path) -> set[str]:

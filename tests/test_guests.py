@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from evoexp.cli import main
-from evoexp.configuration.search_path import find, options, origin
+from evoexp.configuration.search_path import find, options
 from evoexp.store.log_reader import read_log
 from guests import on_path, write_distribution
 
@@ -81,7 +81,11 @@ def test_a_guests_planner_is_run_reproduced_and_reported(
     capsys: pytest.CaptureFixture[str],
     blank_figures: None,
 ) -> None:
-    assert origin("planner", "my_planner") == origin("experiment", "my_planner") == "my-planner 0.3"
+    assert (
+        find("planner", "my_planner").origin
+        == find("experiment", "my_planner").origin
+        == "my-planner 0.3"
+    )
     assert {"my_planner", "rana_planar"} <= set(options("experiment"))
     assert installed(*RUN, "report=my_planner") == 0
     assert "the guest's page" in capsys.readouterr().out

@@ -67,46 +67,22 @@ def keep_all(contents: Iterable[bytes]) -> None:
         keep(content)
 
 
-def with_files(value: Any, folders: Sequence[Path], field: str = "") -> Any:
-    """Return plain data with the content's hash in the place of every `{file: path}`.
-
-    The contents are kept.
-
-    Args:
-        value: Any nesting of mappings, lists and scalars.
-        folders: Where paths are looked for that are not there from the current directory.
-        field: Dotted path of the value, for errors.
-
-    Raises:
-        SettingError: If a file cannot be read.
-    """
-    if isinstance(value, list):
-        return [with_files(item, folders, f"{field}[{k}]") for k, item in enumerate(value)]
-    if not isinstance(value, dict):
-        return value
-    if set(value) != {FILE}:
-        return {
-            key: with_files(item, folders, f"{field}.{key}" if field else str(key))
-            for key, item in value.items()
-        }
-    try:
-        return {SHA256: read(str(value[FILE]), folders)}
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError(
-            f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])
-        ) from None
-
-
-def read(path: str, folders: Sequence[Path]) -> str:
+def read(path: Any, folders: Sequence[Path], field: str) -> str:
     """Read a file as a configuration gives it and keep its content; return the SHA-256.
 
+    Args:
+        folders: Where it is looked for if it is not there from the current directory.
+        field: Dotted path of the setting, for errors.
+
     Raises:
-        OSError: If it cannot be read, neither from the current directory nor from a folder.
+        SettingError: If it cannot be read.
     """
-    places = [Path(path), *(folder / path for folder in folders)]
-    found = next((place for place in places if place.exists()), Path(path))
-    return keep(read_bounded(found))
+    places = [Path(str(path)), *(folder / str(path) for folder in folders)]
+    try:
+        return keep(read_bounded(next((place for place in places if place.exists()), places[0])))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
 
 
 def attached(config: Any) -> dict[str, bytes]:

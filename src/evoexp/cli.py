@@ -12,13 +12,16 @@ from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.command_process import (
+    OUTPUT,
+    complain,
+    damage_in_lines,
     memory_shortage,
+    open_streams,
     refuse_too_little_memory,
+    settle_streams,
     use_temporary_folder,
 )
-from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
-from evoexp.commands.standard_streams import OUTPUT, complain, open_streams, settle_streams
 from evoexp.errors import EvoexpError
 
 KEPT = "finished replicates are kept, the same command runs the others"

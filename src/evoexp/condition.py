@@ -11,9 +11,9 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
-from evoexp.attachments import SHA256, attached, keep, with_files
+from evoexp.attachments import FILE, SHA256, attached, keep, read
 from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting, brief
-from evoexp.registry import component_class
+from evoexp.registry import component_class, components_in
 from evoexp.validation import LARGEST, MOST_QUERIES, TARGET, Component, build
 
 # Of robots and scenarios: coal's distances between bodies ten times as far apart or as large as
@@ -31,9 +31,8 @@ def read_files(
 ) -> Any:
     """Return plain data with the contents' hashes in the place of paths; the contents are kept.
 
-    Besides `{file: path}` (see `attachments.with_files`), components may have files of their own:
-    those have a class method `read_files(settings, field)`. Only what a user typed is read; what a
-    log holds names no paths.
+    Besides `{file: path}`, components may have files of their own: those have a class method
+    `read_files(settings, field)`. Only what a user typed is read; what a log holds names no paths.
 
     Args:
         config: Any nesting of mappings, lists and scalars.
@@ -41,7 +40,7 @@ def read_files(
         adjust: Changes the data once files are read, before pairs of the robot's bodies are
             derived: by what a file of the scenario says of the robot.
     """
-    return _with_pairs(adjust(with_files(_component_files(config, ""), folders)))
+    return _with_pairs(adjust(_with_contents(config, folders, "")))
 
 
 def _with_pairs(config: Any) -> Any:
@@ -64,16 +63,19 @@ def _with_pairs(config: Any) -> Any:
     return {**config, "robot": {**robot, "pairs": {SHA256: keep(_pairs[text])}}}
 
 
-def _component_files(value: Any, field: str) -> Any:
+def _with_contents(value: Any, folders: Sequence[Path], field: str) -> Any:
+    """Return plain data with hashes of contents, where it names files and components read files."""
     if isinstance(value, list):
-        return [_component_files(item, f"{field}[{k}]") for k, item in enumerate(value)]
+        return [_with_contents(item, folders, f"{field}[{k}]") for k, item in enumerate(value)]
     if not isinstance(value, dict):
         return value
+    if set(value) == {FILE}:
+        return {SHA256: read(value[FILE], folders, f"{field}.{FILE}")}
     if isinstance(value.get(TARGET), str):
         reads = getattr(component_class(value[TARGET], field), "read_files", None)
         value = reads(value, field) if reads is not None else value
     return {
-        key: _component_files(item, f"{field}.{key}" if field else str(key))
+        key: _with_contents(item, folders, f"{field}.{key}" if field else str(key))
         for key, item in value.items()
     }
 
@@ -221,11 +223,7 @@ class Condition(NamedTuple):
         return _prepare(self)
 
     def notes(self) -> list[str]:
-        """Return the remarks of robot, planner and scenario, one per line.
-
-        Raises:
-            SettingError: If the parts contradict each other.
-        """
+        """Return the remarks of robot, planner and scenario, one per line."""
         from evoexp.robots.assembly import Robot  # and Pinocchio
 
         planner, problem = self.prepare()
@@ -259,13 +257,9 @@ def _check_roles(robot: Component, scenario: Component, planner: Component) -> N
         for part, value in (("robot", robot), ("scenario", scenario)):
             kind = hints.get(part, Any)
             if isinstance(kind, type | UnionType) and not isinstance(value, kind):
-                must = f"one that {inner.component} takes ({_names(kind)})"
+                kinds = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
+                must = f"one that {inner.component} takes ({kinds})"
                 raise SettingError(part, must, value.component)
-
-
-def _names(kind: Any) -> str:
-    """Return the name of a class, or of the classes of a union."""
-    return " or ".join(each.__name__ for each in get_args(kind) or (kind,))
 
 
 @functools.cache
@@ -283,16 +277,8 @@ def _prepare(condition: Condition) -> Prepared:
     return Prepared(condition.planner, prepared)
 
 
-def revisions(config: Any, field: str = "") -> list[tuple[str, Any, int]]:
-    """Return (field, stored revision, installed revision) of every component in plain data."""
-    found: list[tuple[str, Any, int]] = []
-    if isinstance(config, dict):
-        if TARGET in config:
-            kind = component_class(str(config[TARGET]), field or "config")
-            found.append((field or "config", config.get("revision"), kind.revision))
-        for key, value in config.items():
-            found += revisions(value, f"{field}.{key}" if field else str(key))
-    elif isinstance(config, list):
-        for k, value in enumerate(config):
-            found += revisions(value, f"{field}[{k}]")
-    return found
+def revisions(config: Any) -> Iterator[tuple[str, Any, int]]:
+    """Yield (field, stored revision, installed revision) of every component in plain data."""
+    for field, settings in components_in(config):
+        kind = component_class(str(settings[TARGET]), field or "config")
+        yield field or "config", settings.get("revision"), kind.revision

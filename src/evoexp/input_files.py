@@ -153,7 +153,9 @@ def read_npy(content: bytes) -> NDArray[Any]:
     kind, columns_first, shape = _header(content[start : start + length])
     data = memoryview(content)[start + length :]
     if math.prod(shape) * kind.itemsize != len(data):
-        raise ValueError(f"its header tells {_told(shape, kind)}, {len(data)} bytes follow")
+        numbers = f"{' × '.join(map(str, shape))[:60]} numbers of {kind.itemsize} bytes"
+        told = numbers if shape else "one number"
+        raise ValueError(f"its header tells {told}, {len(data)} bytes follow")
     order: Any = "F" if columns_first else "C"
     return np.frombuffer(data, kind).reshape(shape, order=order).copy()
 
@@ -174,8 +176,3 @@ def _header(text: bytes) -> tuple[np.dtype[Any], bool, tuple[int, ...]]:
         return np.dtype(kind), bool(columns_first), shape
     except TypeError:
         raise ValueError(f"it holds numbers of no known kind, {kind!r}") from None
-
-
-def _told(shape: tuple[int, ...], kind: np.dtype[Any]) -> str:
-    numbers = " × ".join(map(str, shape))
-    return f"{numbers[:60]} numbers of {kind.itemsize} bytes" if shape else "one number"

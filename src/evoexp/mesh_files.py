@@ -24,9 +24,6 @@ def package_folders(setting: Any, field: str) -> dict[str, Path]:
     Args:
         setting: Name of each package → its folder; None: none is told.
         field: That names it, for errors.
-
-    Raises:
-        SettingError: If it is no such mapping, or a folder is not there.
     """
     if setting is None:
         return {}

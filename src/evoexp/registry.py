@@ -16,6 +16,7 @@ package's: the distribution `my-planner` may register `my_planner` and `my_plann
 import functools
 import importlib
 import importlib.metadata
+import importlib.util
 import json
 import re
 from collections.abc import Iterator, Mapping
@@ -29,6 +30,8 @@ from evoexp.validation import TARGET, Component
 COMPONENTS, PAGES = "evoexp.components", "evoexp.pages"
 CLAIMS, CONF = "evoexp.claims", "evoexp.conf"
 OWN = "evoexp"  # the distribution whose names are free
+EXTRAS = {"nsga2": ("pymoo", "baselines"), "ompl": ("ompl", "baselines")}
+"""Component → the package that it needs, and the extra of evoexp that brings it."""
 
 
 class Registration(NamedTuple):
@@ -61,11 +64,7 @@ class Registration(NamedTuple):
         return resources.files(package).joinpath(name) if name.endswith(".yaml") else None
 
     def load(self) -> Any:
-        """Import and return the class or function.
-
-        Raises:
-            RegistrationError: If it cannot be imported.
-        """
+        """Import and return the class or function."""
         module, _, attribute = self.target.partition(":")
         try:
             return getattr(importlib.import_module(module), attribute)
@@ -151,25 +150,23 @@ def component_class(name: str, field: str = TARGET) -> type[Component]:
     return cast(type[Component], registration.load())
 
 
-def component_names(config: Any) -> Iterator[str]:
-    """Yield the names of all components in plain configuration data."""
+def components_in(config: Any, field: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (dotted field, settings) of all components in plain configuration data."""
     if isinstance(config, dict):
         if TARGET in config:
-            yield str(config[TARGET])
-        config = list(config.values())
-    if isinstance(config, list):
-        for value in config:
-            yield from component_names(value)
+            yield field, config
+        for key, value in config.items():
+            yield from components_in(value, f"{field}.{key}" if field else str(key))
+    elif isinstance(config, list):
+        for k, value in enumerate(config):
+            yield from components_in(value, f"{field}[{k}]")
 
 
 @functools.lru_cache(maxsize=64)
 def guests(config_json: bytes) -> dict[str, str]:
-    """Return component → `distribution version` of a condition's components that are not evoexp's.
-
-    Args:
-        config_json: The condition's canonical form.
-    """
-    found = (registered(COMPONENTS, name) for name in component_names(json.loads(config_json)))
+    """Return component → `distribution version` of a condition's components of guests."""
+    named = (str(settings[TARGET]) for _, settings in components_in(json.loads(config_json)))
+    found = (registered(COMPONENTS, name) for name in named)
     return {each.name: each.package for each in found if each is not None and not each.is_own}
 
 
@@ -181,3 +178,16 @@ def missing(components: Mapping[str, str]) -> list[str]:
     """
     known = names(COMPONENTS)
     return sorted({package for name, package in components.items() if name not in known})
+
+
+def lacking(config_json: bytes) -> str:
+    """Return how to install what a condition needs and is not there; nothing if all is.
+
+    Args:
+        config_json: The condition's canonical form.
+    """
+    for component, (package, extra) in EXTRAS.items():
+        is_used = f'"_target_":"{component}"'.encode() in config_json
+        if is_used and importlib.util.find_spec(package) is None:
+            return f"{component} needs pip install 'evoexp[{extra}]'"
+    return ""

@@ -114,9 +114,6 @@ def _number(value: float, field: str, largest: float) -> float:
     """Return a number (or true, or false) that kernels and libraries can reckon with.
 
     NaN and the infinities are left to the field, which may want something else than a number.
-
-    Raises:
-        SettingError: If it is too large, or too near to 0.
     """
     if isinstance(value, float):
         if largest < abs(value) < math.inf:
@@ -189,12 +186,7 @@ def _members(value: Any) -> Mapping[str, Any]:
 
 
 def _inner(kinds: set[type[Settings]], part: int | str) -> set[type[Settings]]:
-    """Return the classes of settings one step down a location, as pydantic gives it.
-
-    Args:
-        kinds: The classes of settings above.
-        part: Name of a field, index in a list, or tag of a union.
-    """
+    """Return the classes of settings one step down a location, as pydantic gives it."""
     inner = {
         own
         for each in kinds
@@ -243,11 +235,7 @@ _MUST = {
 
 
 def check_range(field: str, limits: tuple[float, float]) -> None:
-    """Check that limits leave room between them.
-
-    Raises:
-        SettingError: If they do not.
-    """
+    """Check that limits leave room between them."""
     if not limits[0] < limits[1]:
         raise SettingError(field, "[least, greatest] with least < greatest", list(limits))
 

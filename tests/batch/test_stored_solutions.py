@@ -16,7 +16,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log, stored_condition
 from evoexp.batch.stored_solutions import contradictions
 from evoexp.errors import CorruptLog
-from evoexp.store.integrity import LogCheck, check_logs
+from evoexp.store.integrity import LogCheck, check_log
 from evoexp.store.log import SUMMARY, array_file
 from evoexp.store.log_reader import read_log
 from forged_logs import Row, with_attachment, with_message, with_metadata
@@ -59,7 +59,7 @@ def reproduced(content: bytes, folder: Path) -> str:
 
 def verified(content: bytes, folder: Path) -> LogCheck:
     path = placed(content, folder)
-    return check_logs([path], read_log(path).condition_id, contradictions)[0]
+    return check_log(path, read_log(path).condition_id, contradictions)
 
 
 @pytest.mark.parametrize("name", [*PLANNERS, REFERENCE, "redundant_ga", "two_stage", "urdf"])

@@ -11,7 +11,7 @@ import pytest
 from command_samples import Evoexp, exit_code
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.configuration.search_path import origin
+from evoexp.configuration.search_path import find
 from evoexp.evolution.operators.operator import Crossover
 from evoexp.registry import component_class
 from evoexp.testing import CHECKS, Check, check_operator, conditions
@@ -71,7 +71,7 @@ def test_every_number_has_unit_and_source(package: Path) -> None:
 @pytest.mark.usefixtures("installed")
 def test_its_options_come_from_the_package(evoexp: Evoexp, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "160")
-    assert origin("experiment", NAME) == f"{NAME} 0.1.0"
+    assert find("experiment", NAME).origin == f"{NAME} 0.1.0"
     assert f"{NAME} 0.1.0" in evoexp("list").out
 
 

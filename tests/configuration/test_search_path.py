@@ -12,12 +12,10 @@ from evoexp.configuration import compose
 from evoexp.configuration.compose import expand
 from evoexp.configuration.search_path import (
     description,
-    file_directories,
     find,
     folders,
     groups,
     options,
-    origin,
     searched_first,
 )
 from evoexp.errors import EvoexpError, RegistrationError, SettingError, UnknownOption
@@ -68,7 +66,7 @@ def test_each_place_is_searched_before_the_next_one(
     with searched_first(map(str, given)):
         assert [folder.path for folder in folders()][:5] == places
         for folder in [*places, None]:
-            found.append((population_size(*words), origin("ga", "rana_planar")))
+            found.append((population_size(*words), find("ga", "rana_planar").origin))
             if folder is not None:
                 (folder / "ga" / "rana_planar.yaml").unlink()
         assert {"mine", "lavoie"} <= set(options("ga"))
@@ -149,7 +147,7 @@ def test_of_a_folder_only_the_options_count(tmp_path: Path) -> None:
 
 def test_files_are_looked_for_beside_the_scenarios_of_all_folders(package: Path) -> None:
     (package / "scenario").mkdir()
-    shipped = file_directories()[-1] / "chen_fig_1.txt"
+    shipped = folders()[-1].path / "scenario/chen_fig_1.txt"
     (package / "scenario" / "my_map.txt").write_text(shipped.read_text().replace("*", ".", 1))
     words = ["experiment=chen_fields", "scenario.map={file: my_map.txt}"]
     plain, other = (expand(given)[0].conditions[0].condition.id for given in (words[:1], words))

@@ -14,7 +14,7 @@ from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError, SettingError
 from evoexp.report.results.stored_results import gather
-from evoexp.store.log_reader import array_names, read_array, read_log
+from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory
 from guests import on_path, write_distribution
@@ -97,12 +97,10 @@ def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
     log = read_log(content)
     assert len(log.generations) == 1
     assert log.summary.terms["share"] == 0.25
-    assert array_names(content) == ["counts", "table"]
-    np.testing.assert_array_equal(read_array(content, "table")[:, 0], [0.0, 0.1, 0.2])
-    assert np.isinf(read_array(content, "table")[:, 1]).all()
-    assert read_array(content, "counts").dtype == np.int64
-    with pytest.raises(KeyError):
-        read_array(content, "tables")
+    assert list(log.arrays()) == ["counts", "table"]
+    np.testing.assert_array_equal(log.arrays()["table"][:, 0], [0.0, 0.1, 0.2])
+    assert np.isinf(log.arrays()["table"][:, 1]).all()
+    assert log.arrays()["counts"].dtype == np.int64
     assert run_replicate(found, 0).summary.digest == log.summary.digest
 
 

@@ -14,12 +14,9 @@ from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import (
     BestKnown,
-    lowered,
     parsed,
     read_best_known,
     shipped_best_known,
-    shortest,
-    to_yaml,
 )
 from evoexp.report.results.planner_runs import MULTIPLES, of_results, problem_key
 from evoexp.report.results.stored_results import Results
@@ -30,7 +27,19 @@ TWO = BestKnown("λ", 2.0, "111111111111", 0)
 KNOWN = {"123456789012": ONE, "00000000001e": TWO}  # keys that YAML would take for numbers
 
 
-def test_what_is_written_is_read() -> None:
+@pytest.fixture
+def update() -> ModuleType:
+    """Return the script."""
+    path = str(ROOT / "scripts/update-best-known")
+    spec = spec_from_loader("update_best_known", SourceFileLoader("update_best_known", path))
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_what_is_written_is_read(update: ModuleType) -> None:
+    to_yaml = update.to_yaml
     assert parsed(to_yaml(KNOWN), "x") == KNOWN
     assert parsed(to_yaml({}), "x") == {} == parsed(b"", "x")
     for key, each in shipped_best_known().items():
@@ -63,23 +72,23 @@ def test_what_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_only_shorter_lengths_are_put_in() -> None:
+def test_only_shorter_lengths_are_put_in(update: ModuleType) -> None:
     found = {
         "123456789012": ONE._replace(length=0.5),
         "00000000001e": TWO._replace(problem="other", length=1.5, replicate=3),
         "abcdefabcdef": TWO,
     }
-    now, lines = lowered(KNOWN, found)
+    now, lines = update.lowered(KNOWN, found)
     assert now["123456789012"] == ONE
     assert now["00000000001e"] == TWO._replace(length=1.5, replicate=3)  # its name stays
     assert now["abcdefabcdef"] == TWO
     assert lines == ["λ (00000000001e): 2 → 1.5", "λ (abcdefabcdef): new → 2"]
-    assert lowered(now, found) == (now, [])
+    assert update.lowered(now, found) == (now, [])
 
 
-def test_the_shortest_is_that_of_all_proven_answers(results: Results) -> None:
+def test_the_shortest_is_that_of_all_proven_answers(update: ModuleType, results: Results) -> None:
     runs = of_results(results.evolved)
-    ((key, best),) = shortest(runs).items()
+    ((key, best),) = update.shortest(runs).items()
     assert key == problem_key(results.evolved[0].condition)
     assert best.length == min(own.best_lengths.min() for own in runs)
     (own,) = (own for own in runs if own.condition and own.condition.run.hash12 == best.run)
@@ -102,17 +111,6 @@ def test_targets_are_multiples_of_the_best_known_not_of_the_best_here(
     for runs, words in ((plain, "straight line"), (known, "best known")):
         table = comparison.page_of_runs(runs, results, settings).tables[0]
         assert table.rows[0][-1] == words and table.rows[0][1] == f"`{key}`"
-
-
-@pytest.fixture
-def update() -> ModuleType:
-    """Return the script."""
-    path = str(ROOT / "scripts/update-best-known")
-    spec = spec_from_loader("update_best_known", SourceFileLoader("update_best_known", path))
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_script_writes_what_the_store_has_of_these_problems(

@@ -60,11 +60,13 @@ def draw(
     request = build.Request(
         experiment.report_name, experiment.name, experiment.budget, experiment.conditions
     )
-    return build.report(
-        request,
-        ReportSettings(**REPORT | {"formats": formats, "figures": page}),
-        outputs,
-        experiment.num_replicates,
+    return build.write_report(
+        build.derived(
+            request,
+            ReportSettings(**REPORT | {"formats": formats, "figures": page}),
+            outputs,
+            experiment.num_replicates,
+        )
     ).with_suffix(".md")  # type: ignore[arg-type]
 
 
@@ -275,7 +277,7 @@ def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
     store(tmp_path, together)
     request = build.Request("methods", together.name, together.budget, together.conditions)
     settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "curkovic"})  # type: ignore[arg-type]
-    page = build.report(request, settings, tmp_path, 3).with_suffix(".md")
+    page = build.write_report(build.derived(request, settings, tmp_path, 3)).with_suffix(".md")
     text = page.read_text()
     assert "V against I |" in text
     assert "VI against II |" in text
@@ -301,7 +303,7 @@ def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
     with pytest.raises(
         NothingStored, match=r"try: evoexp run experiment=rana_planar budget=smoke$"
     ):
-        build.report(request, experiment.report, tmp_path, 2)
+        build.write_report(build.derived(request, experiment.report, tmp_path, 2))
     assert not (tmp_path / "reports").exists()
 
 
@@ -387,7 +389,7 @@ def test_varied_conditions_are_told_apart_and_compared_with_their_own_control(
     store(tmp_path, experiment)
     request = build.Request("swept", experiment.name, experiment.budget, experiment.conditions)
     settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "rana"})  # type: ignore[arg-type]
-    page = build.report(request, settings, tmp_path, 2).with_suffix(".md")
+    page = build.write_report(build.derived(request, settings, tmp_path, 2)).with_suffix(".md")
     text = page.read_text()
     assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [
         f"via-point GA · population_size={size} against {control} · population_size={size}"

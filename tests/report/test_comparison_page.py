@@ -16,7 +16,6 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import proven_answers
 from evoexp.report.results.planner_runs import MULTIPLES, of_results
 from evoexp.report.results.proven_answers import (
-    answers,
     answers_of,
     best_lengths,
     first_reached,
@@ -41,8 +40,10 @@ def test_lengths_are_those_of_many_short_steps(seed: int) -> None:
 
 def test_answers_are_the_logged_improvements_judged(results: Results) -> None:
     for condition in results.with_data:
-        found = answers(condition)
-        assert found.equals(answers(condition))  # the second time out of the cache
+        found = answers_of([condition])[condition.label]
+        assert found.equals(
+            answers_of([condition])[condition.label]
+        )  # the second time out of the cache
         planner, problem = condition.prepared
         for k, own in found.groupby("replicate"):
             summary, last = condition.summaries.loc[k], own.iloc[-1]
@@ -72,7 +73,7 @@ def test_answers_of_many_runs_are_those_of_each(
             for row in proven_answers._judged(c.run.log_path(k))
         ]
         assert together[c.label].to_numpy().tolist() == [list(row) for row in rows]
-        assert together[c.label].equals(answers(c))
+        assert together[c.label].equals(answers_of([c])[c.label])
 
 
 TABLE = pd.DataFrame(
@@ -98,7 +99,7 @@ def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
 
 
 def test_shares_are_counts_of_targets(results: Results) -> None:
-    found = {c.label: answers(c) for c in results.evolved}
+    found = answers_of(results.evolved)
     table = share_table(of_results(results.evolved))
     for condition in results.evolved:
         own, line = found[condition.label], straight_line(found[condition.label])
@@ -119,7 +120,7 @@ def test_shares_are_counts_of_targets(results: Results) -> None:
 
 
 def test_the_last_median_is_that_of_the_best_lengths(results: Results) -> None:
-    found = {c.label: answers(c) for c in results.evolved}
+    found = answers_of(results.evolved)
     table = length_table(of_results(results.evolved))
     for condition in results.evolved:
         best = best_lengths(found[condition.label], condition.summaries.index)
@@ -179,7 +180,9 @@ def test_effort_in_other_coins(stored: Path, settings: ReportSettings) -> None:
             spent = {"evaluations": 0.0, "cpu_s": 0.0}
             for k in condition.summaries.index:
                 whole = condition.summaries.loc[k]
-                own = answers(condition).query("replicate == @k and certified")
+                own = answers_of([condition])[condition.label].query(
+                    "replicate == @k and certified"
+                )
                 last = whole if own.empty else own.iloc[0]
                 spent["evaluations"] += last["evaluations"]
                 own_s = whole["cpu_s"] - whole["certificate_s"]

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from evoexp.commands.chosen_motions import chosen_log
 from evoexp.errors import DamagedStore, NothingStored
-from evoexp.store.chosen_logs import chosen_log
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
 

@@ -16,9 +16,7 @@ import pytest
 from evoexp.cli import main
 from evoexp.condition import Condition, revisions
 from evoexp.store.log_reader import (
-    array_names,
     generation_columns,
-    read_array,
     read_log,
     read_solution,
     read_summary,
@@ -66,8 +64,9 @@ def test_it_loads(name: str) -> None:
     assert bool(log.fronts) == (name == "coevolution")
     assert np.isnan(log.cpu_s).all()  # older than that these times were logged
     assert len(log.cpu_s) == len(log.generations)
-    assert array_names(of(name)) == (["minima"] if name == "placement_optimum" else [])
-    assert all(read_array(of(name), array).size for array in array_names(of(name)))
+    arrays = read_log(of(name)).arrays()
+    assert list(arrays) == (["minima"] if name == "placement_optimum" else [])
+    assert all(array.size for array in arrays.values())
     assert bool(set(log.attachments) - {"minima.npy"}) == (name == "urdf")
 
 

@@ -44,10 +44,6 @@ def cluster_fan_out(
     Replicates are run again as in `fan_out`. A scheduler blames whatever waits on a worker that
     dies: the last time, a replicate runs beside no other.
 
-    Args:
-        settings: Address of the scheduler, or the number of workers of a cluster on this machine.
-        limits: Of each replicate.
-
     Raises:
         ClusterError: If there is no such cluster, or a worker has another version of evoexp.
     """
@@ -92,11 +88,7 @@ def _outcomes(
 
 
 def run_checked(code: str, jobs: Sequence[Job], limits: ReplicateLimits) -> list[Outcome]:
-    """Run replicates in a worker of a cluster, if its code is that which asks for them.
-
-    Raises:
-        OtherCode: If it is not.
-    """
+    """Run replicates in a worker of a cluster, if its code is that which asks for them."""
     if code != code_identity():
         raise OtherCode(
             f"runner.address: the worker on {socket.gethostname()} must have evoexp {code}, has "

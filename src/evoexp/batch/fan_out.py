@@ -45,12 +45,7 @@ class Replicates:
     """Jobs on their way through workers, of this machine or of a cluster."""
 
     def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
-        """Let all of them wait.
-
-        Args:
-            num_workers: Tasks that are done at the same time.
-            limits: Of each replicate.
-        """
+        """Let all of them wait."""
         self._limits, self._waiting = limits, deque(jobs)
         self._bundles = Bundles(self._waiting, num_workers)
         self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
@@ -112,12 +107,7 @@ class Bundles:
     """
 
     def __init__(self, waiting: deque[Job], num_workers: int) -> None:
-        """Begin without times.
-
-        Args:
-            waiting: The jobs; those of a bundle are taken out.
-            num_workers: Tasks that are done at the same time.
-        """
+        """Begin without times."""
         self._waiting, self._num_workers = waiting, num_workers
         self._seconds, self._count = 0.0, 0.0
 

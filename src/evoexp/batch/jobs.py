@@ -3,7 +3,7 @@
 import functools
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from evoexp.attachments import keep_all
 from evoexp.batch.live_curves import CurveFile
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.condition import Condition
-from evoexp.records import Block, ReplicateSummary
+from evoexp.records import ReplicateSummary
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
@@ -43,11 +43,6 @@ class Outcome(NamedTuple):
     summary: ReplicateSummary | None = None  # the row that the log holds; None for a failed one
     # whether a failed one may be done another time: it took too long, or too much memory
     may_pass: bool = False
-
-    @property
-    def key(self) -> tuple[str, int]:
-        """Names it among all jobs."""
-        return self.condition_id, self.replicate
 
     @property
     def failed(self) -> bool:
@@ -89,9 +84,8 @@ def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | 
         condition = condition_of(job)
         condition.prepare()
         with limited(limits, in_worker=in_worker):
-            content, summary = run_replicate(
-                condition, job.replicate, job.condition_json, _heard(curves, job)
-            )
+            hear = None if curves is None else CurveFile(curves, *job.key).hear
+            content, summary = run_replicate(condition, job.replicate, job.condition_json, hear)
         reason, trace, may_pass = "", "", False
     except Exception as error:
         content, summary, trace = b"", None, traceback.format_exc()
@@ -102,10 +96,6 @@ def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | 
     return Outcome(
         job.condition_id, job.replicate, reason, trace, content, seconds, summary, may_pass
     )
-
-
-def _heard(curves: Path | None, job: Job) -> Callable[[Block], None] | None:
-    return None if curves is None else CurveFile(curves, *job.key).hear
 
 
 def condition_of(job: Job) -> Condition:

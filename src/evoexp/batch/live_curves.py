@@ -30,13 +30,7 @@ class CurveFile:
     """Hears the generations of one replicate, and leaves their convergence for others to see."""
 
     def __init__(self, folder: Path, condition_id: str, replicate: int) -> None:
-        """Begin with no generation.
-
-        Args:
-            folder: Where the files of all workers are.
-            condition_id: 64 hex digits.
-            replicate: Its index.
-        """
+        """Begin with no generation."""
         self._folder, self._of = folder, (condition_id, replicate)
         self._costs: list[float] = []
 

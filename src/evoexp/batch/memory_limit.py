@@ -43,11 +43,7 @@ def _memory(generations: int, memory: float) -> int:
 
 
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
-    """Refuse a condition whose replicates would take too much memory, or too long a log.
-
-    Args:
-        allowed: Memory of one replicate [B].
-        label: Of the condition, for the error.
+    """Refuse a condition whose replicates would take more than is allowed [B], or too long a log.
 
     Raises:
         SettingError: If they would, or if the condition contradicts itself.

@@ -8,6 +8,7 @@ loss, as the others in flight run again.
 import contextlib
 import faulthandler
 import os
+import resource
 import signal
 import threading
 from collections.abc import Iterator
@@ -40,10 +41,6 @@ class ReplicateLimits(NamedTuple):
 @contextlib.contextmanager
 def limited(limits: ReplicateLimits, *, in_worker: bool) -> Iterator[None]:
     """Keep the body within limits.
-
-    Args:
-        limits: Of time and memory.
-        in_worker: Whether this process is a worker, which may be ended and whose memory is limited.
 
     Raises:
         TookTooLong: The body took too long.
@@ -90,15 +87,8 @@ def _in_time(limits: ReplicateLimits, in_worker: bool) -> Iterator[None]:
 @contextlib.contextmanager
 def _in_memory(limit: int | None) -> Iterator[None]:
     """Limit the addresses that this process may take besides those that it has, where one can."""
-    try:
-        import resource
-
-        used = int(_STATUS.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    except (ImportError, OSError, ValueError):
-        yield
-        return
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    if limit is None or soft not in (resource.RLIM_INFINITY, -1):
+    used, (soft, hard) = used_addresses(), resource.getrlimit(resource.RLIMIT_AS)
+    if limit is None or not used or allowed_addresses() is not None:
         yield
         return
     resource.setrlimit(resource.RLIMIT_AS, (used + limit, hard))
@@ -106,3 +96,16 @@ def _in_memory(limit: int | None) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def allowed_addresses() -> int | None:
+    """Return how many addresses this process may take [B]; None: no limit is set."""
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return None if soft in (resource.RLIM_INFINITY, -1) else soft
+
+
+def used_addresses() -> int:
+    """Return how many addresses this process has taken [B]; 0 where the system does not tell."""
+    with contextlib.suppress(OSError, ValueError):
+        return int(_STATUS.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    return 0

@@ -20,7 +20,7 @@ from evoexp.registry import guests
 from evoexp.store.identity import MANIFEST, restored_manifest
 from evoexp.store.integrity import lost_replicates, mend, needs_mending
 from evoexp.store.manifest import manifest
-from evoexp.store.run_directory import RunDirectory, create_all, lock_all
+from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.summaries import whole_logs, write_summary
 
 if TYPE_CHECKING:
@@ -133,12 +133,10 @@ class Batch:
 
     def _create_runs(self) -> None:
         """Write the directories of new runs, and the number of replicates that is planned."""
-        wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
-        create_all(
-            (run, text, _manifest(run, text) | notes, own.files())
-            for run, own, _, notes in wanted
-            for text in (own.to_json(),)
-        )
+        for key, run in self.runs.items():
+            condition, _, notes = self._wanted[key]
+            config_json = condition.to_json()
+            run.create(config_json, _manifest(run, config_json) | notes, condition.files())
         for key in dict.fromkeys(job.condition_id for job in self.jobs):
             self.runs[key].note_plan(self._wanted[key][1])
 
@@ -176,11 +174,7 @@ class Batch:
         return ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
 
     def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
-        """Return the jobs of missing replicates; references, which take longest, come first.
-
-        Args:
-            lost: Condition → replicates whose log is damaged, whether or not they are asked for.
-        """
+        """Return the jobs of missing replicates; references, which take longest, come first."""
         jobs = []
         ordered = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)
         for key, (condition, count, _) in ordered:
@@ -219,10 +213,6 @@ class Batch:
 
 def _manifest(run: RunDirectory, config_json: bytes) -> dict[str, Any]:
     """Return the manifest of a run; of one that has lost its own, what a log knows of it."""
-    if not (run.path / MANIFEST).exists() and (known := _restored(run)):
-        return known
-    return manifest(run.condition_id, guests(config_json))
-
-
-def _restored(run: RunDirectory) -> dict[str, Any]:
-    return restored_manifest(run.path, run.condition_id) if run.completed() else {}
+    is_lost = run.completed() and not (run.path / MANIFEST).exists()
+    known = restored_manifest(run.path, run.condition_id) if is_lost else {}
+    return known or manifest(run.condition_id, guests(config_json))

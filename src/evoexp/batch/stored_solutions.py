@@ -25,10 +25,6 @@ _UNFIT = (ValueError, ArithmeticError, LookupError, EvoexpError)  # raised by nu
 def contradictions(path: Path, log: LogContents) -> Iterator[str]:
     """Yield the contradictions between a log's solutions and the costs, terms and verdict it tells.
 
-    Args:
-        path: Of the log, for errors.
-        log: The log; the hash of its configuration is right.
-
     Raises:
         EvoexpError: If its solutions cannot be evaluated here: another revision, a missing package.
     """
@@ -57,7 +53,7 @@ def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterato
                 return
             continue  # what costs inf may be no solution at all
         yield from _unlike(row.terms, terms, f"{name}: ")
-        cost = float(getattr(planner, "cost_of_terms", _unknown)(terms))
+        cost = float(getattr(planner, "cost_of_terms", lambda terms: math.nan)(terms))
         if math.isfinite(solution.cost) and not math.isnan(cost):
             yield from _unlike({"cost": solution.cost}, {"cost": cost}, f"{name}: ")
     yield from _unlike(log.summary.terms, terms, "last solution: ")
@@ -68,18 +64,10 @@ def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterato
 
 
 def _terms(planner: Planner, problem: Any, solution: SolutionRow) -> dict[str, float]:
-    """Return the terms of a solution.
-
-    Raises:
-        ValueError: If its numbers are none of a motion.
-    """
+    """Return the terms of a solution."""
     if not (np.abs(solution.values) <= LARGEST).all():  # NaN, too
         raise ValueError(f"its numbers must be finite and at most {LARGEST:g}")
     return planner.evaluate(problem, solution.values)
-
-
-def _unknown(terms: Mapping[str, float]) -> float:
-    return math.nan
 
 
 def _unlike(

@@ -25,12 +25,7 @@ def one_of_each_kind(jobs: Iterable[Job]) -> list[Job]:
 
 
 def warm_kernels(jobs: Iterable[Job], limits: ReplicateLimits) -> None:
-    """Run every kernel that the conditions of jobs need; errors are left to the replicates.
-
-    Args:
-        jobs: One of each kind.
-        limits: Of a replicate; its time does not include compilation.
-    """
+    """Run every kernel that the conditions of jobs need; errors are left to the replicates."""
     limits = limits._replace(timeout_s=max(limits.timeout_s or 0.0, COMPILING_S))
     for job in jobs:
         with contextlib.suppress(Exception), limited(limits, in_worker=False):

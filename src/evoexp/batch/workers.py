@@ -47,11 +47,7 @@ class Work(Protocol):
     """Tasks for workers, and what becomes of their ends."""
 
     def next_task(self, num_running: int) -> tuple[Any, ...] | None:
-        """Return the arguments of the next call; None if there is none now.
-
-        Args:
-            num_running: Tasks that are running.
-        """
+        """Return the arguments of the next call; None if there is none now."""
 
     def end_task(self, task: tuple[Any, ...], end: Any | Died) -> Any | None:
         """Take in the result of a task; return one for the caller, or None."""
@@ -212,11 +208,7 @@ class Workers:
             raise WorkerError("worker processes die before they have begun")
 
     def _fill(self) -> None:
-        """Start workers until they are as many as they should be.
-
-        Raises:
-            Exception: The error by which the server cannot load libraries.
-        """
+        """Start workers until they are as many as they should be."""
         while len(self._workers) < self.number:
             ours, theirs = socket.socketpair()
             self._workers.append(worker := _Worker(ours))

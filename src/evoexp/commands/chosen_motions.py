@@ -11,7 +11,7 @@ import numpy as np
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
-from evoexp.commands.stored_runs import stored_or_shipped
+from evoexp.commands.stored_runs import stored_run
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import (
@@ -28,12 +28,13 @@ from evoexp.playback.timing import SpeedLimits
 from evoexp.playback.trajectory_files import Columns, JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.store.chosen_logs import CHOICES, chosen_log
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.summaries import summary_table
 
+CHOICES = ("best", "worst", "refuted")  # among the replicates of a run
 FOLDER = "motions"  # of the outputs
 MANY = 4  # motions on one page
 JUDGED = "a joint trajectory: judged by its bodies, not by where it begins and ends"
@@ -94,42 +95,73 @@ def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
     )
 
 
-def run_or_log(word: str) -> RunDirectory | Path:
-    """Return the run that a hash names, or the path of a log.
-
-    Raises:
-        EvoexpError: If the hash names none.
-    """
+def named_log(word: str, choice: str | int | None) -> tuple[Path, RunDirectory | None]:
+    """Return the log that a word names: its path, or the choice among the run of a hash."""
     path = Path(word)
     if path.suffix == ".mcap" or path.is_file():
-        return path
-    run = stored_or_shipped(word)
-    if isinstance(run, RunDirectory):
-        return run
-    raise NothingStored(f"condition {run.condition_id[:12]}: not run here; run it: {run.command}")
+        return path, None
+    run = stored_run(word)
+    return chosen_log(run, CHOICES[0] if choice is None else choice), run
+
+
+def chosen_log(run: RunDirectory, choice: str | int) -> Path:
+    """Return the log of one replicate of a run.
+
+    Args:
+        choice: Index of the replicate, or "best" or "worst" (by cost), or "refuted": the first
+            replicate that the certifier refutes.
+
+    Raises:
+        NothingStored: If there is no such replicate.
+    """
+    if isinstance(choice, int):
+        finished = sorted(run.completed())
+        if choice not in finished:
+            names = [*map(str, finished[:8]), *(["…"] if finished[8:] else [])]
+            there = ", ".join(names) or "none"
+            raise NothingStored(
+                f"run {run.hash12}: no finished replicate {choice} (finished: {there})"
+            )
+        return run.log_path(choice)
+    table = summary_table(run, thorough=True).to_pylist()
+    done = [row for row in table if row["status"] == "done"]
+    if choice == "refuted":
+        rows = [row for row in done if row["certified"] is False]
+    else:
+        sign = 1.0 if choice == "best" else -1.0
+        rows = sorted(done, key=lambda row: _rank(row["best_cost"], sign))
+    if not rows:
+        what = "refuted replicate" if choice == "refuted" else "finished replicate"
+        raise NothingStored(f"run {run.hash12}: no {what} among {len(done)}")
+    return run.log_path(rows[0]["replicate"])
+
+
+def _rank(cost: float | None, sign: float) -> tuple[bool, float]:
+    """Return the key by which replicates are sorted: those of no finite cost come last."""
+    is_finite = cost is not None and math.isfinite(cost)
+    return not is_finite, sign * cost if cost is not None and is_finite else 0.0
 
 
 def recordings(arguments: argparse.Namespace) -> list[Recording]:
-    """Return the motions that the arguments choose, in the order of the words.
-
-    Raises:
-        EvoexpError: One line says what is wrong.
-    """
+    """Return the motions that the arguments choose, in the order of the words."""
     limits, words = speed_limits(arguments), arguments.what
     if any(is_override(word) or is_motion(word) for word in words):
-        return _recordings_of_file(words, arguments.only, limits)
+        only = (arguments.only,) if arguments.only else ()
+        path, fitting = fitting_motions(words, only=only)  # of those that it fits, the first ones
+        for remark in fitting[0].remarks[1:]:
+            print(f"{path.name}: {remark}")
+        return [
+            record_motion(own.condition, own.motion, Heading(f"{path.name} · {own.label}"), limits)
+            for own in fitting[:MANY]
+        ]
     if len(words) > MANY:
         raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
     choice = arguments.replicate if arguments.replicate is not None else arguments.choice
-    return [_stored_recording(run_or_log(word), choice, limits) for word in words]
+    return [_stored_recording(*named_log(word, choice), limits) for word in words]
 
 
 def single(arguments: argparse.Namespace) -> Recording:
-    """Return the single motion that the arguments choose.
-
-    Raises:
-        MotionFileError: If it is not one.
-    """
+    """Return the single motion that the arguments choose."""
     found = recordings(arguments)
     if len(found) != 1:
         raise MotionFileError(f"motion: one at a time, got {len(found)}; choose with --only LABEL")
@@ -137,11 +169,7 @@ def single(arguments: argparse.Namespace) -> Recording:
 
 
 def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
-    """Return the joints' limits.
-
-    Raises:
-        SettingError: If one is not above 0.
-    """
+    """Return the joints' limits."""
     for name in ("turn_speed", "slide_speed"):
         value = getattr(arguments, name)
         if value is not None and not 0.0 < value < math.inf:
@@ -149,12 +177,9 @@ def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
     return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
 
 
-def _stored_recording(
-    run: RunDirectory | Path, choice: str | int | None, limits: SpeedLimits
-) -> Recording:
-    if isinstance(run, Path):
-        return stored_recording(run, run.name, limits)
-    log = chosen_log(run, CHOICES[0] if choice is None else choice)
+def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) -> Recording:
+    if run is None:
+        return stored_recording(log, log.name, limits)
     origin = origin_of(run)
     names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
     try:
@@ -163,17 +188,6 @@ def _stored_recording(
         raise RevisionMismatch(
             f"run {run.hash12}: {error}; run it anew with what is installed: {run.command}"
         ) from None
-
-
-def _recordings_of_file(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
-    """Return the motion of a file in every condition that it fits, in the first `MANY` of them."""
-    path, fitting = fitting_motions(words, only=(only,) if only else ())
-    for remark in fitting[0].remarks[1:]:
-        print(f"{path.name}: {remark}")
-    return [
-        record_motion(each.condition, each.motion, Heading(f"{path.name} · {each.label}"), limits)
-        for each in fitting[:MANY]
-    ]
 
 
 def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], ending: str) -> Path:
@@ -294,11 +308,7 @@ def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMo
 def _trajectory(
     label: str, condition: Condition, given: Columns | JointTrajectory
 ) -> FittingMotion:
-    """Return a trajectory as a motion of a condition's robot.
-
-    Raises:
-        ValueError: If it does not fit.
-    """
+    """Return a trajectory as a motion of a condition's robot."""
     planner, problem = condition.prepare()
     if not isinstance(condition.robot, Robot):
         raise ValueError(f"{label}: its robot has no joints for a trajectory")

@@ -7,13 +7,13 @@ from typing import Any
 from rich.table import Column, Table
 
 from evoexp.commands.console import new_table, print_json, say
+from evoexp.commands.report_requests import request_of
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages import page_of
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.results.stored_results import gather
-from evoexp.report.statistics.claim_rules import Rule, Rules, registered_rules
+from evoexp.report.statistics.claim_rules import Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 
 KEYS = (
@@ -68,12 +68,17 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
     experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
     for experiment in experiments:
         try:
-            for claim in judged(experiment):
-                yield _judged_row(paper, experiment, claim)
+            rows = [
+                (c.name, c.text, c.source, c.rule, c.evidence, c.n, c.verdict)
+                for c in judged(experiment)
+            ]
+            command = f"evoexp report {experiment}"
         except NothingStored:
-            for rule in rules.values():
-                if experiment in rule.experiments:
-                    yield _unjudged_row(paper, experiment, rule.unjudged())
+            waiting = [r.unjudged() for r in rules.values() if experiment in r.experiments]
+            rows = [(r.name, r.claim, r.source, r.text, "–", "0", NOT_RUN) for r in waiting]
+            command = f"evoexp run experiment={experiment}"
+        for row in rows:
+            yield dict(zip(KEYS, (paper, *row, experiment, command), strict=True))
 
 
 def judged(name: str) -> tuple[Claim, ...]:
@@ -83,50 +88,16 @@ def judged(name: str) -> tuple[Claim, ...]:
         NothingStored: If nothing of it has been run.
     """
     (experiment,) = compose.expand([f"experiment={name}"])
-    results = gather(
-        outputs_root(),
-        experiment.conditions,
-        experiment.num_replicates,
-        experiment.name,
-        experiment.budget,
-        f"evoexp run experiment={name}",
-        experiment.options,
-    )
-    return page_of(results, experiment.report).claims
+    request, settings, num_replicates = request_of(experiment, [])
+    return page_of(request.results(outputs_root(), num_replicates), settings).claims
 
 
 def _rules(paper: str) -> Rules:
-    """Return the claims that are registered under the name of a paper.
-
-    Raises:
-        UnknownOption: If there is no such paper.
-    """
+    """Return the claims that are registered under the name of a paper."""
     found = registered(CLAIMS, paper)
     if found is None:
         raise UnknownOption("paper", paper, names(CLAIMS))
     return registered_rules(found)
-
-
-def _judged_row(paper: str, experiment: str, claim: Claim) -> dict[str, Any]:
-    values = (
-        paper,
-        claim.name,
-        claim.text,
-        claim.source,
-        claim.rule,
-        claim.evidence,
-        claim.n,
-        claim.verdict,
-        experiment,
-        f"evoexp report {experiment}",
-    )
-    return dict(zip(KEYS, values, strict=True))
-
-
-def _unjudged_row(paper: str, experiment: str, rule: Rule) -> dict[str, Any]:
-    command = f"evoexp run experiment={experiment}"
-    values = (paper, rule.name, rule.claim, rule.source, rule.text, "–", "0", NOT_RUN)
-    return dict(zip(KEYS, (*values, experiment, command), strict=True))
 
 
 def _block(row: dict[str, Any]) -> Table:

@@ -1,4 +1,4 @@
-"""The process of a command: a folder for its temporary files, and errors that mean no memory.
+"""The process of a command: its standard streams, its temporary files, and a lack of memory.
 
 Whatever library makes a temporary file makes it in the folder. The command holds a lock there,
 which the system releases when the process ends, however it ends: a folder of this user whose lock
@@ -8,24 +8,30 @@ Where addresses are limited (`ulimit -v`), a library that cannot be loaded is an
 thread that cannot be started a `RuntimeError`, and some libraries end the process by themselves.
 """
 
-import atexit
 import contextlib
 import errno
 import fcntl
 import os
-import resource
 import shutil
+import sys
 import tempfile
+import textwrap
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+from evoexp.batch.replicate_limits import allowed_addresses, used_addresses
+from evoexp.errors import DamagedStore, printable
+from evoexp.numeric.cache_folder import remove_at_exit
+
+OUTPUT = "standard output"  # the file name of its errors
 PREFIX = "evoexp-command-"
 LOCK = "owner.lock"
 MEGABYTE = 10**6
 LEAST_MB = 2_500  # [MB] of addresses; a shipped run that compiles its kernels took 2,219
 LARGEST_MB = 400  # [MB] of addresses that loading one library and its kernels takes, at most
 _TEXTS = ("failed to map segment", "cannot allocate memory", "can't start new thread", "bad_alloc")
-_STATUS = Path("/proc/self/statm")
 
 
 def use_temporary_folder() -> None:
@@ -41,7 +47,7 @@ def use_temporary_folder() -> None:
         lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)  # held until the process ends
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if (folder / LOCK).exists():  # else another command has just removed it
-            atexit.register(_remove, folder, os.getpid())
+            remove_at_exit(folder)
             os.environ["TMPDIR"] = tempfile.tempdir = str(folder)
 
 
@@ -57,18 +63,13 @@ def remove_abandoned(place: Path) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
-def _remove(folder: Path, process: int) -> None:
-    if os.getpid() == process:  # and not a copy of it
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def refuse_too_little_memory() -> None:
     """Refuse limits with which libraries or the compiler end the process, or never come back.
 
     Raises:
         MemoryError: If a limit is below `LEAST_MB`.
     """
-    allowed = _allowed()
+    allowed = allowed_addresses()
     if allowed is not None and allowed < LEAST_MB * MEGABYTE:
         raise MemoryError(f"a command needs {LEAST_MB:,} MB of addresses at least")
 
@@ -76,9 +77,9 @@ def refuse_too_little_memory() -> None:
 def memory_shortage(error: BaseException) -> str:
     """Describe the lack of memory that an error means; empty if it means something else."""
     texts = [text for each in _chain(error) if (text := _shortage(each))]
-    allowed = _allowed()
+    allowed = allowed_addresses()
     if not texts and isinstance(error, ImportError | OSError | RuntimeError | SystemError):
-        is_little = allowed is not None and allowed - _used() < LARGEST_MB * MEGABYTE
+        is_little = allowed is not None and allowed - used_addresses() < LARGEST_MB * MEGABYTE
         texts = [_first_line(error)] if is_little else []
     if not texts:
         return ""
@@ -111,14 +112,53 @@ def _first_line(error: BaseException) -> str:
     return (named or lines or [""])[0]
 
 
-def _allowed() -> int | None:
-    """Return how many addresses this process may take [B]; None: no limit is set."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return None if soft in (resource.RLIM_INFINITY, -1) else soft
+def open_streams() -> None:
+    """Open closed standard streams on the null device, before one of our files gets their number.
+
+    They stay open, and are opened in the order of their numbers.
+    """
+    sys.stdin = sys.stdin or open(os.devnull)  # noqa: SIM115
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
 
 
-def _used() -> int:
-    """Return how many addresses this process has taken [B], as far as it is known."""
+def settle_streams() -> None:
+    """Flush what was printed; where that fails, let it vanish.
+
+    Python tries again when it ends, and what fails then changes the exit code to 120.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def complain(text: str) -> None:
+    """Print words on standard error, if it can be: one line; on a terminal, no word broken."""
+    line = f"evoexp: {printable(' '.join(text.split()))}"
     with contextlib.suppress(OSError, ValueError):
-        return int(_STATUS.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-    return 0
+        if sys.stderr.isatty():
+            columns = shutil.get_terminal_size().columns
+            line = textwrap.fill(line, columns, break_long_words=False, break_on_hyphens=False)
+        print(line, file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def damage_in_lines() -> Iterator[None]:
+    """Print warnings of damaged files as `evoexp: …`, each line once, while the body runs."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
+            if not issubclass(category, DamagedStore):
+                shown(message, category, *place, **rest)
+            elif (text := " ".join(str(message).split())) not in said:
+                said.add(text)
+                print(f"evoexp: {printable(text)}", file=sys.stderr)
+
+        warnings.simplefilter("always", DamagedStore)
+        warnings.showwarning = show
+        yield

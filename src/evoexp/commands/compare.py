@@ -20,10 +20,9 @@ from evoexp.report.pages import build, comparison, markdown
 from evoexp.report.pages.comparison_files import as_csv, as_latex
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import read_best_known, shipped_best_known
-from evoexp.report.results.given_data import GivenData, of_given, read_given, strange_problems
+from evoexp.report.results.given_data import of_given, read_given, strange_problems
 from evoexp.report.results.ioh_format import ioh_files
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
-from evoexp.report.results.stored_results import gather
 from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root
 
@@ -68,8 +67,10 @@ class Drawn(NamedTuple):
 def main(arguments: argparse.Namespace) -> int:
     """Draw the page, and print its table."""
     arguments.overrides = unpacked(arguments.overrides)
-    if arguments.ioh:
-        _check_empty(arguments.ioh)
+    folder = Path(arguments.ioh or "")
+    # readers would take older files in it for runs, too
+    if arguments.ioh and folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        raise SettingError("--ioh", "a folder that is empty or not there yet", arguments.ioh)
     files, request, settings, runs, strange = drawn(arguments)
     path = build.write_report(files)
     rows = comparison.rated(runs, settings)
@@ -96,20 +97,17 @@ def main(arguments: argparse.Namespace) -> int:
 def drawn(arguments: argparse.Namespace) -> Drawn:
     """Draw the page that is asked for; nothing is written."""
     given = read_given(arguments.data) if arguments.data else None
-    known = _best_known(arguments.best_known)
+    known = shipped_best_known()
+    if arguments.best_known:
+        known |= read_best_known(arguments.best_known)
     request, settings, planned = _asked(arguments)
-    if given:
-        request = _with_data(request, arguments.data, given)
-    found = gather(
-        outputs_root(),
-        request.conditions,
-        planned,
-        request.experiment,
-        request.budget,
-        request.hint,
-        request.options,
-    )
-    runs, strange = of_results(found.evolved, known), list[str]()
+    if given:  # a page of its own
+        name = f"{request.report_name}+given_{given.sha256[:8]}"
+        words = f"{request.arguments} --data {shlex.quote(arguments.data)}".strip()
+        request = request._replace(report_name=name, arguments=words)
+    found = request.results(outputs_root(), planned)
+    lengths = {key: each.length for key, each in known.items()}
+    runs, strange = of_results(found.evolved, lengths), list[str]()
     if given:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
@@ -152,11 +150,7 @@ def _write_files(
 
 
 def _asked(arguments: argparse.Namespace) -> ReportRequest:
-    """Return the request of the page.
-
-    Raises:
-        EvoexpError: As `report_requests.chosen`.
-    """
+    """Return the request of the page."""
     words = shlex.join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
     words += f" --only {shlex.quote(','.join(arguments.only))}" if arguments.only else ""
     words = " ".join([words, *folder_words(arguments.config_dir)])
@@ -177,26 +171,6 @@ def _asked(arguments: argparse.Namespace) -> ReportRequest:
     title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
     request = build.Request(name, title, first.budget, tuple(rows.values()), words, None, "compare")
     return ReportRequest(request, settings, first.num_replicates)
-
-
-def _check_empty(path: str) -> None:
-    """Refuse a folder that holds anything: readers would take older files in it for runs, too."""
-    folder = Path(path)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise SettingError("--ioh", "a folder that is empty or not there yet", path)
-
-
-def _best_known(path: str | None) -> dict[str, float]:
-    """Return the best known lengths by the keys of problems; those of the user's file win."""
-    known = shipped_best_known() | (read_best_known(path) if path else {})
-    return {key: each.length for key, each in known.items()}
-
-
-def _with_data(request: build.Request, path: str, given: GivenData) -> build.Request:
-    """Return the request of a page that shows given runs, too: a folder of its own."""
-    name = f"{request.report_name}+given_{given.sha256[:8]}"
-    words = f"{request.arguments} --data {shlex.quote(path)}".strip()
-    return request._replace(report_name=name, arguments=words)
 
 
 def _name(parts: str, count: int) -> str:

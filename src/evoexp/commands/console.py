@@ -75,12 +75,7 @@ def coloured(text: str, colour: str = "") -> Text:
 
 
 def new_table(title: str, *columns: str | Column) -> Table:
-    """Return an empty table whose cells are folded where the terminal is too narrow, never cut.
-
-    Args:
-        title: May be empty.
-        columns: Names, or what `hash_column` and `right` return.
-    """
+    """Return an empty table whose cells are folded where the terminal is too narrow, never cut."""
     heads = [Column(each, overflow="fold") if isinstance(each, str) else each for each in columns]
     return Table(*heads, title=title or None, title_justify="left")
 

@@ -15,7 +15,7 @@ from evoexp.commands.chosen_motions import (
     FittingMotion,
     fitting_motions,
     initial_motion,
-    run_or_log,
+    named_log,
     stored_motion,
     write,
 )
@@ -24,7 +24,6 @@ from evoexp.commands.motion_files import nested
 from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion
-from evoexp.store.chosen_logs import CHOICES, chosen_log
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
 REMARKS = "remarks"  # of a row: how a trajectory was read
@@ -82,7 +81,10 @@ def main(arguments: argparse.Namespace) -> int:
         rows.append(head | terms | of_task | verdict | {DEPARTURES: departures})
         listings.append(planner.listing(problem, solution))
     if arguments.json:
-        whole = [_with_rows(*pair) for pair in zip(rows, listings, strict=True)]
+        whole = [
+            row if listing is None else row | {"rows": _configurations(listing)}
+            for row, listing in zip(rows, listings, strict=True)
+        ]
         print_json(whole if len(whole) > 1 else whole[0])
         return 0
     groups = _alike(list(zip(rows, listings, strict=True)))
@@ -117,8 +119,11 @@ def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
     words: list[str] = arguments.overrides
     if arguments.write is not None and arguments.write.suffix != ".json":
         raise MotionFileError(f"--write: must be a file that ends in .json, was {arguments.write}")
-    if all(_is_stored(word) for word in words):
-        return [stored_motion(_log(word, arguments.replicate)) for word in words]
+    if all(
+        word.endswith(".mcap") or (HEX.fullmatch(word) and not Path(word).exists())
+        for word in words
+    ):
+        return [stored_motion(named_log(word, arguments.replicate)[0]) for word in words]
     if arguments.replicate is not None:
         raise MotionFileError("--replicate: must go with a hash, was given with an experiment")
     asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
@@ -127,23 +132,8 @@ def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
     return fitting_motions(words, **asked)[1]
 
 
-def _is_stored(word: str) -> bool:
-    path = Path(word)
-    return path.suffix == ".mcap" or (HEX.fullmatch(word) is not None and not path.exists())
-
-
-def _log(word: str, replicate: int | None) -> Path:
-    run = run_or_log(word)
-    if isinstance(run, Path):
-        return run
-    return chosen_log(run, CHOICES[0] if replicate is None else replicate)
-
-
-def _with_rows(row: dict[str, Any], listing: Listing | None) -> dict[str, Any]:
-    """Return a row with one object per configuration, if the planner lists configurations."""
-    if listing is None:
-        return row
-    return row | {"rows": [dict(zip(listing.names, cells, strict=True)) for cells in listing.rows]}
+def _configurations(listing: Listing) -> list[dict[str, Any]]:
+    return [dict(zip(listing.names, cells, strict=True)) for cells in listing.rows]
 
 
 def _listing(label: str, listing: Listing) -> Table:

@@ -16,9 +16,8 @@ from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError
-from evoexp.extras import lacking
 from evoexp.records import flatten
-from evoexp.registry import COMPONENTS, registered
+from evoexp.registry import COMPONENTS, components_in, lacking, registered
 from evoexp.store.identity import TAKEN
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
@@ -119,16 +118,7 @@ def _facts(
     *,
     noted: bool = True,
 ) -> dict[str, Any]:
-    """Return the facts of all keys.
-
-    Args:
-        config_json: Canonical form of the condition.
-        origin: Where the condition comes from.
-        around: Environment or manifest in which the replicates were run; None: none were.
-        rows: Summaries of the replicates.
-        planned: How many there shall be; None: unknown.
-        noted: Whether notes are among them.
-    """
+    """Return the facts of all keys."""
     config = stored_config(config_json)
     condition_id = hashlib.sha256(config_json).hexdigest()
     stored = None if around is None else {k: around.get(k) for k in ("versions", "platform", "cpu")}
@@ -153,8 +143,8 @@ def _facts(
 def _components(config: Any) -> Iterator[dict[str, Any]]:
     """Yield every component once, with its revision here and as stored, and its package."""
     revisions: dict[str, Any] = {}
-    for name, revision in _named(config):
-        revisions.setdefault(name, revision)
+    for _, settings in components_in(config):
+        revisions.setdefault(str(settings[TARGET]), settings.get("revision"))
     for name, revision in revisions.items():
         registration = registered(COMPONENTS, name)
         yield {
@@ -163,16 +153,6 @@ def _components(config: Any) -> Iterator[dict[str, Any]]:
             "installed_revision": registration and registration.load().revision,
             "package": registration and registration.package,
         }
-
-
-def _named(config: Any) -> Iterator[tuple[str, Any]]:
-    """Yield name and revision of all components in plain configuration data."""
-    if isinstance(config, dict):
-        if TARGET in config:
-            yield str(config[TARGET]), config.get("revision")
-        config = list(config.values())
-    for value in config if isinstance(config, list) else ():
-        yield from _named(value)
 
 
 def _result(rows: Sequence[dict[str, Any]], planned: int | None) -> dict[str, Any]:

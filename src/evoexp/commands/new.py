@@ -4,11 +4,10 @@ import argparse
 import keyword
 import re
 import shutil
-from importlib import resources
-from importlib.resources.abc import Traversable
 from importlib.util import find_spec
 from pathlib import Path
 
+import evoexp
 from evoexp.configuration.search_path import options
 from evoexp.errors import EvoexpError, SettingError
 from evoexp.registry import COMPONENTS, names
@@ -47,10 +46,12 @@ def main(arguments: argparse.Namespace) -> int:
     name = arguments.name
     root = arguments.directory / name
     _check(name, root)
-    kind, template = arguments.kind, resources.files("evoexp").joinpath("assets")
+    kind = arguments.kind
+    template = Path(evoexp.__file__).parent / "assets" / f"new_{kind}"
     files = {
-        root / _named(path, kind, name): _named(text, kind, name)
-        for path, text in _read(template.joinpath(f"new_{kind}"))
+        root / _named(path, kind, name): _named((template / path).read_text("utf-8"), kind, name)
+        for path in sorted(str(each.relative_to(template)) for each in template.rglob("*.*"))
+        if "__pycache__" not in path and (template / path).is_file()
     }
     try:
         for path in files:
@@ -66,13 +67,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _check(name: str, root: Path) -> None:
-    """Refuse a name that cannot be, or that something has already.
-
-    Raises:
-        SettingError: If the name is no name of a package, or evoexp has a component or an option of
-            this name.
-        PackageExists: If a directory or a module has it.
-    """
+    """Refuse a name that cannot be, or that something has already."""
     if not re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
         must = "a word of lower-case letters, digits and _ that begins with a letter"
         raise SettingError("NAME", must, name)
@@ -83,18 +78,6 @@ def _check(name: str, root: Path) -> None:
         raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
     if find_spec(name) is not None:
         raise PackageExists(f"{name}: a module of this name is installed; choose another NAME")
-
-
-def _read(directory: Traversable, inside: str = "") -> list[tuple[str, str]]:
-    """Return (path, text) of all files of the template, in alphabetical order."""
-    found = []
-    for each in sorted(directory.iterdir(), key=lambda each: each.name):
-        path = f"{inside}{each.name}"
-        if each.is_dir():
-            found += _read(each, f"{path}/") if each.name != "__pycache__" else []
-        else:
-            found.append((path, each.read_text(encoding="utf-8")))
-    return found
 
 
 def _named(text: str, kind: str, name: str) -> str:

@@ -52,15 +52,6 @@ class PlannedCondition(NamedTuple):
     memory_gb_each: float  # of a replicate [GB]
 
 
-class Estimate(NamedTuple):
-    """Mean CPU time of replicates that were not run yet [s]; None: unknown."""
-
-    seconds: float | None
-    least: float | None
-    most: float | None
-    source: str
-
-
 class Times(NamedTuple):
     """Times of a run's finished replicates."""
 
@@ -69,6 +60,8 @@ class Times(NamedTuple):
     stopped_early: bool  # whether one did not have all generations
 
 
+# mean, least and most CPU time of a replicate that was not run yet [s], None: unknown; its origin
+Estimate = tuple[float | None, float | None, float | None, str]
 KEYS = PlannedCondition._fields
 
 
@@ -200,28 +193,22 @@ class StoredTimes:
         return tuple(other[:12] for other in same if other != condition_id)
 
     def estimate(self, condition: Condition, run: RunDirectory, settings: Any) -> Estimate:
-        """Estimate the CPU time of a replicate: from its own ones, else from runs like it.
-
-        Args:
-            condition: Of which replicates shall be run.
-            run: Where those that were run are stored.
-            settings: Of the condition, as plain data.
-        """
+        """Estimate the CPU time of a replicate: from its own ones, else from runs like it."""
         if (own := _times(run)).cpu_s:
             widening = 1.0 if len(own.cpu_s) >= FEW else 2.0
             least, most = min(own.cpu_s) / widening, max(own.cpu_s) * widening
             mean = float(np.mean(own.cpu_s))
-            return Estimate(mean, least, most, f"{len(own.cpu_s)} of its own")
+            return mean, least, most, f"{len(own.cpu_s)} of its own"
         scene = _scene(settings)
         if scene not in self._known:
             runs = map(_times, self._alike.get(scene, ()))
             self._known[scene] = [times for times in runs if any(times.evaluations)]
         if not (alike := self._known[scene]):
-            return Estimate(None, None, None, "nothing stored like it")
+            return None, None, None, "nothing stored like it"
         generations = range(min(condition.planner.num_generations, 10_000) + 1)
         least, most = bounds(alike, sum(map(condition.planner.num_evaluations, generations)))
         source = f"{len(alike)} other runs of the scene"
-        return Estimate(float(np.sqrt(least * most)), least, most, source)
+        return float(np.sqrt(least * most)), least, most, source
 
 
 def bounds(alike: Sequence[Times], evaluations: int) -> tuple[float, float]:

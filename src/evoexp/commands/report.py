@@ -4,10 +4,11 @@ import argparse
 import contextlib
 import functools
 import io
+import itertools
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from evoexp.commands import compare
 from evoexp.commands.arguments import add_experiment_arguments
@@ -24,14 +25,8 @@ from evoexp.report.pages.home_page import summaries
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
+PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
 ASSUMPTIONS = "assumptions"  # stands for the experiments of that name, one per paper
-
-
-class PlannedReport(NamedTuple):
-    """A report to be drawn: its folder's name, and the function that draws it."""
-
-    folder: str
-    draw: Callable[[], build.ReportFiles]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,12 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _main_of_all(arguments: argparse.Namespace) -> int:
-    """Draw all reports and the home page, or check them.
-
-    Raises:
-        SettingError: If words are given, too.
-        NothingStored: If nothing is stored.
-    """
+    """Draw all reports and the home page, or check them."""
     given = [*arguments.overrides, *arguments.only, *(["-m"] if arguments.multirun else [])]
     if given:
         raise SettingError("--all", "given alone", " ".join(given))
@@ -90,7 +80,7 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
     failed: list[str] = []
     reports = _drawn(planned, failed)
     if arguments.check:
-        code = _check(_with_home(reports))
+        code = _check(itertools.chain(reports, (home_files() for _ in range(1))))
     else:
         code = 0
         for report in reports:
@@ -100,11 +90,7 @@ def _main_of_all(arguments: argparse.Namespace) -> int:
 
 
 def _check(reports: Iterable[build.ReportFiles]) -> int:
-    """Compare reports with what is on disk, and name every file that is not the same.
-
-    Returns:
-        The exit code: 1 if a file differs, is missing or left over.
-    """
+    """Compare reports with what is on disk, and name every file that is not the same."""
     num_reports = num_files = num_wrong = 0
     for report in reports:
         for line in _differences(report):
@@ -137,9 +123,6 @@ def _with_assumptions(words: Sequence[str]) -> list[str]:
     """Return the words with `assumptions` replaced by the papers' experiments of that name.
 
     An experiment that nothing is stored of is named instead, with the command that runs it.
-
-    Raises:
-        NothingStored: If nothing is stored of any of them.
     """
     every = [name for name in options("experiment") if name.endswith(f"_{ASSUMPTIONS}")]
     table, outputs = shipped(), outputs_root()
@@ -156,11 +139,6 @@ def _with_assumptions(words: Sequence[str]) -> list[str]:
 
 
 # all reports
-
-
-def _with_home(reports: Iterator[build.ReportFiles]) -> Iterator[build.ReportFiles]:
-    yield from reports
-    yield home_files()
 
 
 def _drawn(planned: Sequence[PlannedReport], failed: list[str]) -> Iterator[build.ReportFiles]:
@@ -186,10 +164,10 @@ def planned_reports(outputs: Path) -> Iterator[PlannedReport]:
             if budget != "paper":
                 folder, words = f"{name}@{budget}", [*words, f"budget={budget}"]
             seen.add(folder)
-            yield PlannedReport(folder, functools.partial(_of_experiment, words))
+            yield folder, functools.partial(_of_experiment, words)
     for each in summaries(outputs / "reports"):
         if each.folder not in seen:
-            yield PlannedReport(each.folder, functools.partial(_again, each.folder, each.command))
+            yield each.folder, functools.partial(_again, each.folder, each.command)
 
 
 def _of_experiment(words: Sequence[str]) -> build.ReportFiles:
@@ -239,12 +217,7 @@ def _notes(run: RunDirectory) -> dict[str, Any]:
 
 
 def _again(folder: str, command: str) -> build.ReportFiles:
-    """Draw a report by the command that its page names; nothing is written.
-
-    Raises:
-        StoreError: If it names no command that draws a report.
-        EvoexpError: If that cannot be done any more.
-    """
+    """Draw a report by the command that its page names; nothing is written."""
     name, *words = _words(command)
     if name not in ("report", "compare"):
         raise StoreError(f"{folder}: names no command that draws it")

@@ -40,17 +40,14 @@ class ReportRequest(NamedTuple):
         return build.write_report(self.files())
 
 
-class Chosen(NamedTuple):
-    """Stored runs, or experiments with the overrides that apply to all of them."""
-
-    runs: dict[str, Condition]  # by the first digits of their hashes; empty: experiments are meant
-    experiments: list[Experiment]
-    overrides: list[str]
-    settings: ReportSettings  # of the first experiment; of runs those of the paper's report
-
-
-def chosen(arguments: argparse.Namespace) -> Chosen:
+def chosen(
+    arguments: argparse.Namespace,
+) -> tuple[dict[str, Condition], list[Experiment], list[str], ReportSettings]:
     """Return the experiments or the stored runs that the words of a command choose.
+
+    Returns:
+        Runs by the first digits of their hashes, or experiments and the overrides that apply to all
+        of them; the settings of the first experiment, of runs those of the paper's report.
 
     Raises:
         UnknownOption: If a word is neither an experiment nor a hash.
@@ -68,7 +65,7 @@ def chosen(arguments: argparse.Namespace) -> Chosen:
         runs = [resolve(outputs_root(), name) for name in names]
         conditions = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
         plain = compose.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
-        return Chosen(conditions, [], [], plain.report)
+        return conditions, [], [], plain.report
     for name in unknown:
         if len(unknown) < len(names) or not _HASH.fullmatch(name):
             raise UnknownOption("experiment", name, known)
@@ -76,15 +73,11 @@ def chosen(arguments: argparse.Namespace) -> Chosen:
     experiments = compose.expand(
         [*words, *overrides], multirun=multirun or len(names) > 1, only=only
     )
-    return Chosen({}, experiments, overrides, experiments[0].report)
+    return {}, experiments, overrides, experiments[0].report
 
 
 def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str], list[str]]:
-    """Read `rana_planar@smoke`, as the folder of a report is named, as its words.
-
-    Raises:
-        SettingError: If experiments are named with several budgets.
-    """
+    """Read `rana_planar@smoke`, as the folder of a report is named, as its words."""
     parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
     budgets = {f"budget={budget}" for _, at, budget in parted if at}
     if not budgets:
@@ -96,11 +89,7 @@ def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str],
 
 
 def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
-    """Return a report of every named experiment, or a single report of all named runs.
-
-    Raises:
-        EvoexpError: As `chosen`.
-    """
+    """Return a report of every named experiment, or a single report of all named runs."""
     runs, experiments, overrides, settings = chosen(arguments)
     if runs:
         name = "+".join(runs)

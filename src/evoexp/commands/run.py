@@ -27,8 +27,7 @@ from evoexp.configuration import compose
 from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.search_path import folders, options
 from evoexp.errors import SettingError, printable
-from evoexp.extras import lacking
-from evoexp.registry import COMPONENTS, registrations
+from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.pages import page_registration
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -109,11 +108,7 @@ def _command(arguments: argparse.Namespace) -> str:
 
 
 def _that_can_run(experiment: Experiment) -> list[Labelled]:
-    """Return the conditions of an experiment, without those that need an extra that is not there.
-
-    Raises:
-        SettingError: If all of them do.
-    """
+    """Return the conditions of an experiment that need no extra that is not there."""
     lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
     for label, what in lacks.items():
         if what:
@@ -167,7 +162,10 @@ def _show(experiments: Sequence[Experiment], arguments: argparse.Namespace) -> N
         for experiment in experiments:
             say(summary_table(experiment))
         return
-    sources = _stamps([*_code(), *(folder.path for folder in folders()), outputs_root() / "runs"])
+    packages = {each.module.partition(".")[0] for each in registrations(COMPONENTS)}
+    specs = filter(None, map(importlib.util.find_spec, packages))
+    code = [Path(place) for spec in specs for place in spec.submodule_search_locations or ()]
+    sources = _stamps([*code, *(folder.path for folder in folders()), outputs_root() / "runs"])
 
     def drawn(experiment: Experiment) -> str:
         say(summary_table(experiment))
@@ -201,14 +199,6 @@ def _stamps(roots: Iterable[Path]) -> str:
             status = path.stat()
             digest.update(repr((str(path), status.st_size, status.st_mtime_ns)).encode())
     return digest.hexdigest()
-
-
-def _code() -> list[Path]:
-    """Return the folders with the code of evoexp and of all guests."""
-    packages = {each.module.partition(".")[0] for each in registrations(COMPONENTS)}
-    specs = [importlib.util.find_spec(package) for package in sorted(packages)]
-    found = (spec.submodule_search_locations or () for spec in specs if spec is not None)
-    return [Path(location) for locations in found for location in locations]
 
 
 def summary_table(experiment: Experiment) -> Table:

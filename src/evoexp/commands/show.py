@@ -204,12 +204,7 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
-    """Yield the facts about a condition as aligned lines.
-
-    Args:
-        facts: As `facts` gives them.
-        width: Columns of the terminal.
-    """
+    """Yield the facts about a condition as aligned lines."""
     for name, text in _entries(facts):
         room = max(width - INDENT, 30)
         lines = [

@@ -36,16 +36,26 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def write_site() -> None:
-    """Write the home page, and name it.
-
-    Raises:
-        NothingStored: If there is neither a report nor a run.
-    """
+    """Write the home page, and name it."""
     directory, files = home_files()
     directory.mkdir(parents=True, exist_ok=True)
     write_file(directory / HTML, files[HTML])
     say(f"site: {directory / HTML}")
-    _say_busy()
+    # unfinished runs that another process is writing now
+    busy = [
+        name
+        for name, run in stored_runs(outputs_root())
+        if isinstance(run, RunDirectory)
+        and run.num_planned() > len(run.completed())
+        and run.is_being_written()
+    ]
+    if busy:
+        more = ", …" if len(busy) > MAX_NAMED else ""
+        which = "runs are" if len(busy) > 1 else "run is"
+        say(
+            f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
+            "their results are partial"
+        )
 
 
 def home_files() -> ReportFiles:
@@ -62,24 +72,6 @@ def home_files() -> ReportFiles:
         )
     runs.sort(key=lambda run: (run.experiment, run.budget, run.label, run.hash12))
     return ReportFiles(outputs / "reports", {HTML: home_page(found, papers(), runs)})
-
-
-def _say_busy() -> None:
-    """Name the unfinished runs that another process is writing now."""
-    busy = [
-        name
-        for name, run in stored_runs(outputs_root())
-        if isinstance(run, RunDirectory)
-        and run.num_planned() > len(run.completed())
-        and run.is_being_written()
-    ]
-    if busy:
-        more = ", …" if len(busy) > MAX_NAMED else ""
-        which = "runs are" if len(busy) > 1 else "run is"
-        say(
-            f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
-            "their results are partial"
-        )
 
 
 def papers() -> list[Paper]:

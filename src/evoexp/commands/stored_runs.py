@@ -5,7 +5,7 @@ from pathlib import Path
 from evoexp import shipped
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
-from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
+from evoexp.errors import AmbiguousHash, EvoexpError, NothingStored, UnknownHash
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, open_run, outputs_root, resolve, run_names
 
@@ -27,13 +27,14 @@ def stored_run(prefix: str) -> RunDirectory:
     """Return the stored run whose hash begins with a prefix.
 
     Raises:
+        NothingStored: If it is that of a shipped condition which was not run here.
         UnknownHash: If there is none; lists those that there are.
         AmbiguousHash: If there are several.
     """
-    try:
-        return resolve(outputs_root(), prefix)
-    except UnknownHash as error:
-        raise _with_candidates(error, prefix) from None
+    run = stored_or_shipped(prefix)
+    if isinstance(run, RunDirectory):
+        return run
+    raise NothingStored(f"condition {run.condition_id[:12]}: not run here; run it: {run.command}")
 
 
 def stored_or_shipped(prefix: str) -> RunDirectory | Shipped:
@@ -50,7 +51,14 @@ def stored_or_shipped(prefix: str) -> RunDirectory | Shipped:
         if len(rows) > 1:
             raise AmbiguousHash(prefix, [row.condition_id[:12] for row in rows]) from None
         if not rows:
-            raise _with_candidates(error, prefix) from None
+            if prefix in options("experiment"):
+                hint = f"did you mean 'experiment={prefix}'?"
+                raise UnknownHash(f"{error}; {hint}") from None
+            names = run_names(outputs_root())
+            more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+            stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
+            hint = f"no shipped condition either (stored: {stored}; see: evoexp list)"
+            raise UnknownHash(f"{error}; {hint}") from None
         return rows[0]
 
 
@@ -60,13 +68,3 @@ def shipped_experiment(row: Shipped) -> Experiment:
 
     words = [f"experiment={row.experiment}", f"budget={row.budget}"]
     return compose.expand(words, only=[row.label])[0]
-
-
-def _with_candidates(error: UnknownHash, prefix: str) -> UnknownHash:
-    """Return an error about a hash with what may have been meant."""
-    if prefix in options("experiment"):
-        return UnknownHash(f"{error}; did you mean 'experiment={prefix}'?")
-    names = run_names(outputs_root())
-    more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-    stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
-    return UnknownHash(f"{error}; no shipped condition either (stored: {stored}; see: evoexp list)")

@@ -1,6 +1,7 @@
 """`evoexp verify`: whether a store is whole, and the commands that mend it."""
 
 import argparse
+import contextlib
 import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ from evoexp.commands.console import (
 )
 from evoexp.commands.stored_runs import stored_run
 from evoexp.store.identity import CONFIG
-from evoexp.store.integrity import LogCheck, RunCheck, check_logs, check_rows, check_run
+from evoexp.store.integrity import LogCheck, RunCheck, check_log, check_rows, check_run
 from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, run_names
 
 LARGE = 8_000_000  # [B] of logs from which on worker processes check them
@@ -106,26 +107,21 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
         for start in range(0, len(own), PART)
     ]
     size = sum(path.lstat().st_size for own in paths for path in own)
-    if (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2:
-        yield from _by_run(paths, itertools.starmap(_check, parts))
-        return
-    with Workers(min(num_cores(), len(parts))) as workers:
-        yield from _by_run(paths, in_order(workers, _check, parts))
-
-
-def _by_run(
-    paths: Sequence[Sequence[Path]], checks: Iterator[list[LogCheck]]
-) -> Iterator[list[LogCheck]]:
-    """Yield the checks of every run's logs."""
-    flat = itertools.chain.from_iterable(checks)
-    for own in paths:
-        yield list(itertools.islice(flat, len(own)))
+    is_small = (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2
+    with contextlib.ExitStack() as stack:
+        checks: Iterator[list[LogCheck]] = itertools.starmap(_check, parts)
+        if not is_small:
+            workers = stack.enter_context(Workers(min(num_cores(), len(parts))))
+            checks = in_order(workers, _check, parts)
+        flat = itertools.chain.from_iterable(checks)
+        for own in paths:
+            yield list(itertools.islice(flat, len(own)))
 
 
 def _check(paths: list[Path], condition_id: str) -> list[LogCheck]:
     from evoexp.batch.stored_solutions import contradictions  # planners, which take long to load
 
-    return check_logs(paths, condition_id, contradictions)
+    return [check_log(path, condition_id, contradictions) for path in paths]
 
 
 def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:

@@ -51,10 +51,6 @@ def known_instead(config: dict[str, Any], override: Override) -> list[str] | Non
     A component that reads files, and all that is no component, is not looked into: whether there is
     such a setting is checked with its value.
 
-    Args:
-        config: Composed options.
-        override: Of a setting or a group.
-
     Returns:
         None if the override concerns this configuration; no names if no option of the override's
         group is chosen.
@@ -128,9 +124,6 @@ def _child(node: Any, override: Override, depth: int) -> Any:
         node: Where the first `depth` parts of the path lead.
         override: Gives the path, and whether a list may grow.
         depth: Number of the step, from 0.
-
-    Raises:
-        SettingError: If no path leads on from there.
     """
     parts = override.key.split(".")
     part, field = parts[depth], ".".join(parts[: depth + 1])

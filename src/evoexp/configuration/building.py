@@ -11,7 +11,7 @@ from evoexp.configuration.named_states import with_named_states
 from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
 from evoexp.configuration.planning_groups import with_planning_group, with_shared_packages
 from evoexp.configuration.refusals import chosen
-from evoexp.configuration.search_path import file_directories
+from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, UnknownSetting
 from evoexp.registry import component_class
 from evoexp.validation import TARGET, Settings, build, settings_error
@@ -46,7 +46,8 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
     Raises:
         EvoexpError: For a value that cannot be, or parts that do not go together.
     """
-    read = read_files(with_shared_packages(config), file_directories(), with_planning_group)
+    beside = [folder.path / "scenario" for folder in folders()]  # where files lie
+    read = read_files(with_shared_packages(config), beside, with_planning_group)
     plain = with_named_states(read)
     # groups that the planner takes in, whose errors name the group, as it was typed
     for group in (group for group in PLANNER_PARTS if plain.get(group) is not None):
@@ -75,11 +76,7 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
 
 
 def planned_replicates(count: Any, budget: Budget) -> int:
-    """Return the number of replicates, capped by the budget.
-
-    Raises:
-        SettingError: If it is no number of replicates.
-    """
+    """Return the number of replicates, capped by the budget."""
     if type(count) is not int or count < 1:
         raise SettingError("num_replicates", "a whole number, at least 1", count)
     if count > MOST_REPLICATES:
@@ -88,11 +85,7 @@ def planned_replicates(count: Any, budget: Budget) -> int:
 
 
 def build_settings(kind: type[AnySettings], config: dict[str, Any], group: str) -> AnySettings:
-    """Build the settings of a group that is no component.
-
-    Raises:
-        EvoexpError: For a value that cannot be, or an unknown setting.
-    """
+    """Build the settings of a group that is no component."""
     if TARGET in config:
         raise UnknownSetting(f"{group}.{TARGET}", kind.model_fields)
     values = build(config, component_class, group)

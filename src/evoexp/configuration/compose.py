@@ -28,7 +28,7 @@ from evoexp.configuration.building import build_settings, planned_replicates
 from evoexp.configuration.conditions import Builder, Built, Composed, Entry, concerning
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
 from evoexp.configuration.interpolations import fill_in
-from evoexp.configuration.option_files import check_file, check_files
+from evoexp.configuration.option_files import check_file
 from evoexp.configuration.overrides import (
     ADD,
     DELETE,
@@ -95,11 +95,7 @@ def expand(
 
 
 def parse(text: str) -> Override:
-    """Read one override.
-
-    Raises:
-        SettingError: If it is none.
-    """
+    """Read one override."""
     key, _, typed = text.partition("=")
     if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
         return Override("", key, (Value(typed, typed),), False, text)
@@ -149,15 +145,12 @@ class Composer:
         (root / EXPERIMENT).mkdir()
         for folder in folders():
             if folder.origin != shipped.ORIGIN:
-                check_files(folder.path)
+                for path in sorted(folder.path.glob("*/*.yaml")):
+                    check_file(path)
         self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
 
     def __call__(self, overrides: Choice) -> Composed:
-        """Return the options that overrides choose, with the settings that overrides change.
-
-        Raises:
-            EvoexpError: If they cannot be composed.
-        """
+        """Return the options that overrides choose, with the settings that overrides change."""
         base = self.chosen(overrides)
         config = copy.deepcopy(base.config)
         assign_all(config, {key: each for key, each in overrides.items() if key not in groups()})

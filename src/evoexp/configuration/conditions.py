@@ -61,14 +61,7 @@ class Builder:
     def __init__(
         self, name: str, entries: Sequence[Entry], compose: Composes, budget: Budget
     ) -> None:
-        """Keep the experiment, and who composes it.
-
-        Args:
-            name: Of the experiment, which is the label of a condition that has no other.
-            entries: Of the experiment's file.
-            compose: Composes a choice.
-            budget: Caps the conditions.
-        """
+        """Keep the experiment, and who composes it."""
         self.name, self.budget = name, budget
         self._entries, self._compose = entries, compose
         self._known: dict[frozenset[str], Built] = {}
@@ -142,12 +135,7 @@ class Builder:
                     yield Crossed(self.name, label, swept, problem, own, typed, choice)
 
     def _concerning(self, choice: Choice, own: Choice) -> Choice:
-        """Return the overrides of the command line that concern a condition.
-
-        Args:
-            choice: Of the command line, each with one value.
-            own: Of the condition's entry.
-        """
+        """Return the overrides of the command line that concern a condition."""
         planner = str(self._compose.chosen({**own, **choice}).config.get("planner"))
         parts = [key for key in choice if key in PLANNER_PARTS and choice[key].option()]
         not_taken = {key for key in parts if f"{MARK}{key}" not in planner}

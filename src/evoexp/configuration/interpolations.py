@@ -22,9 +22,6 @@ _MAX_DEPTH = 100  # of settings taken from settings; deeper ones go round in cir
 def fill_in(values: Mapping[str, Any], config: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings with others in the place of interpolations.
 
-    Args:
-        config: All settings, from which they may be taken.
-
     Raises:
         SettingError: If an interpolation is more than the name of a setting that exists.
     """

@@ -59,11 +59,7 @@ Holds = Callable[[Crossed, Choice], bool]  # whether a condition is the same wit
 
 
 def refuse_equal_labels(rows: Iterable[Crossed]) -> None:
-    """Refuse labels that occur twice, or cannot be printed.
-
-    Raises:
-        SettingError: Naming the first one.
-    """
+    """Refuse labels that occur twice, or cannot be printed."""
     labels = set[str]()
     for row in rows:
         if not row.label.isprintable():

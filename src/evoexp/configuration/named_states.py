@@ -16,9 +16,6 @@ def with_named_states(config: dict[str, Any]) -> dict[str, Any]:
 
     `q_start: ready` counts for all arms, `q_start: [ready, folded]` for one each.
 
-    Args:
-        config: All groups, files read.
-
     Raises:
         SettingError: If the robot has no such state, or not of all joints that move.
     """

@@ -13,23 +13,10 @@ MOST_NESTED = 50  # lists and mappings in each other
 MOST_VALUES = 100_000  # once every alias (`*name`) stands for a copy of what it names
 
 
-def check_files(folder: Path) -> None:
-    """Check all options in the groups of a folder.
-
-    Raises:
-        SettingError: As `check_file`.
-    """
-    for path in sorted(folder.glob("*/*.yaml")):
-        check_file(path)
-
-
 def check_file(path: Path) -> None:
     """Refuse an option file that is too large, or that unfolds to too many values.
 
     Whether it can be composed otherwise is not looked at.
-
-    Raises:
-        SettingError: Naming it.
     """
     try:
         content = read_bounded(path, MAX_FILE)

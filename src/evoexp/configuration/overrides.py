@@ -69,11 +69,7 @@ Choice = Mapping[str, Override]  # by key, each with one value
 
 
 def collect(overrides: Iterable[Override]) -> dict[str, Override]:
-    """Return overrides by key, after refusing those that no configuration can take.
-
-    Raises:
-        EvoexpError: For a key that cannot be set or is given twice, or an unknown option.
-    """
+    """Return overrides by key, after refusing those that no configuration can take."""
     found: dict[str, Override] = {}
     for override in overrides:
         known = found.setdefault(override.key, override)
@@ -123,15 +119,7 @@ def _check_setting(override: Override) -> None:
 
 
 def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
-    """Refuse overrides that are swept over but may not be.
-
-    Args:
-        overrides: By key.
-        multirun: Whether sweeps were asked for.
-
-    Raises:
-        SettingError: Naming the first one.
-    """
+    """Refuse overrides that are swept over but may not be."""
     for key, override in overrides.items():
         if override.is_swept and not multirun:
             raise SettingError(key, "one value (or add -m to sweep over several)", override.typed)
@@ -159,11 +147,7 @@ def sweep(overrides: Choice) -> Iterator[dict[str, Override]]:
 
 
 def sweep_texts(overrides: Choice, choice: Choice) -> dict[str, str]:
-    """Return key → `name=value` of the swept overrides that a combination has.
-
-    Args:
-        overrides: By key, as they are swept over.
-    """
+    """Return key → `name=value` of the swept overrides that a combination has."""
     short = short_names([key for key, override in overrides.items() if override.is_swept])
     return {
         key: f"{name}={choice[key].values[0].text}" for key, name in short.items() if key in choice
@@ -186,9 +170,6 @@ def expand_entry(
 
     Yields:
         Label and overrides with one value of each condition.
-
-    Raises:
-        EvoexpError: If an override or the label cannot be.
     """
     field, parsed = f"conditions.{template}", collect(overrides)
     for key, override in parsed.items():

@@ -22,11 +22,7 @@ TURNING, SLIDING = ("revolute", "continuous"), "prismatic"
 
 
 def with_shared_packages(plain: dict[str, Any]) -> dict[str, Any]:
-    """Return a configuration whose planning scene finds meshes in the robot's packages, too.
-
-    Args:
-        plain: Groups as plain data, before files are read.
-    """
+    """Return a configuration whose planning scene finds meshes in the robot's packages, too."""
     robot, scenario = (plain.get(part) for part in PARTS[:2])
     if not isinstance(scenario, dict) or scenario.get(TARGET) != MoveitTask.component:
         return plain
@@ -39,9 +35,6 @@ def with_shared_packages(plain: dict[str, Any]) -> dict[str, Any]:
 
 def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
     """Return a configuration whose robot is as the request wants it, if a request there is.
-
-    Args:
-        plain: Groups as plain data, files as hashes.
 
     Raises:
         SettingError: If robot and request contradict each other.

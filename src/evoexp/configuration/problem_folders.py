@@ -6,7 +6,6 @@ problems, as the data set MotionBenchMaker does.
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from evoexp.attachments import located
 from evoexp.configuration.overrides import Choice, Override, Value
@@ -16,59 +15,40 @@ FOLDER, SCENE, REQUEST = "scenario.folder", "scenario.scene", "scenario.request"
 MOST_PROBLEMS = 10_000  # conditions of one call
 
 
-class ProblemFiles(NamedTuple):
-    """A problem of a folder."""
-
-    name: str  # the folder's name and the number: `box_panda 0001`
-    scene: Path  # path of the planning scene
-    request: Path  # path of the motion plan request
-
-
 def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
     """Yield label and overrides of every problem of a folder; without one, the overrides as given.
 
-    Args:
-        choice: Overrides by key, each with one value.
+    A label is the folder's name and the number, `box_panda 0001`; problems come in the order of the
+    paths of their scenes.
 
     Raises:
-        SettingError: If the folder holds no problem, or a scene is named beside it.
+        SettingError: If the folder holds no problem or too many, a scene has no request, or one is
+            named beside the folder.
     """
     if FOLDER not in choice:
         yield "", choice
         return
-    given = choice[FOLDER]
-    folder = str(given.values[0].data) if given.values else ""
     for key in (SCENE, REQUEST):
         if key in choice:
             raise SettingError(key, f"left out beside {FOLDER}", choice[key].text)
-    rest = {key: override for key, override in choice.items() if key != FOLDER}
-    for problem in problems(folder):
-        files = {SCENE: str(problem.scene), REQUEST: str(problem.request)}
-        yield problem.name, rest | {key: _setting(key, path) for key, path in files.items()}
-
-
-def problems(folder: str) -> list[ProblemFiles]:
-    """Return the problems of a folder, and of the folders in it, in the order of their names.
-
-    Raises:
-        SettingError: If there are none or too many, or a scene has no request.
-    """
+    given = choice[FOLDER]
+    folder = str(given.values[0].data) if given.values else ""
     root = Path(located(folder))
     if "\0" in folder or not root.is_dir():
         raise SettingError(FOLDER, "a folder of problems", folder)
-    found = []
-    for scene in sorted([*root.glob("scene*.yaml"), *root.glob("*/scene*.yaml")]):
+    scenes = sorted([*root.glob("scene*.yaml"), *root.glob("*/scene*.yaml")])
+    if not scenes or len(scenes) > MOST_PROBLEMS:
+        must = f"a folder of 1 to {MOST_PROBLEMS:,} problems (scene0001.yaml, request0001.yaml, …)"
+        raise SettingError(FOLDER, must, f"{folder} with {len(scenes) or 'none'}")
+    rest = {key: override for key, override in choice.items() if key != FOLDER}
+    for scene in scenes:
         number = scene.stem.removeprefix("scene")
         request = scene.with_name(f"request{number}.yaml")
         if not request.is_file():
             raise SettingError(FOLDER, f"a folder with {request.name} beside every scene", folder)
-        name = f"{scene.resolve().parent.name} {number}".strip()
-        found.append(ProblemFiles(name, scene, request))
-    if not found or len(found) > MOST_PROBLEMS:
-        must = f"a folder of 1 to {MOST_PROBLEMS:,} problems (scene0001.yaml, request0001.yaml, …)"
-        raise SettingError(FOLDER, must, f"{folder} with {len(found) or 'none'}")
-    return found
-
-
-def _setting(key: str, path: str) -> Override:
-    return Override("", key, (Value(path, path),), False, f"{key}={path}")
+        paths = {SCENE: str(scene), REQUEST: str(request)}
+        files = {
+            key: Override("", key, (Value(path, path),), False, f"{key}={path}")
+            for key, path in paths.items()
+        }
+        yield f"{scene.resolve().parent.name} {number}".strip(), rest | files

@@ -22,11 +22,7 @@ def chosen(group: str) -> str:
 
 
 def unparsed(text: str) -> SettingError:
-    """Return the refusal of an override that cannot be read.
-
-    Args:
-        text: As typed.
-    """
+    """Return the refusal of an override that cannot be read."""
     key, equals, value = text.partition("=")
     if not equals or not re.fullmatch(r"[~+]*[A-Za-z_][\w.\[\]]*", key):
         return SettingError("override", "key=value", text)
@@ -62,7 +58,8 @@ def uncomposed(
         return SettingError(deleted[2], "an option that is chosen, to be deleted", f"~{deleted[1]}")
     files = {group: name for group, name in choices.items() if name}
     group = EXPERIMENT if EXPERIMENT in files else next(iter(files), EXPERIMENT)
-    must = f"an option whose file can be composed ({_first_line(error)})"
+    reason = next(iter(text.strip().splitlines()), type(error).__name__)
+    must = f"an option whose file can be composed ({reason})"
     return SettingError(group, must, files.get(group))
 
 
@@ -89,7 +86,3 @@ def _miswritten(file: Option) -> EvoexpError | None:
             if group in groups() and name is not None and str(name) not in options(group):
                 return UnknownOption(group, str(name), options(group))
     return None
-
-
-def _first_line(error: Exception) -> str:
-    return next(iter(str(error).strip().splitlines()), type(error).__name__)

@@ -44,9 +44,6 @@ def searched_first(directories: Iterable[str]) -> Iterator[None]:
 
     Args:
         directories: As typed after `--config-dir`, the first one to be searched first.
-
-    Raises:
-        SettingError: If one is no folder.
     """
     token = _given.set(tuple(directories))
     try:
@@ -110,10 +107,6 @@ def options(group: str) -> list[str]:
 def find(group: str, name: str) -> Option:
     """Return an option: its file and where it comes from.
 
-    Args:
-        group: `ga`, say.
-        name: Of the option; of an experiment its file, too.
-
     Raises:
         UnknownOption: If there is none of this name; lists those that there are.
     """
@@ -136,11 +129,6 @@ def is_file(experiment: str) -> bool:
     return experiment.endswith(SUFFIXES)
 
 
-def origin(group: str, name: str) -> str:
-    """Return where an option comes from: a folder as typed, a package with its version, evoexp."""
-    return find(group, name).origin
-
-
 def description(experiment: str) -> str:
     """Return the line of an experiment file that says what the experiment is.
 
@@ -153,8 +141,3 @@ def description(experiment: str) -> str:
         if not words.startswith(("@package", "evoexp run")):
             return words
     return ""
-
-
-def file_directories() -> list[Path]:
-    """Return the folders where files lie that options refer to: beside the scenarios."""
-    return [folder.path / "scenario" for folder in folders()]

@@ -43,10 +43,21 @@ def _settled(named: str) -> Path:
             return folder
     temporary = Path(tempfile.mkdtemp(prefix="evoexp-"))
     os.environ[VARIABLE] = str(temporary)  # worker processes inherit it
-    atexit.register(_remove, temporary, os.getpid())
+    remove_at_exit(temporary)
     text = f"evoexp: {folder}: {reason}; kernels are compiled for this command and not kept"
     print(text, file=sys.stderr, flush=True)
     return temporary
+
+
+def remove_at_exit(folder: Path) -> None:
+    """Remove a folder when this process ends, and not when one that was forked from it does."""
+    process = os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == process:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
 
 
 def _made_private(folder: Path) -> str:
@@ -64,11 +75,6 @@ def _made_private(folder: Path) -> str:
 def is_own(path: Path) -> bool:
     """Return whether a file or folder is this user's; where nobody owns files, all are."""
     return not hasattr(os, "geteuid") or path.stat().st_uid == os.geteuid()
-
-
-def _remove(temporary: Path, process: int) -> None:
-    if os.getpid() == process:  # and not a worker that was forked from it
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def read_kept(path: Path) -> bytes:

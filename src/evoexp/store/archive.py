@@ -61,10 +61,6 @@ def pack(runs: Sequence[RunDirectory], path: Path) -> int:
 
     Summary tables, failures and whatever is no part of a run stay behind.
 
-    Args:
-        runs: The runs; they are only read.
-        path: Of the archive; it is replaced as a whole.
-
     Raises:
         StoreError: If a run is damaged beyond its logs.
     """
@@ -100,9 +96,6 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
 def take_in(path: Path, outputs: Path) -> list[TakenRun]:
     """Take the runs of an archive into a store; replicates that are there already stay.
 
-    Args:
-        outputs: Root of the store.
-
     Raises:
         ArchiveError: If it is no archive of runs, or damaged; what came before the damage is taken.
         Busy: If another process writes one of the runs.
@@ -129,7 +122,7 @@ def _take_in(path: Path, outputs: Path, file: BinaryIO) -> list[TakenRun]:
             if rest != CONFIG:
                 raise ArchiveError(f"{_shown(path)}: damaged: {member.name} comes before {CONFIG}")
             arrivals[hash12] = _Arrival(path, outputs, hash12, content)
-        elif member.is_log:
+        elif member.name.endswith(".mcap"):
             arrival.add(int(rest), content)
         else:
             arrival.add_beside(rest, content, sha256)
@@ -155,12 +148,7 @@ class _Arrival:
         self._begun = False
 
     def add_beside(self, name: str, content: bytes, sha256: str) -> None:
-        """Take a file beside the configuration in: one that it refers to at once.
-
-        Args:
-            name: In the run's directory.
-            sha256: Of its content.
-        """
+        """Take a file beside the configuration in: one that it refers to at once."""
         if not name.startswith(PREFIX):
             self._beside[name] = content if name != MANIFEST else self._foreign(content)
         elif name != PREFIX + sha256 or sha256.encode() not in self._config:
@@ -233,11 +221,6 @@ class _Member(NamedTuple):
     start: int  # offset of its content [B]
     size: int  # [B] of its content
 
-    @property
-    def is_log(self) -> bool:
-        """Whether it is a replicate's log."""
-        return _LOG.fullmatch(self.name) is not None
-
 
 def _members(path: Path, file: BinaryIO) -> Iterator[_Member]:
     """Yield the files of an archive by their heads alone; each is plain, and wholly there.
@@ -246,7 +229,8 @@ def _members(path: Path, file: BinaryIO) -> Iterator[_Member]:
     """
     end, names = file.seek(0, os.SEEK_END), set[str]()
     file.seek(0)
-    if kind := next((k for sign, k in _COMPRESSED.items() if _begins(file, sign)), ""):
+    begin = file.read(max(map(len, _COMPRESSED)))
+    if kind := next((kind for sign, kind in _COMPRESSED.items() if begin.startswith(sign)), ""):
         raise ArchiveError(f"{_shown(path)}: no archive of runs: compressed ({kind}); unpack it")
     start = 0
     while start + 2 * _BLOCK <= end:
@@ -285,13 +269,6 @@ def _entry(path: Path, head: bytes) -> tarfile.TarInfo:
     if not 0 <= entry.size <= limit:
         raise ArchiveError(f"{_shown(path)}: no archive of runs: a file is too large")
     return entry
-
-
-def _begins(file: BinaryIO, sign: bytes) -> bool:
-    """Return whether a file begins so; it is at its beginning before and after."""
-    found = file.read(len(sign)) == sign
-    file.seek(0)
-    return found
 
 
 def _content(file: BinaryIO, member: _Member) -> tuple[bytes, str]:

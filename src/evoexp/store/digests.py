@@ -19,14 +19,7 @@ class Chain:
     """
 
     def __init__(self, rng: "np.random.Generator") -> None:
-        """Start a chain, its link being empty.
-
-        Args:
-            rng: The replicate's generator; its bit generator must be a PCG64.
-
-        Raises:
-            TypeError: Another bit generator: its state has another layout.
-        """
+        """Start a chain, its link being empty."""
         demand_pcg64(rng.bit_generator)
         self._rng, self.link = rng, b""
 
@@ -37,10 +30,8 @@ class Chain:
     def extend(self, costs: bytes, best: bytes, state: bytes) -> str:
         """Append a generation and return its link in hex.
 
-        Args:
-            costs: `array_bytes` of its costs.
-            best: `array_bytes` of the best solution so far.
-            state: Of the generator behind it.
+        Costs and the best solution so far come from `array_bytes`; the state is the generator's
+        behind the generation.
         """
         self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
         return self.link.hex()

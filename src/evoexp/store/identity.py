@@ -78,11 +78,7 @@ def config_id(path: Path) -> str:
 
 
 def whole_log(path: Path, prefix: str) -> FoundLog | None:
-    """Return the first log in a run directory that is whole and of a condition, if there is one.
-
-    Args:
-        prefix: Of the condition's hash.
-    """
+    """Return the first log in a run directory that is whole and of a condition, if there is one."""
     for log in sorted((path / REPLICATES).glob("*.mcap")):
         try:
             contents = read_log(log)
@@ -95,11 +91,7 @@ def whole_log(path: Path, prefix: str) -> FoundLog | None:
 
 
 def read(path: Path) -> bytes:
-    """Return the content of a file.
-
-    Raises:
-        DamagedFile: It cannot be read, or is empty.
-    """
+    """Return the content of a file."""
     try:
         content = read_bounded(path)
     except OSError as error:
@@ -110,11 +102,7 @@ def read(path: Path) -> bytes:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Return the JSON object that a file holds.
-
-    Raises:
-        DamagedFile: It cannot be read, or is none.
-    """
+    """Return the JSON object that a file holds."""
     content = read(path)
     try:
         value = json.loads(content)
@@ -192,11 +180,7 @@ def _manifest_id(path: Path) -> str | None:
 
 
 def read_plans(path: Path) -> list[Plan]:
-    """Return the plans that a file holds, the first one first; none where there is no file.
-
-    Raises:
-        DamagedFile: The file is damaged.
-    """
+    """Return the plans that a file holds, the first one first; none where there is no file."""
     if not os.path.lexists(path):
         return []
     try:

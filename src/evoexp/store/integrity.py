@@ -8,7 +8,7 @@ the logs; it reads only. Mending is for who holds the lock; no reading command r
 
 A link of a log's chain cannot be computed again from the log, which does not hold what entered it:
 `reproduce` does that by running the replicate again. Solutions can be evaluated again: by whoever
-knows planners, see `check_logs`.
+knows planners, see `check_log`.
 """
 
 import hashlib
@@ -44,8 +44,7 @@ from evoexp.store.identity import (
 from evoexp.store.log_reader import LogContents, checked_summary, read_log, read_summary
 from evoexp.store.run_directory import RunDirectory, is_stored, open_run
 from evoexp.store.summaries import (
-    altered_rows,
-    altered_settings,
+    altered,
     damaged_logs,
     replicate_of,
     table_damage,
@@ -83,27 +82,17 @@ class RunCheck(NamedTuple):
 
 
 def check_run(outputs: Path, name: str) -> RunCheck:
-    """Look at a stored run's files, but for its logs.
-
-    Args:
-        outputs: Root of all outputs.
-        name: Of the run's directory.
-    """
-    try:
-        return _check_files(outputs, name)
-    except OSError as error:
-        problem = f"{error.filename}: {error.strerror}; change its permissions"
-        return RunCheck(name, None, {"cannot be read": problem}, [])
-
-
-def _check_files(outputs: Path, name: str) -> RunCheck:
+    """Look at a stored run's files, but for its logs."""
     path = outputs / "runs" / name
-    leftovers = list(_leftovers(path))
     try:
+        leftovers = list(_leftovers(path))
         run = open_run(outputs, name)
         problems = damaged_files(run)
     except StoreError as error:
         return RunCheck(name, None, {CONFIG: reason(path / CONFIG, error)}, leftovers)
+    except OSError as error:
+        problem = f"{error.filename}: {error.strerror}; change its permissions"
+        return RunCheck(name, None, {"cannot be read": problem}, [])
     if (lost := _lost(run)) and not run.is_being_written():
         problems[REPLICATES] = lost
     if damage := table_damage(run):
@@ -119,10 +108,7 @@ def _check_files(outputs: Path, name: str) -> RunCheck:
 
 def _lost(run: RunDirectory) -> str:
     """Tell which replicates were asked for and left neither log nor failure; empty: none."""
-    try:
-        asked = max((plan.num_replicates for plan in run.plans()), default=0)
-    except StoreError:
-        return ""
+    asked = run.num_asked()
     there = {k for k in run.completed() | run.failed() if k < asked}
     if len(there) >= asked:
         return ""
@@ -134,28 +120,21 @@ def _lost(run: RunDirectory) -> str:
     )
 
 
-def check_logs(
-    paths: list[Path], condition_id: str, evaluate: Evaluation | None = None
-) -> list[LogCheck]:
-    """Look at logs of a run, each as a whole.
+def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
+    """Look at a log of a run as a whole; the name of its file tells its replicate.
 
     Args:
-        paths: Of the logs; their names tell their replicates.
         condition_id: Of the run, 64 hex digits.
         evaluate: Evaluates the solutions of a log that is whole; it raises `EvoexpError` where it
             cannot.
     """
-    return [_check_log(path, condition_id, evaluate) for path in paths]
-
-
-def _check_log(path: Path, condition_id: str, evaluate: Evaluation | None) -> LogCheck:
     summary, problem, unevaluated = None, "", ""
     try:
         log = read_log(path)
         summary = log.summary
         log.arrays()  # each is one
         problem = next(_contradictions(log, condition_id, int(path.stem)), "")
-        if not problem and evaluate is not None:
+        if not problem:
             try:
                 problem = next((f"altered: {each}" for each in evaluate(path, log)), "")
             except EvoexpError as error:
@@ -178,13 +157,8 @@ def _seems_whole(path: Path, condition_id: str) -> bool:
 def check_rows(run: RunDirectory, logs: list[LogCheck]) -> dict[str, str]:
     """Return file → problem where rows of the summary table do not repeat their logs."""
     whole = {log.name: log.summary for log in logs if log.summary and not log.problem}
-    names = altered_rows(run, whole)
-    if not names:
-        columns = altered_settings(run)
-        told = f"altered: {columns[0]} is not the setting{DELETE}" if columns else ""
-        return {"summary.parquet": told} if told else {}
-    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-    return {"summary.parquet": f"altered: it does not repeat {names[0]}{more}{DELETE}"}
+    problem = altered(run, whole)
+    return {"summary.parquet": problem + DELETE} if problem else {}
 
 
 def _contradictions(log: LogContents, condition_id: str, replicate: int) -> Iterator[str]:
@@ -311,31 +285,22 @@ def lost_replicates(run: RunDirectory) -> set[int]:
 
     Others, which somebody put there, are set aside and not run again.
     """
-    try:
-        asked = max((plan.num_replicates for plan in run.plans()), default=0)
-    except DamagedFile:
-        asked = 0
-    whole = whole_logs(run)
-    return {replicate for replicate in run.completed() - whole if replicate < asked}
+    asked = run.num_asked()
+    return {replicate for replicate in run.completed() - whole_logs(run) if replicate < asked}
 
 
 def _set_aside(run: RunDirectory, files: dict[str, str], then: str) -> None:
-    names = [set_aside(path).name for path in _present(run.path, files)]
+    there = [run.path / name for name in files if os.path.lexists(run.path / name)]
+    names = [set_aside(path).name for path in there]
     kept = f"; kept as {', '.join(names[:2])}{', …' if len(names) > 2 else ''}" if names else ""
     shown = {Path(name).name: why for name, why in files.items()}
     warn(f"run {run.hash12}: damaged, and {then}: {listed(shown)}{kept}")
-
-
-def _present(folder: Path, names: dict[str, str]) -> list[Path]:
-    return [folder / name for name in names if os.path.lexists(folder / name)]
 
 
 def _is_of_another_version(path: Path) -> bool:
     """Return whether a log cannot be read because another version of evoexp wrote it."""
     try:
         read_summary(path)
-    except OtherVersion:
-        return True
-    except CorruptLog:
-        return False
+    except CorruptLog as error:
+        return isinstance(error, OtherVersion)
     return False

@@ -100,9 +100,6 @@ class Log:
             attachments: Further files that the condition needs, by name.
             environment: Versions, CPU features and what else may explain a difference; any JSON
                 values.
-
-        Raises:
-            ValueError: An attachment called like the configuration.
         """
         self._condition_id = condition_id
         self._replicate = replicate
@@ -188,9 +185,6 @@ class Log:
     def finish(self, summary: ReplicateSummary) -> Finished:
         """Close the log.
 
-        Args:
-            summary: The replicate's row; its digest is filled in here.
-
         Returns:
             The log's bytes and the completed summary.
 
@@ -226,14 +220,7 @@ class Log:
     def _add(
         self, topic: str, record: type, generation: int, data: bytes, terms: tuple[str, ...] = ()
     ) -> None:
-        """Append a message.
-
-        Args:
-            topic: Of its channel, which is registered with its first message.
-            record: Whose messages the channel has.
-            generation: Its index.
-            terms: Names of the terms that the record has besides its fields.
-        """
+        """Append a message."""
         self._size += len(data)
         if self._size > MAX_LOG:
             raise LogTooLarge(

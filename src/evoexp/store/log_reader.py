@@ -61,11 +61,7 @@ class LogContents(NamedTuple):
     cpu_s: FloatArray
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the attached arrays by their names, in alphabetical order.
-
-        Raises:
-            CorruptLog: If one of them is none.
-        """
+        """Return the attached arrays by their names, in alphabetical order."""
         return {
             name.removesuffix(written.ARRAY): decode_array(data)
             for name, data in sorted(self.attachments.items())
@@ -77,11 +73,7 @@ class _OpenLog:
     """A log of a run, checked."""
 
     def __init__(self, checked: CheckedLog, name: str) -> None:
-        """Look at what it says of itself.
-
-        Raises:
-            CorruptLog: It is a log of another program, or of another version.
-        """
+        """Look at what it says of itself."""
         self.name, self.reader = name, checked.reader
         records = [(each.name, each.metadata) for each in checked.metadata]
         self._metadata = self._by_name(records)
@@ -126,29 +118,20 @@ class _OpenLog:
 @contextmanager
 def _opened(source: Source) -> Iterator[_OpenLog]:
     """Check a log of a run and open it; a body that cannot be read is a damaged log."""
-    content, name = _content(source)
+    name = "log" if isinstance(source, bytes) else str(source)
+    try:
+        content = source if isinstance(source, bytes) else read_bounded(Path(source), MAX_LOG)
+    except OSError as error:
+        if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
+            raise
+        raise CorruptLog(f"{name}: cannot be read: {error.strerror or error}") from error
     checked = check(content, name)
     with unreadable_is_corrupt(name):
         yield _OpenLog(checked, name)
 
 
-def _content(source: Source) -> tuple[bytes, str]:
-    """Return the bytes of a log and the name that errors give it."""
-    if isinstance(source, bytes):
-        return source, "log"
-    try:
-        return read_bounded(Path(source), MAX_LOG), str(source)
-    except OSError as error:
-        if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
-            raise
-        raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
-
-
 def read_log(source: Source) -> LogContents:
     """Return everything that a log holds, verified.
-
-    Args:
-        source: Path of a log, or its bytes.
 
     Raises:
         CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be
@@ -254,40 +237,7 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
         }
 
 
-def array_names(source: Source) -> list[str]:
-    """Return the names of the arrays that are attached to a log, in alphabetical order.
-
-    Raises:
-        CorruptLog: As `read_log`, except that the content digest is not compared.
-    """
-    with _opened(source) as log:
-        names = sorted(log.attachments)
-        return [name.removesuffix(written.ARRAY) for name in names if name.endswith(written.ARRAY)]
-
-
-def read_array(source: Source, array: str) -> NDArray[Any]:
-    """Return one of the arrays that are attached to a log; nothing else is decoded.
-
-    Args:
-        source: Path of a log, or its bytes.
-        array: Its name, without `.npy`.
-
-    Raises:
-        KeyError: There is none of this name.
-        CorruptLog: As `read_log`, except that the content digest is not compared.
-    """
-    with _opened(source) as log:
-        data = log.attachments.get(array + written.ARRAY)
-        if data is not None:
-            return decode_array(data)
-    raise KeyError(array)
-
-
 def decode_array(data: bytes) -> NDArray[Any]:
-    """Return the array that a `.npy` attachment holds.
-
-    Raises:
-        CorruptLog: If it is none.
-    """
+    """Return the array that a `.npy` attachment holds."""
     with unreadable_is_corrupt("attached array"):
         return read_npy(data)

@@ -35,9 +35,6 @@ _DISTRIBUTIONS = (
 _VECTOR_PREFIXES = ("sse", "ssse", "avx", "fma", "f16c", "bmi", "amx", "asimd", "sve", "neon", "fp")
 
 
-_NO_COMPONENTS: Mapping[str, str] = {}
-
-
 class Difference(NamedTuple):
     """One entry in which two environments differ; None where one of them lacks it."""
 
@@ -50,16 +47,12 @@ class Difference(NamedTuple):
         return f"{self.name}: was {self.was}, now {self.now}"
 
 
-def manifest(condition_id: str, components: Mapping[str, str] = _NO_COMPONENTS) -> dict[str, Any]:
-    """Return the manifest of a run: its full hash, the environment, the state of the code.
-
-    Args:
-        condition_id: 64 hex digits.
-    """
+def manifest(condition_id: str, components: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Return the manifest of a run: its full hash, the environment, the state of the code."""
     return {"condition": condition_id, **environment(components), "git": git_state()}
 
 
-def environment(components: Mapping[str, str] = _NO_COMPONENTS) -> dict[str, Any]:
+def environment(components: Mapping[str, str] | None = None) -> dict[str, Any]:
     """Return versions, platform and processor, without importing any of the packages.
 
     Args:

@@ -125,11 +125,7 @@ def decode_values(metadata: Mapping[str, str]) -> dict[str, Any]:
 
 
 def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
-    """Undo `encode_values` of an environment, whose sections are mappings.
-
-    Raises:
-        ValueError: If one is something else.
-    """
+    """Undo `encode_values` of an environment, whose sections are mappings."""
     environment = decode_values(metadata)
     for section in ("versions", "platform", "cpu", "components"):
         if not isinstance(environment.get(section, {}), dict):
@@ -139,7 +135,7 @@ def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
 
 def decode_generation(data: bytes) -> GenerationRow:
     """Undo `encode_generation`."""
-    fields, terms = _decode(GenerationRow, data)
+    fields, terms = _typed(GenerationRow, orjson.loads(data))
     return GenerationRow(**fields, terms=terms)
 
 
@@ -151,7 +147,7 @@ def decode_summary(metadata: Mapping[str, str]) -> ReplicateSummary:
 
 def decode_solution(data: bytes) -> SolutionRow:
     """Undo `encode_solution`."""
-    fields, _ = _decode(SolutionRow, data)
+    fields, _ = _typed(SolutionRow, orjson.loads(data))
     return SolutionRow(**fields)
 
 
@@ -182,10 +178,6 @@ def flagged(row: dict[str, Any]) -> dict[str, Any]:
             if where.size:
                 flags[name] = {str(index): repr(float(value[index])) for index in where.tolist()}
     return {**row, NONFINITE: flags} if flags else row
-
-
-def _decode(record: type, data: bytes) -> tuple[dict[str, Any], dict[str, float]]:
-    return _typed(record, orjson.loads(data))
 
 
 def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str, float]]:

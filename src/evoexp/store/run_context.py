@@ -31,10 +31,6 @@ def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
     A shipped condition has the label and the budget of the shipped table, in the experiment that
     its manifest names if that has it: experiments share conditions.
 
-    Args:
-        manifest: Of the run; may be empty.
-        condition_id: 64 hex digits.
-
     Returns:
         The keys of `ORIGIN`, None where nothing is known, and `changed`.
     """
@@ -67,11 +63,6 @@ def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[s
     A setting has the last part of its name where no other setting and no column has it, else its
     name as it is typed: `population_size`, `collision.num_samples`. Components are called by their
     group: `planner`, `control`, `robot`. Lists of plain values are JSON; other lists are left out.
-
-    Args:
-        path: The run's directory.
-        condition_id: 64 hex digits.
-        taken: Columns that the table has already.
 
     Returns:
         Name → value; empty where neither configuration nor manifest can be read.

@@ -55,12 +55,7 @@ class RunDirectory:
     """
 
     def __init__(self, outputs: Path, condition_id: str) -> None:
-        """Name the directory; nothing is created or read.
-
-        Args:
-            outputs: Root of all outputs, see `outputs_root`.
-            condition_id: Full hash of the condition, 64 hex digits.
-        """
+        """Name the directory; nothing is created or read."""
         if not re.fullmatch("[0-9a-f]{64}", condition_id):
             raise ValueError(f"condition_id: must be 64 hex digits, was {condition_id!r}")
         self.condition_id = condition_id
@@ -206,23 +201,23 @@ class RunDirectory:
         return shlex.join(words) if words[:2] == _RUN and TAKEN not in notes else COMMAND
 
     def plans(self) -> list[Plan]:
-        """Return how many replicates were asked for, in the order in which that was done.
-
-        Raises:
-            DamagedFile: `plans.json` is damaged.
-        """
+        """Return how many replicates were asked for, in the order in which that was done."""
         return read_plans(self.path / PLANS)
+
+    def num_asked(self) -> int:
+        """Return how many replicates were ever asked for; 0 where the plans are damaged."""
+        with suppress(DamagedFile):
+            return max((plan.num_replicates for plan in self.plans()), default=0)
+        return 0
 
     def num_planned(self, asked: int = 0) -> int:
         """Return how many replicates were ever asked for, now included, or are there."""
-        with suppress(DamagedFile):
-            asked = max([asked, *(plan.num_replicates for plan in self.plans())])
-        return max([asked, *(1 + k for k in self.completed() | self.failed())])
+        return max([asked, self.num_asked(), *(1 + k for k in self.completed() | self.failed())])
 
     def note_plan(self, num_replicates: int) -> None:
         """Note that so many replicates are asked for, before any of them runs; more than ever."""
         plans = self.plans()
-        if num_replicates > max((plan.num_replicates for plan in plans), default=0):
+        if num_replicates > self.num_asked():
             plans.append(Plan(num_replicates, len(self.completed())))
             self.path.mkdir(parents=True, exist_ok=True)
             write_file(self.path / PLANS, as_json(plans))
@@ -241,11 +236,7 @@ class RunDirectory:
         return self._matching(_FAILED) - self.completed()
 
     def failure(self, replicate: int) -> dict[str, Any]:
-        """Return `reason` and `traceback` of a failed replicate.
-
-        Raises:
-            StoreError: The file is missing or damaged.
-        """
+        """Return `reason` and `traceback` of a failed replicate."""
         failure = read_object(self.failure_path(replicate))
         if not (
             isinstance(failure.get("reason"), str) and isinstance(failure.get("traceback"), str)
@@ -320,14 +311,6 @@ def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
         for run in sorted(distinct, key=lambda run: run.condition_id):
             stack.enter_context(run.lock())
         yield
-
-
-def create_all(
-    runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapping[str, bytes]]],
-) -> None:
-    """Create several runs as `RunDirectory.create` does, given its arguments."""
-    for run, config_json, manifest, files in runs:
-        run.create(config_json, manifest, files)
 
 
 def outputs_root() -> Path:

@@ -166,47 +166,38 @@ def table_damage(run: RunDirectory) -> str:
         return "damaged: it is derived from the logs and cannot be read"
 
 
-def altered_settings(run: RunDirectory) -> list[str]:
-    """Return the columns of `summary.parquet` that do not repeat a setting of the run.
+def altered(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> str:
+    """Return how `summary.parquet` contradicts logs or settings of a run; empty: it does not.
 
-    What the manifest says of the origin may have changed since, and is not looked at.
-    """
-    stored = _stored(run)
-    try:
-        run.check()
-    except StoreError:  # whose settings nothing tells
-        return []
-    if stored is None:  # or one with columns of another version
-        return []
-    assert stored.settings is not None, "it was read from a file"
-    columns = stored.settings.to_pydict()
-    context = run_context(run.path, run.condition_id, stored.table.column_names)
-    return [
-        name
-        for name, value in context.items()
-        if name in columns and name not in ORIGIN and set(columns[name]) - {value}
-    ]
-
-
-def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> list[str]:
-    """Return the logs whose row in `summary.parquet` does not repeat the summary they hold.
-
-    Rows of logs that changed since the table was written are not looked at.
+    Rows of logs that changed since the table was written are not looked at, nor is what the
+    manifest says of the origin, which may have changed since.
 
     Args:
         summaries: The logs' own, by the names of their files.
     """
     stored, stamps = _stored(run), _stamps(run)
-    if stored is None:
-        return []
+    if stored is None or stored.settings is None:  # damaged, or of another version
+        return ""
     rows = dict(zip(stored.row_names, stored.table.to_pylist(), strict=True))
-    return [
+    names = [
         name
         for name, summary in summaries.items()
         if name in rows
         and stored.files[name] == stamps.get(name)
         and _given(rows[name]) != _given(flatten(summary))
     ]
+    if names:
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        return f"altered: it does not repeat {names[0]}{more}"
+    try:
+        run.check()
+    except StoreError:  # whose settings nothing tells
+        return ""
+    columns = stored.settings.to_pydict()
+    for name, value in run_context(run.path, run.condition_id, stored.table.column_names).items():
+        if name in columns and name not in ORIGIN and set(columns[name]) - {value}:
+            return f"altered: {name} is not the setting"
+    return ""
 
 
 def _given(row: Mapping[str, Any]) -> str:

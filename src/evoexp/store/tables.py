@@ -17,10 +17,6 @@ from evoexp.store.summaries import Runs, distinct, summary_table, whole_logs
 def read_summaries(runs: Runs, *, thorough: bool = False) -> pd.DataFrame:
     """Return the summaries of one or several runs, one row per replicate; see `summary_table`.
 
-    Args:
-        runs: One or several.
-        thorough: Whether the checksums of all logs are looked at: before they are read.
-
     Returns:
         Its columns. Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and
         missing stay three things; text is pandas' own.
@@ -36,10 +32,6 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
 
     Logs are read one after the other; of each only its columns are kept. Damaged ones are left
     out; `read_summaries` says so.
-
-    Args:
-        runs: One or several.
-        replicates: Which ones of every run, done or not; None: all.
 
     Returns:
         Columns condition (categorical), replicate, those of `GenerationRow` without its chain, and

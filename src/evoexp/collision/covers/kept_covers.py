@@ -8,6 +8,7 @@ import contextlib
 import functools
 import hashlib
 import json
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from evoexp.collision.box_support import EXACT, coal
 from evoexp.collision.covers.body_covers import Cover, sphere_cover
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.kernel_folders import sources_key
-from evoexp.version import version_of
 
 _LIBRARIES = ("numpy", "scipy", "coal")
 _SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
@@ -67,5 +67,5 @@ def _corners(triangle: Any) -> list[int]:
 
 @functools.cache
 def _code() -> bytes:
-    versions = [*map(version_of, _LIBRARIES)]
+    versions = [*map(metadata.version, _LIBRARIES)]
     return hashlib.sha256(json.dumps([*versions, EXACT, sources_key()]).encode()).digest()

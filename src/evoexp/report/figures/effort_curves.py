@@ -12,6 +12,7 @@ from evoexp.records import FloatArray
 from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
+from evoexp.report.results.proven_answers import best_lengths
 from evoexp.report.statistics.inference import quantiles
 
 POINTS = 200  # along the axis of effort
@@ -84,20 +85,14 @@ def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
         table, most = own.table, max(float(own.spent.max()), 2.0)
         least = float(table["collision_queries"].min()) if len(table) else 0.5 * most
         axis = np.geomspace(max(least, 1.0), most, POINTS // 2)
-        best = np.array([_best_until(own, x) for x in axis])  # (points, runs)
+        early = (table[table["collision_queries"] <= x] for x in axis)
+        best = np.array([best_lengths(part, own.replicates) for part in early])  # (points, runs)
         spread = dict(
             zip(("median", "lower", "upper"), quantiles(best, (0.5, 0.25, 0.75)), strict=True)
         )
         columns: dict[str, Any] = {"planner": own.planner}
         parts.append(pd.DataFrame(columns | {"collision_queries": axis} | spread))
     return pd.concat(parts, ignore_index=True)
-
-
-def _best_until(own: PlannerRuns, effort: float) -> FloatArray:
-    """Return the least proven length of each run up to some effort, (runs,); inf: none."""
-    early = own.table["certified"] & (own.table["collision_queries"] <= effort)
-    best = own.table[early].groupby("replicate")["length"].min().reindex(list(own.replicates))
-    return np.asarray(best.to_numpy(np.float64, na_value=np.inf))
 
 
 def problem_order(runs: Iterable[PlannerRuns]) -> list[str]:

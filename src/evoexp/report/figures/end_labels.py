@@ -12,13 +12,11 @@ from evoexp.report.figures import style
 
 MANY = 5  # curves, from which on each is named at its end
 LONGEST = 40  # signs of a name
-SIZE = 7.5  # [pt]
-LINE = 1.3  # [-] of the size, from one name to the next
+LINE = 9.5  # [pt] from one name to the next
 HIGH = 0.82  # [-] of a figure's height that its axes have, about
 APART = 0.075  # [-] of the height of a panel, between names at the ends of curves
 DOTTED = (0, (1, 1.5))  # so that no line to a name is taken for a curve
 BESIDE = 1.06  # [-] of the width of a panel, where names begin
-BEGIN, END = 1.005, 1.035  # [-] of the axes' width, of the line from a curve to its name
 
 
 class CurveEnd(NamedTuple):
@@ -52,21 +50,22 @@ def apart(wanted: FloatArray, gap: float) -> FloatArray:
     return np.asarray(np.clip(found, 0.0, 1.0 - last_step) + steps)
 
 
-def name_ends(axes: Axes, ends: Sequence[CurveEnd]) -> None:
+def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:
     """Write names to the right of a panel, each joined with the end of its curve by a line.
 
     Args:
         axes: Whose limits are set.
         ends: Of its curves; those that end at infinity get no name.
+        gap: Between names, as a share of the height of the panel.
     """
     low, high = axes.get_ylim()
     known = sorted((end for end in ends if np.isfinite(end.y)), key=lambda end: end.y)
     heights = np.clip([(end.y - low) / (high - low) for end in known], 0.0, 1.0)
-    for end, place in zip(known, apart(np.asarray(heights), APART), strict=True):
+    for end, place in zip(known, apart(np.asarray(heights), gap), strict=True):
         line = {"arrowstyle": "-", "color": end.colour, "lw": 0.8, "shrinkA": 1.0, "shrinkB": 0.0}
         look: dict[str, Any] = {"va": "center", "fontsize": 7.0, "color": style.NEUTRAL}
         axes.annotate(
-            end.name,
+            style.shortened(end.name, LONGEST),
             (end.x, end.y),
             (BESIDE, place),
             "data",
@@ -86,22 +85,13 @@ def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:
         style.legend_below(figure, axes, columns)
         return
-    curves.sort(key=lambda each: _height(each[0]))
-    low, high = axes.get_ylim()
-    ends = np.array([_height(curve)[0] for curve, _ in curves])
-    ends = np.clip((ends - low) / (high - low), 0.0, 1.0)
-    gap = SIZE * LINE / 72.0 / (HIGH * figure.get_figheight())
-    for (curve, name), end, place in zip(curves, ends, apart(ends, gap), strict=True):
-        look = {"color": curve.get_color(), "transform": axes.transAxes, "clip_on": False}
-        dashes, width = curve.get_linestyle(), curve.get_linewidth()
-        axes.plot([BEGIN, END], [end, place], linestyle=dashes, linewidth=width, **look)
-        axes.text(
-            END + 0.005, place, style.shortened(name, LONGEST), va="center", fontsize=SIZE, **look
-        )
-
-
-def _height(curve: Any) -> tuple[float, float]:
-    """Return the end of a curve, and its mean, by which curves of one end are told apart."""
-    found = np.asarray(curve.get_ydata(), dtype=np.float64)
-    found = found[np.isfinite(found)]
-    return (float(found[-1]), float(found.mean())) if len(found) else (0.0, 0.0)
+    ends: list[tuple[float, CurveEnd]] = []
+    for curve, name in curves:
+        x, y = (np.asarray(values, dtype=np.float64) for values in curve.get_data())
+        x, y = x[np.isfinite(y)], y[np.isfinite(y)]
+        if len(y):
+            end = CurveEnd(float(x[-1]), float(y[-1]), name, curve.get_color())
+            ends.append((float(y.mean()), end))
+    ends.sort(key=lambda each: each[0])  # curves of one end are told apart by their means
+    gap = LINE / 72.0 / (HIGH * figure.get_figheight())
+    name_ends(axes, [end for _, end in ends], gap)

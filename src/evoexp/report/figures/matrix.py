@@ -49,10 +49,7 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
     count = len(labels)
     cells = table.assign(**{name: table[name].map(labels.index) for name in ("condition", "other")})
     a12 = cells.pivot(index="condition", columns="other", values="a12").to_numpy()
-    names = [
-        f"{k}  {label if len(label) <= LONGEST else f'{label[: LONGEST - 1]}…'}"
-        for k, label in enumerate(labels, 1)
-    ]
+    names = [f"{k}  {style.shortened(label, LONGEST)}" for k, label in enumerate(labels, 1)]
     figure = style.figure(SIZE * count + 0.7, NARROWEST)
     axes = figure.subplots()
     image = axes.imshow(a12, cmap="RdBu", vmin=0.0, vmax=1.0)

@@ -3,6 +3,7 @@
 The functions draw the tables of `motion_tables` and need nothing else.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -42,25 +43,30 @@ def draw_scenes(table: pd.DataFrame) -> Figure:
 
 def draw_stages(table: pd.DataFrame) -> Figure:
     """Draw one panel per instant, three side by side, all of the same scale."""
-    panels = list(groups(table, ["panel", "title"]))
-    lines = -(-len(panels) // 3)
-    figure = style.figure(2.4 * lines + 0.3)
-    planar = bool(table["planar"].all())
-    for k, ((_, title), rows) in enumerate(panels):
-        _panel(figure, (lines, 3, k + 1), title, rows, planar=planar, room=table)
+    figure = _panels(table, 3, 2.4, lambda panel: table)
     _key(figure, table)
     return figure
 
 
 def draw_covers(table: pd.DataFrame) -> Figure:
     """Draw the exact bodies of each robot beside their covers, in the same scale."""
+    return _panels(table, 2, 3.2, lambda panel: table[table["panel"] // 2 == panel // 2])
+
+
+def _panels(
+    table: pd.DataFrame, per_line: int, height: float, room: Callable[[int], pd.DataFrame]
+) -> Figure:
+    """Draw panels side by side, each as large as the bodies of some rows.
+
+    Args:
+        height: Of a line of panels [inch].
+        room: Returns the rows that a panel has room for.
+    """
     panels = list(groups(table, ["panel", "title"]))
-    lines = len(panels) // 2
-    figure = style.figure(3.2 * lines)
-    planar = bool(table["planar"].all())
+    lines, planar = -(-len(panels) // per_line), bool(table["planar"].all())
+    figure = style.figure(height * lines + 0.3)
     for k, ((panel, title), rows) in enumerate(panels):
-        both = table[table["panel"] // 2 == panel // 2]
-        _panel(figure, (lines, 2, k + 1), title, rows, planar=planar, room=both)
+        _panel(figure, (lines, per_line, k + 1), title, rows, planar=planar, room=room(panel))
     return figure
 
 

@@ -155,17 +155,11 @@ def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[F
 
     In a column half as many stand side by side, the others below them.
     """
-    columns = _side_by_side(count)
-    lines = -(-count // columns)
-    found = figure(height * lines)
-    panels = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
-    for unused in panels[count:]:
-        unused.remove()
-    return found, panels[:count]
+    return lines_of_panels(height, count, count, 0.0, sharey=sharey)
 
 
 def lines_of_panels(
-    height: float, count: int, per_line: int, foot: float
+    height: float, count: int, per_line: int, foot: float, *, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with some panels, and the panels, line by line.
 
@@ -175,15 +169,14 @@ def lines_of_panels(
         per_line: Panels side by side at most; half as many in a column.
         foot: Height below the panels, for a legend [inch].
     """
-    columns = _side_by_side(min(count, per_line))
+    columns = min(count, per_line)
+    columns = columns if _scale.get() is _SCALES["page"] else -(-columns // 2)
     lines = -(-count // columns)
     found = figure(height * lines + foot)
-    return found, [found.add_subplot(lines, columns, k + 1) for k in range(count)]
-
-
-def _side_by_side(count: int) -> int:
-    """Return how many of some panels stand side by side: in a column half as many."""
-    return count if _scale.get() is _SCALES["page"] else -(-count // 2)
+    panels = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
+    for unused in panels[count:]:
+        unused.remove()
+    return found, panels[:count]
 
 
 def begins_line(axes: Axes) -> bool:

@@ -5,11 +5,14 @@ import logging
 import warnings
 from collections.abc import Mapping
 from importlib import resources
+from logging.handlers import BufferingHandler
 from typing import Any
 
 import matplotlib as mpl
 
 from evoexp.errors import SettingError, brief
+
+MOST_LINES = 10_000  # that a log keeps
 
 
 @functools.cache
@@ -26,29 +29,20 @@ def read_style_file(path: str) -> dict[str, Any]:
     Raises:
         SettingError: If it cannot be read, or sets what matplotlib does not know.
     """
-    found: list[str] = []
-    logger, handler = logging.getLogger("matplotlib"), _Lines(found)
+    # matplotlib logs what a style file has wrong
+    logger, handler = logging.getLogger("matplotlib"), BufferingHandler(MOST_LINES)
+    handler.setLevel(logging.WARNING)
     logger.addHandler(handler)
+    reason = ""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             style = dict(mpl.rc_params_from_file(path, use_default_template=False))
     except (OSError, ValueError, Warning) as error:
-        found.append(str(error))
+        reason = str(error)
     finally:
         logger.removeHandler(handler)
-    if found:
-        wrong = brief(found[0].strip().partition("\n")[0])
+    if lines := [record.getMessage() for record in handler.buffer] or [reason] * bool(reason):
+        wrong = brief(lines[0].strip().partition("\n")[0])
         raise SettingError("report.style", f"a matplotlib style file ({wrong})", path)
     return {name: value for name, value in style.items() if name != "svg.hashsalt"}
-
-
-class _Lines(logging.Handler):
-    """Keeps the lines that are logged: matplotlib logs what a style file has wrong."""
-
-    def __init__(self, lines: list[str]) -> None:
-        super().__init__(logging.WARNING)
-        self._lines = lines
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._lines.append(record.getMessage())

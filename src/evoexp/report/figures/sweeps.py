@@ -14,7 +14,7 @@ from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
 from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import MainEffect, Sweep, Values
+from evoexp.report.results.swept_settings import MainEffect, Sweep, Values, labelled
 from evoexp.report.statistics.inference import quantile
 
 PER_LINE = 3  # panels side by side
@@ -36,21 +36,16 @@ def grid_table(sweep: Sweep, values: Values) -> pd.DataFrame:
         if not each.results.done:
             continue
         own = values(each.results)
-        before = sweep.settings[: max(last - 1, 0)]
-        words = [f"{s} = {v}" for s, v in zip(before, each.values, strict=False)]
-        panel = ", ".join(word for word in (each.base, *words) if word)
-        y, row = ("", 0) if last == 0 else _place(each.values[last - 1], levels[last - 1])
-        x, column = _place(each.values[last], levels[last])
+        before = labelled(sweep, each.values[: max(last - 1, 0)])
+        panel = ", ".join(word for word in (each.base, before) if word)
+        x, y = each.values[last], each.values[last - 1] if last else ""
+        row = levels[last - 1].index(y) if last else 0
         spread = (quantile(own, share) for share in (0.5, 0.25, 0.75))
-        found.append((panel, x, y, column, row, *spread, len(own)))
+        found.append((panel, x, y, levels[last].index(x), row, *spread, len(own)))
     names = ["panel", "x", "y", "column", "row", "median", "lower", "upper", "runs"]
     return pd.DataFrame(found, columns=names).assign(
         x_setting=sweep.settings[last], y_setting=sweep.settings[last - 1] if last else ""
     )
-
-
-def _place(value: str, levels: Sequence[str]) -> tuple[str, int]:
-    return value, levels.index(value)
 
 
 def draw_grid(table: pd.DataFrame, name: str) -> Figure:
@@ -153,14 +148,8 @@ def draw_effects(table: pd.DataFrame) -> Figure:
 def facets(sweep: Sweep) -> list[tuple[str, str]]:
     """Return the panels: (condition, values of all settings but the last), each once."""
     return list(
-        dict.fromkeys((each.base, _before(sweep, each.values)) for each in sweep.conditions)
+        dict.fromkeys((each.base, labelled(sweep, each.values[:-1])) for each in sweep.conditions)
     )
-
-
-def _before(sweep: Sweep, values: tuple[str, ...]) -> str:
-    """Return the values of all settings but the last one, with their names."""
-    named = zip(sweep.settings[:-1], values, strict=False)
-    return ", ".join(f"{setting} = {value}" for setting, value in named)
 
 
 def convergence_table(results: Results, sweep: Sweep) -> pd.DataFrame:
@@ -177,7 +166,7 @@ def convergence_table(results: Results, sweep: Sweep) -> pd.DataFrame:
     labels = best[best["condition"].isin(of.keys())]["condition"]
     return best.loc[labels.index].assign(
         base=labels.map({label: each.base for label, each in of.items()}),
-        facet=labels.map({label: _before(sweep, each.values) for label, each in of.items()}),
+        facet=labels.map({label: labelled(sweep, each.values[:-1]) for label, each in of.items()}),
         setting=sweep.settings[-1],
         value=labels.map({label: each.values[-1] for label, each in of.items()}),
         level=labels.map({label: levels.index(each.values[-1]) for label, each in of.items()}),

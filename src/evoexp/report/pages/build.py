@@ -58,19 +58,17 @@ class Request(NamedTuple):
             return f"evoexp run experiment={self.words}"
         return f"evoexp run {self.words}" if self.arguments else f"evoexp show {self.words}"
 
+    def results(self, outputs: Path, num_replicates: int | None) -> Results:
+        """Read the stored results, see `gather`."""
+        where = outputs, self.conditions, num_replicates
+        return gather(*where, self.experiment, self.budget, self.hint, self.options)
+
 
 class ReportFiles(NamedTuple):
     """A report before it is written."""
 
     directory: Path  # its folder
     files: dict[str, bytes]  # name → content
-
-
-def report(
-    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
-) -> Path:
-    """Write a report and return the path of its `index.html`; see `derived`."""
-    return write_report(derived(request, settings, outputs, num_replicates))
 
 
 def derived(
@@ -89,17 +87,8 @@ def derived(
         UnknownOption: If the settings name a page that does not exist.
         CorruptLog: If a log cannot be trusted.
     """
-    found = gather(
-        outputs,
-        request.conditions,
-        num_replicates,
-        request.experiment,
-        request.budget,
-        request.hint,
-        request.options,
-    )
-    page = page_of(found, settings)
-    return page_files(request, page, found, settings)
+    found = request.results(outputs, num_replicates)
+    return page_files(request, page_of(found, settings), found, settings)
 
 
 def page_files(

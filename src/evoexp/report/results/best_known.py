@@ -11,25 +11,18 @@ with it all shares of targets reached. So the lengths stand in a file of their o
 Run and replicate are those that found it.
 """
 
-import json
 import math
 import re
-from collections.abc import Iterable, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 
+import evoexp
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
-from evoexp.report.results.planner_runs import PlannerRuns
 
 _HASH = re.compile("[0-9a-f]{12}")
-_HEAD = """# The shortest proven answer known of each problem, in joint space [rad, m]: targets of
-# `evoexp compare` are multiples of it. The key is that of robot and scenario, as the page of a
-# comparison shows it. Written by scripts/update-best-known, from stored runs.
-"""
 
 
 class BestKnown(NamedTuple):
@@ -43,8 +36,7 @@ class BestKnown(NamedTuple):
 
 def shipped_best_known() -> dict[str, BestKnown]:
     """Return the shipped file's content by the keys of problems."""
-    file = resources.files("evoexp").joinpath("assets/best_known.yaml")
-    return parsed(file.read_bytes(), "best_known.yaml")
+    return read_best_known(Path(evoexp.__file__).parent / "assets/best_known.yaml")
 
 
 def read_best_known(path: str | Path) -> dict[str, BestKnown]:
@@ -58,11 +50,7 @@ def read_best_known(path: str | Path) -> dict[str, BestKnown]:
 
 
 def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
-    """Return a file's content by the keys of problems.
-
-    Raises:
-        SettingError: If something in it cannot be.
-    """
+    """Return a file's content by the keys of problems."""
     try:
         found = yaml.safe_load(content) or {}
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
@@ -89,45 +77,3 @@ def _entry(entry: Any, where: str) -> BestKnown:
     if type(replicate) is not int or replicate < 0:
         raise SettingError(f"{where}, replicate", "a whole number, at least 0", replicate)
     return BestKnown(str(entry["problem"]), float(length), run, replicate)
-
-
-def to_yaml(known: Mapping[str, BestKnown]) -> bytes:
-    """Return a file's content, in the order of the problems' names."""
-    lines = [
-        f"{json.dumps(key)}: {{problem: {json.dumps(each.problem, ensure_ascii=False)}, "
-        f"length: {each.length!r}, run: {json.dumps(each.run)}, replicate: {each.replicate}}}\n"
-        for key, each in sorted(known.items(), key=lambda item: (item[1].problem, item[0]))
-    ]
-    return (_HEAD + "".join(lines)).encode()
-
-
-def shortest(runs: Iterable[PlannerRuns]) -> dict[str, BestKnown]:
-    """Return the shortest proven answer of runs that were judged here, by the problems' keys."""
-    found: dict[str, BestKnown] = {}
-    for own in runs:
-        good = own.table[own.table["certified"]]
-        if own.condition is None or not len(good):
-            continue
-        row = good.iloc[int(good["length"].to_numpy().argmin())]
-        length, before = float(row["length"]), found.get(own.problem.key)
-        if before is None or length < before.length:
-            run = own.condition.run.hash12
-            found[own.problem.key] = BestKnown(own.problem.name, length, run, int(row["replicate"]))
-    return found
-
-
-def lowered(
-    known: Mapping[str, BestKnown], found: Mapping[str, BestKnown]
-) -> tuple[dict[str, BestKnown], list[str]]:
-    """Put shorter lengths into those that are known; return all, and a line for each new one.
-
-    The name that a problem has stays.
-    """
-    now, lines = dict(known), list[str]()
-    for key, each in found.items():
-        before = known.get(key)
-        if before is None or each.length < before.length:
-            now[key] = each if before is None else each._replace(problem=before.problem)
-            was = "new" if before is None else f"{before.length:.6g}"
-            lines.append(f"{now[key].problem} ({key}): {was} → {each.length:.6g}")
-    return now, lines

@@ -82,7 +82,10 @@ def joint_positions(
     Args:
         q: (nq, instants) [deg].
     """
-    frames = list(_frames(assembly, q))
+    data, frames = assembly.model.createData(), list[FloatArray]()
+    for configuration in q.T:
+        pin.forwardKinematics(assembly.model, data, DEGREE * configuration)
+        frames.append(np.array([place.homogeneous for place in data.oMi]))  # (joints, 4, 4)
     numbers = [0] * assembly.num_arms
     for link in assembly.links:
         start, end = (
@@ -208,14 +211,6 @@ def in_stages(table: pd.DataFrame, num_stages: int) -> pd.DataFrame:
         for stage, (first, stop) in enumerate([*itertools.pairwise(cuts), (0, last)])
     ]
     return pd.concat(parts, ignore_index=True)
-
-
-def _frames(assembly: Assembly, q: FloatArray) -> Iterator[FloatArray]:
-    """Yield the placements of all joints at each configuration, (joints, 4, 4)."""
-    data = assembly.model.createData()
-    for configuration in q.T:
-        pin.forwardKinematics(assembly.model, data, DEGREE * configuration)
-        yield np.array([placement.homogeneous for placement in data.oMi])
 
 
 def refuted(condition: ConditionResults) -> dict[int, tuple[float, str]]:

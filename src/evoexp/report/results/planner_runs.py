@@ -191,17 +191,14 @@ def planner_names(
     unique = len(set(every)) == len(every) and len(kinds) == num_names
     if unique and all(rest.values()) and num_names < len(every):
         return rest
-    return _component_names(conditions)
-
-
-def _component_names(conditions: Sequence[ConditionResults]) -> dict[str, str]:
-    found: dict[str, str] = {}
-    kinds: list[Any] = list(dict.fromkeys(c.condition.planner for c in conditions))
+    planners: list[Any] = list(dict.fromkeys(c.condition.planner for c in conditions))
+    names = {}
     for c in conditions:
-        same = [kind for kind in kinds if kind.component == c.condition.planner.component]
+        name = c.condition.planner.component
+        same = [planner for planner in planners if planner.component == name]
         number = f" {same.index(c.condition.planner) + 1}" if len(same) > 1 else ""
-        found[c.label] = f"{c.condition.planner.component}{number}"
-    return found
+        names[c.label] = f"{name}{number}"
+    return names
 
 
 def _parts(c: ConditionResults) -> list[str]:

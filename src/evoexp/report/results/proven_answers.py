@@ -8,6 +8,7 @@ know of it. Verdicts take long and follow from log and code alone: they are kept
 import contextlib
 import hashlib
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,16 +20,15 @@ import pandas as pd
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.kernel_folders import sources_key
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray
+from evoexp.registry import COMPONENTS, registrations
 from evoexp.report.results.stored_results import ConditionResults
-from evoexp.store.installed_code import installed_code
 from evoexp.store.log_reader import read_log
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)  # per cubic segment
-NO_PART = ("batch", "commands", "papers", "playback", "report", "testing")
-"""Folders of code that planners and the certifier do not know: no verdict depends on them."""
 WORTH_WORKERS = 16  # logs to judge, from which on worker processes are started
 CLOSE = 1e-6  # [rad] by which goals may differ and be the same
 
@@ -50,18 +50,15 @@ class Answer(NamedTuple):
     cpu_s: float = np.nan
 
 
-def answers(condition: ConditionResults) -> pd.DataFrame:
-    """Return the answers of all finished replicates, in order; columns of `Answer`.
+def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
+    """Return the answers of all finished replicates, by the labels of conditions.
 
     Solutions of infinite cost, and those that are no motions, such as a posture that is held, have
-    no row.
+    no row. They are judged on all cores.
     """
-    return answers_of([condition])[condition.label]
-
-
-def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
-    """Return the answers of conditions by their labels, see `answers`; judged on all cores."""
-    code = installed_code(NO_PART) + Path(__file__).read_bytes()
+    guests = {each.module.partition(".")[0] for each in registrations(COMPONENTS)}
+    loaded = sorted(name for name in guests if name in sys.modules)
+    code = "".join(map(sources_key, loaded)).encode() + Path(__file__).read_bytes()
     logs = [(c, int(k), c.run.log_path(int(k))) for c in conditions for k in c.summaries.index]
     times, kept = list[FloatArray](), dict[Path, list[list[Any]]]()
     places = dict[Path, Path]()  # log → where its answers are kept
@@ -118,7 +115,7 @@ def first_reached(
     """Return the effort of every run up to its first proven answer that is so short.
 
     Args:
-        table: Of `answers`.
+        table: Of `answers_of`.
         replicates: (runs,) in order.
         longest: Length that an answer may have.
         spent: (runs,) effort of the whole runs.

@@ -20,7 +20,7 @@ from evoexp.report.statistics.inference import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
-from evoexp.store.log_reader import read_array, read_log, read_solution
+from evoexp.store.log_reader import read_log, read_solution
 from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
@@ -88,12 +88,8 @@ class ConditionResults:
         return read_log(self.run.log_path(self.best_replicate)).solutions[0].values
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array attached to the log of the best replicate.
-
-        Raises:
-            KeyError: If there is none of this name.
-        """
-        return read_array(self.run.log_path(self.best_replicate), name)
+        """Return an array attached to the log of the best replicate."""
+        return read_log(self.run.log_path(self.best_replicate)).arrays()[name]
 
     @property
     def _finished(self) -> list[int]:
@@ -314,6 +310,9 @@ def _read(
     is_stored = bool(run.completed() or run.failed())
     if is_stored:
         run.check_identity()
+    manifest = run.manifest() if is_stored else {}
+    code = {"version": (manifest.get("versions") or {}).get("evoexp")}
+    code |= {name: (manifest.get("git") or {}).get(name) for name in ("commit", "dirty")}
     plans = _plans(run)
     rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
     rows = rows.set_index("replicate")
@@ -326,8 +325,8 @@ def _read(
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,
-        _code(run) if is_stored else {},
-        _recorded_options(run) if options is None and is_stored else options or (),
+        code if is_stored else {},
+        _recorded_options(manifest) if options is None else options,
         plans,
         damaged_logs(run),
     )
@@ -342,20 +341,12 @@ def _plans(run: RunDirectory) -> tuple[Plan, ...]:
         return ()
 
 
-def _recorded_options(run: RunDirectory) -> tuple[Option, ...]:
+def _recorded_options(manifest: Mapping[str, Any]) -> tuple[Option, ...]:
     """Return the options that a run's manifest names; only shipped ones have files to be read."""
-    recorded: dict[str, dict[str, str]] = run.manifest().get("options") or {}
+    recorded: dict[str, dict[str, str]] = manifest.get("options") or {}
     found = []
     for group, each in recorded.items():
         shipped = config_directory() / group / f"{each['name']}.yaml"
         path = str(shipped) if each["origin"] == ORIGIN else ""
         found.append(Option(group, each["name"], each["origin"], path))
     return tuple(found)
-
-
-def _code(run: RunDirectory) -> dict[str, Any]:
-    """Return version and commit of the code that created a run, from its manifest."""
-    manifest = run.manifest()
-    git = manifest.get("git") or {}
-    version = manifest.get("versions", {}).get("evoexp")
-    return {"version": version, "commit": git.get("commit"), "dirty": git.get("dirty")}

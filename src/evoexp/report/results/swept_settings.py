@@ -141,15 +141,15 @@ def _pairs(
             for c in both
             if c is not None
         )
-        found.append({seed: _less(other[seed], one[seed]) for seed in one.keys() & other.keys()})
+        found.append(
+            {
+                seed: 0.0 if other[seed] == one[seed] else other[seed] - one[seed]  # both infinite
+                for seed in one.keys() & other.keys()
+            }
+        )
     seeds = sorted({seed for each in found for seed in each})
     table = [[each.get(seed, np.nan) for each in found] for seed in seeds]
     return np.array(table, dtype=np.float64).reshape(len(seeds), len(found))
-
-
-def _less(one: float, other: float) -> float:
-    """Return a difference; 0 where both are infinite."""
-    return 0.0 if one == other else one - other
 
 
 def _effect(
@@ -170,5 +170,8 @@ def _median(values: np.ndarray) -> float:
 
 
 def labelled(sweep: Sweep, names: Sequence[str]) -> str:
-    """Return values with the names of their settings: "population_size = 20, num_elites = 0"."""
-    return ", ".join(f"{s} = {v}" for s, v in zip(sweep.settings, names, strict=True))
+    """Return values with the names of their settings: "population_size = 20, num_elites = 0".
+
+    Fewer values than settings are those of the first settings.
+    """
+    return ", ".join(f"{s} = {v}" for s, v in zip(sweep.settings, names, strict=False))

@@ -39,7 +39,9 @@ def contradictions(path: Path, log: LogContents) -> Iterator[str]:
         yield from map(str, _contradictions(planner, problem, log))
 
 
-def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterator[FieldDifference]:
+def _contradictions(
+    planner: Planner[Any], problem: Any, log: LogContents
+) -> Iterator[FieldDifference]:
     rows = {row.index: row for row in log.generations}
     terms: Mapping[str, float] = {}
     for solution in log.solutions:
@@ -67,7 +69,7 @@ def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterato
     yield from _unlike(flatten(log.summary), verdict, "motion of the last solution: ")
 
 
-def _terms(planner: Planner, problem: Any, solution: SolutionRow) -> dict[str, float]:
+def _terms(planner: Planner[Any], problem: Any, solution: SolutionRow) -> dict[str, float]:
     """Return the terms of a solution.
 
     Raises:

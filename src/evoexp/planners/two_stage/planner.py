@@ -22,7 +22,7 @@ from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
-from evoexp.planners.planner import Judgement, PlannerDefaults
+from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Best, Block, FloatArray
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
@@ -45,7 +45,7 @@ class Problem(NamedTuple):
     security_margin: float  # clearance that the task requires [length unit]
 
 
-class TwoStage(PlannerDefaults, Component):
+class TwoStage(PlannerDefaults[Problem], Component):
     """The placement search, then the path search."""
 
     component: ClassVar[str] = "two_stage"
@@ -173,7 +173,7 @@ class TwoStage(PlannerDefaults, Component):
         """Refuse: there are two populations, one per stage."""
         raise _no_population()
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Refuse: there are two populations, one per stage."""
         raise _no_population()
 

@@ -275,20 +275,6 @@ def test_robot_and_grid_have_the_same_dimensions() -> None:
         planner().prepare(robot(3), scenario(np.zeros((4, 4), dtype=bool)))
 
 
-def test_random_search_draws_the_same_first_paths() -> None:
-    own = planner()
-    problem = solvable((9, 9), 0.3, 4, own)
-    control = RandomSearch(planner=own)
-    first, drawn = (
-        next(generations(own.evolve(problem, rng(7)))),
-        next(generations(control.evolve(problem, rng(7)))),
-    )
-    assert [nodes_of(path) for path in first.population] == [
-        nodes_of(path) for path in drawn.population
-    ]
-    assert np.array_equal(first.costs, drawn.costs)
-
-
 def test_populations_are_checked() -> None:
     own = planner()
     problem = solvable((4, 4), 0.0, 0, own)

@@ -38,7 +38,7 @@ COPIES = 5
 
 
 class SceneTask(Protocol):
-    """What `PlannerDefaults` reads of a problem."""
+    """A problem, as far as `PlannerDefaults` reads it."""
 
     @property
     def scene(self) -> Scene | None:

@@ -78,16 +78,6 @@ def test_flips_are_where_a_walk_with_geometric_steps_ends(
         assert np.all(left > (1.0 - rate) ** (staying + 1) * (1.0 - 1e-12))
 
 
-def test_every_bit_is_flipped_as_often() -> None:
-    draws, strings = Draws(200_000), np.zeros((GENES, 10_000), dtype=np.int64)
-    draws.extend(rng(5))
-    flip_strings(draws.block, strings, 8, 10_000, 0.1)
-    shares = bits_of(strings, 8).mean(axis=1)
-    assert shares == pytest.approx(0.1, abs=4.5 * np.sqrt(0.09 / 10_000)), (
-        "16 shares, 4.5 standard errors"
-    )
-
-
 @pytest.mark.parametrize(("rate", "share"), [(0.0, 0.0), (1.0, 1.0), (1e-300, 0.0)])
 def test_never_and_always(rate: float, share: float) -> None:
     draws, strings = Draws(64), np.zeros((GENES, 3), dtype=np.int64)

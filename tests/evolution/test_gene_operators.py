@@ -42,12 +42,6 @@ def mutated(operator: Mutation, rate: float, progress: float) -> tuple[FloatArra
 
 
 @each_crossover
-def test_crossover_at_rate_0_copies(operator: Crossover) -> None:
-    parents, out = crossed(operator, 0.0)
-    assert np.array_equal(parents, out)
-
-
-@each_crossover
 def test_crossover_has_its_rate(operator: Crossover) -> None:
     parents, out = crossed(operator, 0.3)
     changed = (parents != out).any(axis=0).reshape(-1, 2).any(axis=1)

@@ -287,24 +287,6 @@ def test_equal_keys_keep_the_old_then_the_first_formed() -> None:
     assert chosen.ages.tolist() == [8, 0]
 
 
-def test_the_best_team_is_taken_even_if_nobody_of_it_is_on_a_front() -> None:
-    """Individuals 0 are cheaper, but collide; 1 and 1 are the best pair, of no front."""
-    own = np.array([[1.0, 2.0], [1.0, 2.0]])
-    collisions = np.array([[[1, 1], [1, 0]]], dtype=np.int16)
-    front = np.array([[True, False], [True, False]])
-    best = best_team(collisions, own)
-    for offered, expected in ((None, [[0, 0]]), (best.individuals, [[1, 1], [0, 0]])):
-        chosen = update_hall(collisions, own, front, Hall.room(0, 2), 2, best=offered)
-        assert chosen.teams.tolist() == expected
-
-
-def test_individuals_of_a_population_that_may_be_shared_are_in_many_teams() -> None:
-    own, collisions = np.ones((2, 4)), np.zeros((1, 4, 4), dtype=np.int16)
-    front = np.array([[True] * 4, [True] + [False] * 3])
-    chosen = update_hall(collisions, own, front, Hall.room(0, 2), 3, rules(2, shared=(1,)))
-    assert chosen.teams.tolist() == [[0, 0], [1, 0], [2, 0]]
-
-
 def test_nothing_is_random_and_inputs_are_left_alone() -> None:
     w, hall = world(6, 2, 30), some_hall(2, 2, 30, 4)
     copies = [array.copy() for array in (*w, *hall)]

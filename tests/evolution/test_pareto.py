@@ -45,26 +45,6 @@ def test_ties_infinities_and_nan(individuals: list[list[float]]) -> None:
     assert np.array_equal(pareto_front(criteria), front_by_definition(criteria))
 
 
-def test_duplicates_stay_or_go_together() -> None:
-    criteria = np.array([[1.0, 2.0, 1.0, 2.0, 3.0], [2.0, 1.0, 2.0, 1.0, 3.0]])
-    assert pareto_front(criteria).tolist() == [True, True, True, True, False]
-    assert pareto_front(np.ones((4, 6))).all()
-
-
-def test_nan_is_not_on_the_front_and_pushes_nobody_off() -> None:
-    criteria = np.array([[0.0, 1.0, 2.0], [np.nan, 1.0, 2.0]])
-    assert pareto_front(criteria).tolist() == [False, True, False]
-    assert not pareto_front(np.full((2, 3), np.nan)).any()
-
-
-def test_whoever_is_off_the_front_is_dominated_by_somebody_on_it() -> None:
-    criteria = np.random.default_rng(0).random((4, 100))
-    front = pareto_front(criteria)
-    assert 0 < front.sum() < 100
-    for k in np.flatnonzero(~front):
-        assert any(dominates(criteria[:, j], criteria[:, k]) for j in np.flatnonzero(front))
-
-
 def test_nobody_and_no_criteria() -> None:
     assert pareto_front(np.empty((4, 0))).tolist() == []
     with pytest.raises(ValueError, match="one at least"):

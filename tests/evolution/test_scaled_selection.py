@@ -47,17 +47,6 @@ def test_scaling_is_equation_5_whatever_the_constant(seed: int, num: int, count:
         )
 
 
-def test_mean_is_kept_and_the_best_expects_twice_the_mean_where_nothing_is_negative() -> None:
-    expected = scale_linearly(np.array([1.0, 2.0, 3.0]), 3)
-    np.testing.assert_allclose(expected, [2.0, 1.0, 0.0])
-    np.testing.assert_allclose(scale_linearly(np.array([1.0, 2.0, 3.0]), 3, 1.5), [1.5, 1.0, 0.5])
-
-
-def test_what_would_be_negative_is_0_and_the_rest_is_divided_by_the_mean() -> None:
-    expected = scale_linearly(np.array([0.0, 0.0, 0.0, 10.0]), 4)  # 2, 2, 2, -2
-    np.testing.assert_allclose(expected, [4 / 3, 4 / 3, 4 / 3, 0.0])
-
-
 @given(COSTS, st.floats(-1e3, 1e3), st.integers(0, 40))
 def test_scaling_does_not_change_with_a_shift_and_adds_up(
     costs: np.ndarray, shift: float, count: int
@@ -85,12 +74,6 @@ def test_counts_are_the_floor_or_one_more(costs: np.ndarray, count: int, seed: i
     assert len(parents) == count
     assert (counts >= np.floor(expected - 1e-9)).all()
     assert (counts <= np.ceil(expected + 1e-9)).all()
-
-
-def test_whole_numbers_leave_nothing_to_chance() -> None:
-    for seed in range(50):
-        parents = stochastic_remainder(np.random.default_rng(seed), np.array([2.0, 0.0, 1.0, 3.0]))
-        assert sorted(parents) == [0, 0, 2, 3, 3, 3]
 
 
 def test_counts_are_unbiased() -> None:

@@ -15,9 +15,7 @@ def redistribute(
     via_points: np.ndarray, arm_slices: np.ndarray, num_lanes: int, workspace: Redistribution
 ) -> None:
     if via_points.shape[1] > 2:
-        own = workspace
-        settings = own.samples_per_segment, own.pivots, own.floats, own.integers
-        redistribute_arms(via_points, arm_slices, padded(num_lanes), *settings)
+        redistribute_arms(via_points, arm_slices, padded(num_lanes), workspace)
 
 
 def relax(via_points: np.ndarray, delta: float, num_lanes: int) -> None:

@@ -68,24 +68,6 @@ def test_begins_and_ends_bit_for_bit_and_every_step_has_its_length():
         assert np.allclose(lengths, step, rtol=1e-12)
 
 
-def test_turns_of_a_planar_walk_are_uniform():
-    via_points, uniforms, _, goal, _ = fresh(3, [2], 20, 400)
-    strings = via_points[:, :, 3:403]
-    move, toward = np.diff(strings, axis=1)[:, :-1], goal[:, None, None] - strings[:, :-2]
-    turn = np.arctan2(toward[0] * move[1] - toward[1] * move[0], (toward * move).sum(axis=0))
-    limit = TURN
-    assert np.allclose(turn.T, (2 * uniforms - 1) * limit, atol=1e-9)
-    # uniform in ±limit: mean 0, variance limit²/3; 7600 turns, five standard errors
-    assert abs(turn.mean()) < 5 * limit / math.sqrt(3 * turn.size)
-    assert abs(turn.var() / (limit**2 / 3) - 1) < 5 * math.sqrt(0.8 / turn.size)
-
-
-def test_without_turning_it_is_straight():
-    via_points, _, start, goal, _ = fresh(4, [3], 20, 3, step=1.0, max_turn=0.0)
-    line = start + (goal - start) * np.linspace(0.0, 1.0, 21)[:, None]
-    assert np.allclose(via_points[:, :, 3:6], line.T[:, :, None], rtol=0.0, atol=1e-9)
-
-
 @pytest.mark.parametrize("joints", [[1], [2], [3], [6], [2, 1, 3]])
 def test_a_walk_to_where_it_begins_stays_there(joints):
     here = np.full(sum(joints), 0.3)
@@ -101,13 +83,6 @@ def test_a_goal_along_one_axis_gives_no_nan(start, goal):
         6, [3], 20, 30, max_turn=math.pi / 2, start=np.float64(start), goal=np.float64(goal)
     )
     assert np.all(np.isfinite(via_points[:, :, 3:33]))
-
-
-def test_one_joint_has_no_angle_to_turn():
-    via_points, uniforms, _, _, _ = fresh(7, [1], 20, 3, step=2.5, start=[0.0], goal=[100.0])
-    assert uniforms.shape == (3, 0)
-    assert np.allclose(via_points[0, :9, 3], 12.5 * np.arange(9))
-    assert np.all(np.abs(via_points[0, 8:, 3] - 100.0) <= 12.5 + 1e-9)
 
 
 def test_consumes_one_angle_fewer_than_joints_per_step():

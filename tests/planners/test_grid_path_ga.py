@@ -116,26 +116,6 @@ def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
         assert nodes_of(child) not in (nodes_of(table[0]), nodes_of(table[1]))
 
 
-def test_without_crossover_and_mutation_only_selection_is_left() -> None:
-    own = planner(crossover_rate=0.0, mutation_rate=0.0, num_elites=0)
-    problem = solvable((9, 9), 0.3, 1, own)
-    first: set[tuple[int, ...]] = set()
-    for generation in generations(own.evolve(problem, rng(3))):
-        paths = {tuple(nodes_of(path)) for path in generation.population}
-        first = first or paths
-        assert paths <= first
-
-
-def test_elites_stay() -> None:
-    own = planner(num_elites=2, mutation_rate=1.0, num_generations=20)
-    problem = solvable((12, 12), 0.3, 2, own)
-    bests = [
-        generation.best_cost_in_generation
-        for generation in generations(own.evolve(problem, rng(0)))
-    ]
-    assert all(b <= a for a, b in zip(bests, bests[1:], strict=False))
-
-
 def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
     """A labyrinth, whose walks take more numbers than a block has.
 
@@ -174,15 +154,6 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
     monkeypatch.setattr(grid_planner, "BLOCK", block)
     monkeypatch.setattr(grid_planner, "PER_CALL", stretch)
     assert run() == expected
-
-
-def test_the_last_population_is_only_its_paths() -> None:
-    own = planner()
-    problem = solvable((9, 9), 0.3, 4, own)
-    *_, last = generations(own.evolve(problem, rng(6)))
-    assert last.population.shape[1] == last.population[:, 0].max() + 1
-    assert all(not path[path[0] + 1 :].any() for path in last.population)
-    np.testing.assert_array_equal(own.cost(problem, last.population).cost, last.costs)
 
 
 def test_walks_whose_moves_weigh_no_whole_numbers_take_the_longer_way() -> None:
@@ -302,20 +273,6 @@ def test_robot_and_grid_have_the_same_dimensions() -> None:
         SettingError, match=r"robot\.dimensions: must be as many as the grid has \(2\), was 3"
     ):
         planner().prepare(robot(3), scenario(np.zeros((4, 4), dtype=bool)))
-
-
-def test_random_search_draws_the_same_first_paths() -> None:
-    own = planner()
-    problem = solvable((9, 9), 0.3, 4, own)
-    control = RandomSearch(planner=own)
-    first, drawn = (
-        next(generations(own.evolve(problem, rng(7)))),
-        next(generations(control.evolve(problem, rng(7)))),
-    )
-    assert [nodes_of(path) for path in first.population] == [
-        nodes_of(path) for path in drawn.population
-    ]
-    assert np.array_equal(first.costs, drawn.costs)
 
 
 def test_populations_are_checked() -> None:

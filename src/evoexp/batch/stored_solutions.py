@@ -35,7 +35,9 @@ def contradictions(path: Path, log: LogContents) -> Iterator[str]:
         yield from map(str, _contradictions(planner, problem, log))
 
 
-def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterator[FieldDifference]:
+def _contradictions(
+    planner: Planner[Any], problem: Any, log: LogContents
+) -> Iterator[FieldDifference]:
     rows = {row.index: row for row in log.generations}
     terms: Mapping[str, float] = {}
     for solution in log.solutions:
@@ -63,7 +65,7 @@ def _contradictions(planner: Planner, problem: Any, log: LogContents) -> Iterato
     yield from _unlike(flatten(log.summary), verdict, "motion of the last solution: ")
 
 
-def _terms(planner: Planner, problem: Any, solution: SolutionRow) -> dict[str, float]:
+def _terms(planner: Planner[Any], problem: Any, solution: SolutionRow) -> dict[str, float]:
     """Return the terms of a solution."""
     if not (np.abs(solution.values) <= LARGEST).all():  # NaN, too
         raise ValueError(f"its numbers must be finite and at most {LARGEST:g}")

@@ -65,25 +65,15 @@ def drawn_move(uniform: float, sums: NDArray[Any]) -> int:
 
 @kernel
 def walk(
-    draws: Block,
-    moves: Moves,
-    sums: SumArray,
-    ends: tuple[int, int],
-    erase: bool,
-    path: NodeArray,
-    place: NodeArray,
+    draws: Block,  # one number is taken per step; if they are used up, the walk breaks off
+    moves: Moves,  # with a table of sums their potentials are not read
+    sums: SumArray,  # (1, nodes, moves) of `weigh_all`; (0, nodes, moves): worked out on the way
+    ends: tuple[int, int],  # indices of the start and of the target, which the front must reach
+    erase: bool,  # whether loops are erased
+    path: NodeArray,  # (≥ nodes + 1,), written; see above
+    place: NodeArray,  # (nodes,) scratch
 ) -> None:
-    """Write a random path: every step draws one of the permitted moves, weighted by `weigh_moves`.
-
-    Args:
-        draws: One number is taken per step; if they are used up, the walk breaks off.
-        moves: The moves and their potentials; with a table of sums the potentials are not read.
-        sums: (1, nodes, moves) of `weigh_all`; (0, nodes, moves): worked out as the walk goes.
-        ends: Indices of the node it starts at and of the target, which the front must reach.
-        erase: Whether loops are erased.
-        path: (≥ nodes + 1,), written; see above.
-        place: (nodes,) scratch.
-    """
+    """Write a random path: a step draws a permitted move, weighted as by `weigh_moves`."""
     uniforms, taken, neighbours = draws.uniforms, draws.taken, moves.neighbours
     node, target = ends
     at, num, count, is_table = taken[0], len(uniforms), 1, len(sums) > 0

@@ -48,6 +48,7 @@ from evoexp.paths.workspace import (
     VECTOR,
     Layout,
     Offsets,
+    Redistribution,
     layout,
 )
 from evoexp.records import FloatArray, IntArray
@@ -198,13 +199,11 @@ def spline_point(knots: tuple[Vector, Vector, Vector, Vector], u: Vector) -> Vec
 
 @kernel
 def redistribute_arms(
+    # (nq, N + 1, lanes) paths, N ≥ 2, any unit common to the joints of an arm; lanes fill vectors
     via_points: FloatArray,
-    arm_slices: IntArray,
-    num_lanes: int,
-    samples_per_segment: int,
-    pivots: FloatArray,
-    w: FloatArray,
-    integers: Offsets,
+    arm_slices: IntArray,  # (arms, 2) first and last-plus-one joint of each arm
+    num_lanes: int,  # that are treated, a multiple of eight; those behind are left alone
+    spline: Redistribution,
 ) -> None:
     """Move the via-points of every arm's path to equal arc length along its spline, in place.
 
@@ -212,19 +211,11 @@ def redistribute_arms(
     bits; a path without length keeps all of them. Lengths come from `samples_per_segment` speeds
     per segment by a rule of fourth order: 8 are about as accurate as 16 chords, 16 about five times
     better.
-
-    Args:
-        via_points: (nq, N + 1, lanes) paths, N ≥ 2, any unit common to the joints of an arm; lanes
-            a multiple of eight.
-        arm_slices: (arms, 2) first and last-plus-one joint of each arm.
-        num_lanes: Lanes that are treated, a multiple of eight; those behind are left alone.
-        samples_per_segment: A power of two from 8 on.
-        pivots: (N + 1,) of `prepare_redistribution`.
-        w: Scratch, not to be shared between threads.
     """
-    N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples_per_segment)
+    flat, spline = borrowed((via_points.reshape(-1), spline))
+    samples, pivots, w, integers = spline
+    N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples)
     pitch = np.uint64(via_points.shape[2])
-    flat, pivots, w, integers = borrowed((via_points.reshape(-1), pivots, w, integers))
     for arm in range(arm_slices.shape[0]):
         joint = np.uint64(arm_slices[arm, 0])
         joints = np.uint64(arm_slices[arm, 1]) - joint

@@ -17,14 +17,14 @@ def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
 
 @kernel
 def walk_strings(
-    via_points: FloatArray,
-    lanes: IntArray,
-    uniforms: FloatArray,
-    start: FloatArray,
-    goal: FloatArray,
-    arm_slices: IntArray,
-    step: float,
-    max_turn: float,
+    via_points: FloatArray,  # (nq, N + 1, lanes), written in the given lanes
+    lanes: IntArray,  # (strings,) where to write
+    uniforms: FloatArray,  # (strings, num_uniforms) in [0, 1)
+    start: FloatArray,  # (nq,)
+    goal: FloatArray,  # (nq,)
+    arm_slices: IntArray,  # (arms, 2) rows of each arm
+    step: float,  # step length in units of D / N
+    max_turn: float,  # turns are uniform in ± this [rad]
 ) -> None:
     """Write new strings into some lanes.
 
@@ -32,32 +32,13 @@ def walk_strings(
     A step goes in the direction of the goal, each of whose angles is turned by a uniform random
     angle: in the plane of two joints the one angle, in space azimuth and elevation, and so on. The
     goal itself is the last point. An arm of one joint has no angle to turn.
-
-    Args:
-        via_points: (nq, N + 1, lanes), written in the given lanes.
-        lanes: (strings,) where to write.
-        uniforms: (strings, num_uniforms) in [0, 1).
-        start: (nq,).
-        goal: (nq,).
-        arm_slices: (arms, 2) rows of each arm.
-        step: Step length in units of D / N.
-        max_turn: Turns are uniform in ± this [rad].
     """
     memory = np.empty((3, len(start) * LANES))
+    ends, scratch = (start, goal), (memory[0], memory[1], memory[2])
     for first in range(0, len(lanes), LANES):
-        count = min(LANES, len(lanes) - first)
+        own = slice(first, min(first + LANES, len(lanes)))
         _walk_eight(
-            via_points,
-            lanes[first : first + count],
-            uniforms[first : first + count],
-            start,
-            goal,
-            arm_slices,
-            step,
-            max_turn,
-            memory[0],
-            memory[1],
-            memory[2],
+            via_points, lanes[own], uniforms[own], ends, arm_slices, step, max_turn, scratch
         )
 
 
@@ -66,18 +47,17 @@ def _walk_eight(
     via_points: FloatArray,
     lanes: IntArray,
     uniforms: FloatArray,
-    start: FloatArray,
-    goal: FloatArray,
+    ends: tuple[FloatArray, FloatArray],
     arm_slices: IntArray,
     step: float,
     max_turn: float,
-    here: FloatArray,
-    direction: FloatArray,
-    drawn: FloatArray,
+    scratch: tuple[FloatArray, FloatArray, FloatArray],
 ) -> None:
-    """Write up to eight strings, as vectors; the last three arguments are scratch."""
-    via_points, lanes, uniforms = borrowed((via_points, lanes, uniforms))
-    here, direction, drawn = borrowed((here, direction, drawn))
+    """Write up to eight strings, as vectors."""
+    via_points, lanes, uniforms, ends, scratch = borrowed(
+        (via_points, lanes, uniforms, ends, scratch)
+    )
+    (start, goal), (here, direction, drawn) = ends, scratch
     num, count, taken = via_points.shape[1] - 1, len(lanes), 0
     drawn[:] = 0.0  # for the lanes without a string
     for arm in range(len(arm_slices)):

@@ -36,14 +36,10 @@ EndCondition = Literal["natural", "clamped"]
 
 
 class Redistribution(NamedTuple):
-    """Settings, constant factor and scratch of `redistribute_arms`, for one thread."""
+    """Constant factor and scratch of `redistribute_arms`, for one thread."""
 
-    num_via_points: int  # N; a path has the N + 1 points 0..N
-    max_joints: int  # the most joints that one arm may have
-    # `natural` (no curvature at the ends) or `clamped` (no slope there)
-    end_condition: EndCondition
-    samples_per_segment: int  # speeds evaluated per segment
-    pivots: FloatArray  # reciprocal pivots of the tridiagonal system.  # (N + 1,)
+    samples_per_segment: int  # speeds evaluated per segment, a power of two from 8 on
+    pivots: FloatArray  # (N + 1,) reciprocal pivots of the tridiagonal system
     floats: FloatArray  # scratch, 64-byte aligned
     integers: Offsets  # scratch
 
@@ -124,25 +120,14 @@ def aligned_zeros(size: int) -> FloatArray:
 
 
 def prepare_redistribution(
-    num_via_points: int,
-    max_joints: int,
-    end_condition: EndCondition = "natural",
-    samples_per_segment: int = 8,
+    num_via_points: int,  # N; a path has the N + 1 points 0..N
+    max_joints: int,  # the most joints that one arm may have
+    end_condition: EndCondition = "natural",  # or `clamped`: zero slope at both ends
+    samples_per_segment: int = 8,  # a power of two from 8 to 1024; see `redistribute_arms`
 ) -> Redistribution:
-    """Factor the splines' system and allocate the scratch of `redistribute_arms`, once.
-
-    Args:
-        num_via_points: N; a path has the N + 1 points 0..N.
-        max_joints: The most joints that one arm may have.
-        end_condition: `natural` or `clamped` (zero slope at both ends).
-        samples_per_segment: Speeds evaluated per segment, a power of two from 8 to 1024; see
-            `redistribute_arms`.
-    """
+    """Factor the splines' system and allocate the scratch of `redistribute_arms`, once."""
     at = layout(*(np.uint64(size) for size in (max_joints, num_via_points, samples_per_segment)))
     return Redistribution(
-        num_via_points,
-        max_joints,
-        end_condition,
         samples_per_segment,
         spline_pivots(num_via_points, end_condition),
         aligned_zeros(int(at.size)),

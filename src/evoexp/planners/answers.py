@@ -7,7 +7,7 @@ what was asked for.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,31 +19,12 @@ LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
 SAME = 1e-6  # [unit of the values] files hold rounded numbers: what differs by less is the same
 
 
-class Judgement(Protocol):
-    """A judged population."""
-
-    @property
-    def cost(self) -> FloatArray:
-        """(individuals,) lower is better; inf: infeasible."""
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """(individuals,) whether the planner's own model accepts each."""
-
-    @property
-    def collision_queries(self) -> int:
-        """Configurations that the algorithm asks for, also those that the kernels skip."""
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the paper's own terms of one individual."""
-
-
 class JudgementArrays(NamedTuple):
-    """A `Judgement` as plain arrays."""
+    """A judged population."""
 
     cost: FloatArray  # (individuals,) lower is better; inf: infeasible
     feasible: BoolArray  # (individuals,) whether the planner's own model accepts each
-    collision_queries: int  # configurations that the algorithm asks for
+    collision_queries: int  # configurations asked for, also those that the kernels skip
     terms: Mapping[str, NDArray[Any]]  # name → (individuals,) of the planner's own terms
 
     def named_terms(self, individual: int) -> dict[str, float]:

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.bodies.body_collision import Clearances
+from evoexp.collision.bodies.body_models import BodyModel
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.collision.box_support import coal
@@ -64,7 +65,8 @@ class ArmProblem:
     @property
     def margins(self) -> FloatArray:
         """(pairs of the scene,) clearance that the task requires of each [length unit]."""
-        return margins(self.assembly, self.scene, self.security_margin, self.obstacle_margin)
+        among = obstacle_pairs(self.assembly, self.scene)
+        return np.where(among, self.obstacle_margin, self.security_margin)
 
     @property
     def limits(self) -> FloatArray:
@@ -88,11 +90,12 @@ def arm_problem(
     elif isinstance(scenario, GridMotion):
         assembly = _within_floor(assembly, scenario)
     task = _arm_motion(assembly, scenario)
-    start, goal = ends_of(assembly, task)
+    # a metre of a sliding joint counts as a radian, 57.3 degrees
+    units = np.where(moving_joints(assembly).slides, 1.0 / DEGREE, 1.0)
+    start, goal = (q * units for q in task.ends(assembly.arm_slices))
     collision: SphereCollision | CoveredCollision
     if isinstance(model, CoveredBodies):
-        bodies = covered_scene(assembly, task, scenario)
-        collision = covered_collision(model, bodies, assembly, task, scenario, (start, goal))
+        collision, bodies = _covered(model, assembly, task, scenario, (start, goal))
     else:
         collision = model.bind(assembly, task.obstacles)
         given = ("q_start", start, task.q_start), ("q_goal", goal, task.q_goal)
@@ -109,10 +112,18 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
     """Return a task as a motion between configurations, all joints relative to the link before.
 
     Raises:
-        SettingError: If its goal is a pose, it is silent about a joint, or robots stand still.
+        SettingError: If its goal is a pose, it is silent about a joint, robots stand still, or an
+            obstacle stands on the start or the goal of a grid.
     """
     if isinstance(task, GridMotion):
-        return _floor_motion(task)
+        task.blocked()  # refuses ends that are blocked
+        return ArmMotion(
+            q_start=(tuple(map(float, task.start)),),
+            q_goal=(tuple(map(float, task.goal)),),
+            security_margin=task.security_margin,
+            length_unit=task.length_unit,
+            obstacles=task.bodies(),
+        )
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
     from evoexp.collision.planar.link_collision import two_link_arms  # and its kernels
@@ -149,30 +160,9 @@ def _within_floor(assembly: Assembly, task: GridMotion) -> Assembly:
     return assembly._replace(model=model)
 
 
-def _floor_motion(task: GridMotion) -> ArmMotion:
-    """Return the way over a grid as a motion from one place to another [length unit].
-
-    Raises:
-        SettingError: If an obstacle stands on the start or the goal.
-    """
-    task.blocked()  # refuses ends that are blocked
-    return ArmMotion(
-        q_start=(tuple(map(float, task.start)),),
-        q_goal=(tuple(map(float, task.goal)),),
-        security_margin=task.security_margin,
-        length_unit=task.length_unit,
-        obstacles=task.bodies(),
-    )
-
-
-def margins(
-    assembly: Assembly, bodies: Scene, security_margin: float, obstacle_margin: float
-) -> FloatArray:
-    """Return the clearance that a task requires of each pair of a scene, (pairs,)."""
-    return np.where(obstacle_pairs(assembly, bodies), obstacle_margin, security_margin)
-
-
-def cover_shapes(collision: SphereCollision | CoveredCollision) -> tuple[CoverShape, ...]:
+def cover_shapes(
+    collision: SphereCollision | CoveredCollision | BodyModel,
+) -> tuple[CoverShape, ...]:
     """Return the circles, spheres and capsules that a collision model tests."""
     joint, start, end, radius, _ = collision.shapes
     columns = joint.tolist(), start, end, radius.tolist()
@@ -190,22 +180,10 @@ def cover_notes(
     """
     if not isinstance(collision, CoveredCollision):
         return []
-    hulls = hull_names(bodies, collision.assembly.geometry.ngeoms)
+    first = collision.assembly.geometry.ngeoms
+    obstacles = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
+    hulls = [name for name, (shape, _, _) in obstacles if isinstance(shape, coal.ConvexBase)]
     return [*collision.notes(unit), *hull_notes(hulls)]
-
-
-def ends_of(assembly: Assembly, task: ArmMotion) -> tuple[FloatArray, FloatArray]:
-    """Return start and goal as strings have them, each (nq,) [deg].
-
-    A metre of a sliding joint counts as a radian, 57.3 degrees.
-
-    Raises:
-        SettingError: If they do not fit the robot's arms and joints.
-    """
-    start, goal = task.ends(assembly.arm_slices)
-    slides = moving_joints(assembly).slides
-    units = np.where(slides, 1.0 / DEGREE, 1.0)
-    return start * units, goal * units
 
 
 def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> None:
@@ -227,44 +205,28 @@ def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> Non
             raise SettingError(field, must, float(DEGREE * q[k] / unit))
 
 
-def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmTask) -> Scene:
-    """Return the exact bodies of a robot among the obstacles of a task, pairs of one arm included.
-
-    Args:
-        task: Its obstacles, by which contacts are named.
-        given: The task as the scenario has it; names the pairs that may touch.
-    """
-    found, num_bodies = scene(assembly, task.obstacles, self_pairs=True), assembly.geometry.ngeoms
-    if isinstance(given, MoveitTask):
-        found = without_pairs(found, given, assembly)
-    names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
-    return found._replace(names=(*found.names[:num_bodies], *names))
-
-
-def hull_names(bodies: Scene, first: int) -> list[str]:
-    """Return the names of obstacles, the bodies from `first` on, that are convex hulls."""
-    rest = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
-    return [name for name, (shape, _, _) in rest if isinstance(shape, coal.ConvexBase)]
-
-
-def covered_collision(
+def _covered(
     model: CoveredBodies,
-    bodies: Scene,
     assembly: Assembly,
-    task: ArmMotion,
-    given: ArmTask,
+    task: ArmMotion,  # its obstacles, by which contacts are named
+    given: ArmTask,  # the task as the scenario has it; names the pairs that may touch
     ends: tuple[FloatArray, FloatArray],
-) -> CoveredCollision:
-    """Return the covered bodies of a robot, after a look at the exact ones at start and goal.
+) -> tuple[CoveredCollision, Scene]:
+    """Return the covered bodies of a robot, and the exact ones, pairs of one arm included.
 
     Raises:
         SettingError: If bodies touch at the start or the goal, or these are beyond limits.
     """
+    ignored: tuple[tuple[int, int], ...] = ()
+    bodies = scene(assembly, task.obstacles, self_pairs=True)
+    if isinstance(given, MoveitTask):
+        bodies, ignored = without_pairs(bodies, given, assembly), touching(assembly, given)
+    names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
+    bodies = bodies._replace(names=(*bodies.names[: assembly.geometry.ngeoms], *names))
     check_limits(assembly, ends)
     for field, q in zip(FIELDS, ends, strict=True):
         check_bodies(bodies, DEGREE * q, field, task.length_unit)
-    ignored = touching(assembly, given) if isinstance(given, MoveitTask) else ()
-    return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored)
+    return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored), bodies
 
 
 def check_spheres(clearance: Clearances, field: str, given: Any, unit: str) -> None:

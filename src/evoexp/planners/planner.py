@@ -6,8 +6,18 @@ alike; everything else a planner writes itself. `evoexp.testing` checks every ob
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    Literal,
+    NamedTuple,
+    Protocol,
+    TypeVar,
+    runtime_checkable,
+)
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +26,35 @@ from evoexp.collision.scene import Part, Scene
 from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
-from evoexp.planners.answers import Judgement as Judgement
 from evoexp.planners.answers import JudgementArrays as JudgementArrays
 from evoexp.planners.answers import Shape as Shape
 from evoexp.planners.answers import num_values as num_values
 from evoexp.records import Best, Block, BoolArray, FloatArray
 
 Reproducibility = Literal["bits", "environment"]
+Populations = Generator[FloatArray, JudgementArrays, None]
 # Copies of a population that a run of most planners holds: parents, offspring, paths between them.
 COPIES = 5
 
 
+class SceneTask(Protocol):
+    """A problem, as far as `PlannerDefaults` reads it."""
+
+    @property
+    def scene(self) -> Scene | None:
+        """The exact bodies; None: nothing to judge by."""
+
+    @property
+    def security_margin(self) -> float:
+        """Clearance that the task requires [length unit of the scene]."""
+
+
+Problem = TypeVar("Problem")
+Task = TypeVar("Task", bound=SceneTask)
+
+
 @runtime_checkable
-class Planner(Protocol):
+class Planner(Protocol[Problem]):
     """All obligations of a planner; `problem` is the value that its own `prepare` returned."""
 
     # the registered name; a guest's begins with the name of its distribution
@@ -41,7 +67,7 @@ class Planner(Protocol):
     # whether it is a truth that needs no seed, and so has one replicate
     is_reference: ClassVar[bool]
 
-    def prepare(self, robot: Any, scenario: Any) -> Any:
+    def prepare(self, robot: Any, scenario: Any) -> Problem:
         """Build the robot, check the scenario against it, return the problem.
 
         The annotations of both parameters name the types of robots and scenarios that fit.
@@ -50,7 +76,7 @@ class Planner(Protocol):
             SettingError: If robot, scenario and settings contradict each other.
         """
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then all generations, one or several per `Block`."""
 
     @property
@@ -64,18 +90,18 @@ class Planner(Protocol):
         generation of a planner that ends by itself (`stop_reason`) may evaluate fewer.
         """
 
-    def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
+    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw `count` individuals as the initial population is drawn, individuals last.
 
         Raises:
             SettingError: If the planner has several populations, one after the other.
         """
 
-    def cost(self, problem: Any, population: FloatArray) -> Judgement:
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge a population as `sample` returns it."""
 
     def improve(
-        self, problem: Any, population: FloatArray, rng: np.random.Generator
+        self, problem: Problem, population: FloatArray, rng: np.random.Generator
     ) -> FloatArray | None:
         """Return a population after one pass of the planner's local operator, without evolution.
 
@@ -85,58 +111,58 @@ class Planner(Protocol):
             Like `sample`; None if the planner has no such operator.
         """
 
-    def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
+    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return one individual of a population as a flat solution."""
 
-    def motion(self, problem: Any, solution: FloatArray) -> Motion | None:
+    def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the joint-space motion of a solution; None where the answer is no motion."""
 
-    def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
+    def parts(self, problem: Problem, motion: Motion) -> Sequence[Part]:
         """Return the pieces of a motion in the order of time, each with its exact bodies.
 
         Most motions are one piece; without pieces there is nothing to judge by.
         """
 
-    def security_margin(self, problem: Any) -> float:
+    def security_margin(self, problem: Problem) -> float:
         """Return the clearance that the task requires [length unit of the scene]."""
 
-    def evaluate(self, problem: Any, solution: FloatArray) -> dict[str, float]:
+    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the named terms of a solution, as `evoexp evaluate` prints them.
 
         Raises:
             ValueError: If the solution has not the documented shape.
         """
 
-    def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
+    def departures(self, problem: Problem, solution: FloatArray) -> Sequence[str]:
         """Return the ways in which a solution is none of the task, each in a phrase.
 
         Another start or goal, a joint beyond its limits, a forbidden move; nothing about
         collisions, which `parts` are judged for, nor about a goal that a search comes near to.
         """
 
-    def shape(self, problem: Any) -> Shape:
+    def shape(self, problem: Problem) -> Shape:
         """Return the documented shape of a solution, part by part."""
 
-    def memory(self, problem: Any) -> int:
+    def memory(self, problem: Problem) -> int:
         """Return an estimate of the memory that a run takes beyond that of its problem [B].
 
         It need not be exact, yet grow as the memory does with populations, paths and generations:
         a run that would take more than there is is refused before it begins.
         """
 
-    def prior_queries(self, problem: Any) -> int:
+    def prior_queries(self, problem: Problem) -> int:
         """Return how many configurations the task itself says to be free or not, as a map does.
 
         Comparisons add them to the queries of a run: another planner asks for them one by one.
         """
 
-    def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
+    def listing(self, problem: Problem, solution: FloatArray) -> Listing | None:
         """Return a table with one row per configuration; None if the planner has none."""
 
-    def notes(self, problem: Any) -> Sequence[str]:
+    def notes(self, problem: Problem) -> Sequence[str]:
         """Return remarks on settings and problem, one per line, for `show` and the report."""
 
-    def covers(self, problem: Any) -> Sequence[CoverShape]:
+    def covers(self, problem: Problem) -> Sequence[CoverShape]:
         """Return the spheres and capsules that the search tests in place of the robot's bodies.
 
         They are drawn beside the bodies. A search that tests other shapes, or the bodies
@@ -144,11 +170,24 @@ class Planner(Protocol):
         """
 
 
-class PlannerDefaults:
+if TYPE_CHECKING:
+
+    class _ByProblem(Generic[Task]):
+        """A class that is generic over its problem."""
+else:
+
+    class _ByProblem:
+        """The same when it runs: pydantic takes `typing.Generic` behind its own classes only."""
+
+        def __class_getitem__(cls, problem: Any) -> type:
+            return cls
+
+
+class PlannerDefaults(_ByProblem[Task]):
     """The usual answers of a planner, to be inherited before `Component`.
 
-    They need a problem with the attributes `scene` (a `Scene`, or None) and `security_margin`, and
-    a planner with a field `ga` that has `population_size`, `num_offspring` and `num_generations`.
+    They need a planner with a field `ga` that has `population_size`, `num_offspring` and
+    `num_generations`.
     """
 
     reproducibility: ClassVar[Reproducibility] = "bits"
@@ -160,7 +199,7 @@ class PlannerDefaults:
 
     if TYPE_CHECKING:
         ga: Any  # has `population_size`, `num_offspring` and `num_generations`
-        shape: Callable[[Any], Shape]
+        shape: ClassVar[Callable[..., Shape]]
 
     @property
     def answers_are_proven(self) -> bool:
@@ -177,19 +216,19 @@ class PlannerDefaults:
         return int(self.ga.num_offspring if index else self.ga.population_size)
 
     def improve(
-        self, problem: Any, population: FloatArray, rng: np.random.Generator
+        self, problem: Task, population: FloatArray, rng: np.random.Generator
     ) -> FloatArray | None:
         """Return None: there is no local operator."""
         return None
 
-    def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
+    def parts(self, problem: Task, motion: Motion) -> Sequence[Part]:
         """Return the whole motion with the problem's scene, or nothing without a scene."""
-        bodies: Scene | None = problem.scene
+        bodies = problem.scene
         return () if bodies is None else (Part(bodies, 0, motion.num_segments),)
 
-    def security_margin(self, problem: Any) -> float:
+    def security_margin(self, problem: Task) -> float:
         """Return the problem's margin."""
-        return float(problem.security_margin)
+        return problem.security_margin
 
     def cost_of_terms(self, terms: Mapping[str, float]) -> float:
         """Return the recorded cost of a solution, given its terms as `evaluate` names them.
@@ -198,28 +237,28 @@ class PlannerDefaults:
         """
         return terms.get("cost", math.nan)
 
-    def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
+    def departures(self, problem: Task, solution: FloatArray) -> Sequence[str]:
         """Return none: every solution of the documented shape is one of the task."""
         return ()
 
-    def memory(self, problem: Any) -> int:
+    def memory(self, problem: Task) -> int:
         """Return the memory of `COPIES` populations of solutions."""
         individuals = max(self.num_evaluations(0), self.num_evaluations(1))
         return 8 * COPIES * num_values(self.shape(problem)) * individuals
 
-    def prior_queries(self, problem: Any) -> int:
+    def prior_queries(self, problem: Task) -> int:
         """Return 0: a search asks for all that it knows."""
         return 0
 
-    def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
+    def listing(self, problem: Task, solution: FloatArray) -> Listing | None:
         """Return None: there is no table."""
         return None
 
-    def notes(self, problem: Any) -> Sequence[str]:
+    def notes(self, problem: Task) -> Sequence[str]:
         """Return no remarks."""
         return ()
 
-    def covers(self, problem: Any) -> Sequence[CoverShape]:
+    def covers(self, problem: Task) -> Sequence[CoverShape]:
         """Return none: the search tests no spheres and capsules."""
         return ()
 
@@ -233,22 +272,15 @@ class Candidate(NamedTuple):
 
 
 class Keeper:
-    """Keeps the best solution so far and the counts, and makes blocks of generations.
-
-    Attributes:
-        index: Index of the last recorded generation; −1 before the first.
-        cost: Least cost so far.
-        best: The solution of that cost.
-        evaluations: Evaluations so far.
-        collision_queries: Configurations asked for so far.
-    """
+    """Keeps the best solution so far and the counts, and makes blocks of generations."""
 
     __slots__ = ("_tried", "best", "collision_queries", "cost", "evaluations", "index")
 
     def __init__(self) -> None:
-        self.index, self.cost, self._tried = -1, np.inf, np.inf
-        self.best = Candidate(np.empty(0), {}, False)
-        self.evaluations = self.collision_queries = 0
+        self.index = -1  # of the last recorded generation
+        self.cost = self._tried = np.inf  # least cost so far, and of what is not proven
+        self.best = Candidate(np.empty(0), {}, False)  # the solution of that cost
+        self.evaluations = self.collision_queries = 0  # so far
 
     def improves(self, cost: float) -> bool:
         """Return whether a cost is to be kept: a lower one, or the first of all."""
@@ -282,16 +314,13 @@ class Keeper:
             self.keep(np.inf, candidate(cheapest, False))
 
     def record_judged(
-        self, planner: Planner, problem: Any, population: FloatArray, judgement: Judgement
+        self,
+        planner: Planner[Problem],  # makes a solution of the best individual
+        problem: Problem,
+        population: FloatArray,  # individuals last, all of them new in this generation
+        judgement: JudgementArrays,  # of this population
     ) -> Block:
-        """Keep the best individual of a generation if it improves, and return a block of it.
-
-        Args:
-            planner: The planner, which makes a solution of the best individual.
-            problem: Its problem.
-            population: Individuals last, all of them new in this generation.
-            judgement: Of this population.
-        """
+        """Keep the best individual of a generation if it improves, and return a block of it."""
         statistics, feasible = cost_statistics(judgement.cost), judgement.feasible
         k = statistics.best
         lowest = float(judgement.cost[k])
@@ -316,32 +345,20 @@ class Keeper:
 
     def record(
         self,
-        statistics: CostStatistics,
-        costs: FloatArray,
-        population: NDArray[Any],
+        statistics: CostStatistics,  # mean and deviation of its costs
+        costs: FloatArray,  # (individuals,); see `Generation`
+        population: NDArray[Any],  # any shape
         *,
-        lowest: float,
-        num_feasible: int,
-        evaluations: int,
-        collision_queries: int,
+        lowest: float,  # its lowest cost; where the best is a team, the lowest of a team
+        num_feasible: int,  # individuals that the planner's own model accepts
+        evaluations: int,  # of this generation
+        collision_queries: int,  # configurations that this generation asked for
+        # see `Generation`
         criteria: FloatArray | None = None,
         stop_reason: str = "",
         arrays: Mapping[str, NDArray[Any]] | None = None,
     ) -> Block:
-        """Count a generation and return a block of it.
-
-        Args:
-            statistics: Mean and deviation of its costs.
-            costs: (individuals,); see `Generation`.
-            population: Any shape.
-            lowest: Its lowest cost; where the best is a team, the lowest of a team.
-            num_feasible: Individuals that the planner's own model accepts.
-            evaluations: Evaluations of this generation.
-            collision_queries: Configurations that this generation asked for.
-            criteria: See `Generation`.
-            stop_reason: See `Generation`.
-            arrays: See `Generation`.
-        """
+        """Count a generation and return a block of it."""
         self.index += 1
         self.evaluations += evaluations
         self.collision_queries += collision_queries
@@ -363,10 +380,18 @@ class Keeper:
         )
 
 
-def judged_samples(planner: Planner, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
-    """Yield generations of samples, each drawn as the planner draws its initial population."""
-    keeper = Keeper()
-    for index in range(planner.num_generations + 1):
-        population = planner.sample(problem, rng, planner.num_evaluations(index))
+def judged_generations(
+    planner: Planner[Problem], problem: Problem, populations: Populations
+) -> Iterator[Block]:
+    """Yield as many generations as a planner has, each population judged as it judges its own.
+
+    Args:
+        planner: The planner.
+        problem: Its problem.
+        populations: Yields them, individuals last; each one is sent back judged.
+    """
+    keeper, judged = Keeper(), None
+    for _ in range(planner.num_generations + 1):
+        population = next(populations) if judged is None else populations.send(judged)
         judged = planner.cost(problem, population)
         yield keeper.record_judged(planner, problem, population, judged)

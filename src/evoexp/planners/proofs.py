@@ -21,7 +21,7 @@ margins.
 KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave as it is
 
 
-def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certificate:
+def judge_motion(planner: Planner[Any], problem: Any, motion: Motion | None) -> Certificate:
     """Judge a planner's motion by the exact bodies; without a motion the certificate is empty."""
     if motion is None:
         return Certificate()

@@ -8,6 +8,7 @@ import numpy as np
 from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import num_values
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.testing.evolution_record import demand, evolution
@@ -61,12 +62,8 @@ def solutions_have_the_documented_shape(condition: Condition) -> None:
 def _fits(size: int, shape: Any) -> bool:
     """Return whether a flat solution of this size can have a documented shape."""
     if len(shape) and shape[0] is ...:
-        return size > 0 and size % _size(shape[1:]) == 0
-    return size == _size(shape)
-
-
-def _size(parts: Any) -> int:
-    return sum(int(math.prod(part)) for part in parts)
+        return size > 0 and size % num_values(shape[1:]) == 0
+    return size == num_values(shape)
 
 
 def samples_are_judged_alike(condition: Condition) -> None:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
+from evoexp.evolution.genetic_settings import PopulationSettings
 from evoexp.evolution.operators.operator import Context, Crossover, Genome, Mutation, Selection
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.records import FloatArray, IntArray
@@ -44,14 +45,14 @@ class Breeding(NamedTuple):
     mutating: FloatArray  # settings of the mutation
 
     @classmethod
-    def of(cls, operators: Operators, genome: Genome, ga: Any, counts: Sequence[int]) -> Self:
-        """Return the rules of breeding.
-
-        Args:
-            genome: Of every individual.
-            ga: A component with the population's size, rates and generations.
-            counts: Numbers of offspring that there may be: each one less than the one before.
-        """
+    def of(
+        cls,
+        operators: Operators,
+        genome: Genome,  # of every individual
+        ga: PopulationSettings,
+        counts: Sequence[int],  # of offspring that there may be: each one less than the one before
+    ) -> Self:
+        """Return the rules of breeding."""
         selection, crossover, mutation = operators
         sizes = [
             (

@@ -54,6 +54,20 @@ class GeneCrossover(Crossover):
 
 
 @kernel
+def pairs_to_cross(
+    genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray
+) -> tuple[IntArray, FloatArray]:
+    """Write the parents themselves; return the pairs to be crossed, and the numbers of each pair.
+
+    These are (pairs, 1 + 2 · genes): the decision, then two for each gene.
+    """
+    copy_parents(genomes, parents, out)
+    num_pairs, num_each = len(parents) // 2, 1 + 2 * len(genomes)
+    draws = context.uniforms[: num_pairs * num_each].reshape((num_pairs, num_each))
+    return np.flatnonzero(draws[:, 0] < context.rate), draws
+
+
+@kernel
 def replace_pair(
     gene: int, pair: int, one: float, two: float, genome: Genome, out: FloatArray
 ) -> None:
@@ -72,15 +86,11 @@ class UniformCrossover(GeneCrossover):
     @kernel
     def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
-        copy_parents(genomes, parents, out)
-        num_genes = len(genomes)
-        for pair in range(len(parents) // 2):
-            draws = context.uniforms[pair * (1 + 2 * num_genes) :]
-            if not draws[0] < context.rate:
-                continue
-            for gene in range(num_genes):
+        pairs, draws = pairs_to_cross(genomes, parents, context, out)
+        for pair in pairs:
+            for gene in range(len(genomes)):
                 x, y = out[gene, 2 * pair], out[gene, 2 * pair + 1]
-                one, two = (y, x) if draws[1 + 2 * gene] < 0.5 else (x, y)
+                one, two = (y, x) if draws[pair, 1 + 2 * gene] < 0.5 else (x, y)
                 replace_pair(gene, pair, one, two, context.genome, out)
 
 
@@ -96,15 +106,11 @@ class ArithmeticCrossover(GeneCrossover):
     @kernel
     def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
-        copy_parents(genomes, parents, out)
-        num_genes = len(genomes)
-        for pair in range(len(parents) // 2):
-            draws = context.uniforms[pair * (1 + 2 * num_genes) :]
-            if not draws[0] < context.rate:
-                continue
-            for gene in range(num_genes):
+        pairs, draws = pairs_to_cross(genomes, parents, context, out)
+        for pair in pairs:
+            for gene in range(len(genomes)):
                 x, y = out[gene, 2 * pair], out[gene, 2 * pair + 1]
-                one, two = y + draws[1] * (x - y), x + draws[1] * (y - x)
+                one, two = y + draws[pair, 1] * (x - y), x + draws[pair, 1] * (y - x)
                 replace_pair(gene, pair, one, two, context.genome, out)
 
 
@@ -124,14 +130,11 @@ class BlxAlpha(GeneCrossover):
     @kernel
     def cross(genomes: FloatArray, parents: IntArray, context: Context, out: FloatArray) -> None:
         """Write offspring; see `Crossover`."""
-        copy_parents(genomes, parents, out)
-        num_genes, alpha = len(genomes), context.settings[0]
-        for pair in range(len(parents) // 2):
-            draws = context.uniforms[pair * (1 + 2 * num_genes) :]
-            if not draws[0] < context.rate:
-                continue
-            for gene in range(num_genes):
+        (pairs, draws), alpha = pairs_to_cross(genomes, parents, context, out), context.settings[0]
+        for pair in pairs:
+            for gene in range(len(genomes)):
                 x, y = out[gene, 2 * pair], out[gene, 2 * pair + 1]
                 low, wide = min(x, y) - alpha * abs(x - y), (1.0 + 2.0 * alpha) * abs(x - y)
-                one, two = low + draws[1 + 2 * gene] * wide, low + draws[2 + 2 * gene] * wide
+                one = low + draws[pair, 1 + 2 * gene] * wide
+                two = low + draws[pair, 2 + 2 * gene] * wide
                 replace_pair(gene, pair, one, two, context.genome, out)

@@ -17,7 +17,7 @@ def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -
 
     Args:
         weights: (individuals,) ≥ 0; if all are 0, every individual is equally likely.
-        uniforms: (parents,) in [0, 1).
+        uniforms: (≥ parents,) in [0, 1).
         chosen: (parents,) written: indices in the order drawn; neighbours are a random pairing.
     """
     # the wheel: sums of weights up to each individual
@@ -27,7 +27,7 @@ def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -
     for k in range(num):
         total += weights[k]
         wheel[k] = total
-    for i in range(len(uniforms)):
+    for i in range(len(chosen)):
         if total > 0.0:
             # the first k with wheel[k] > pointer, by bisection
             pointer = uniforms[i] * total

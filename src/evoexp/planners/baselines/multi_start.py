@@ -1,14 +1,13 @@
 """Multi-start improvement: the planner's own local operator from many starts, without evolution."""
 
-from collections.abc import Iterator
+import itertools
 from typing import Any, ClassVar
 
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.planners.planner import Keeper
+from evoexp.planners.planner import Populations
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import Block, FloatArray
 from evoexp.validation import Count
 
 
@@ -20,15 +19,11 @@ class MultiStart(WrappedPlanner):
     crossed or mutated. A generation evaluates as many individuals as the planner would evaluate in
     it, so that both are equal in evaluations at every generation: where that number falls, the last
     individuals are left out; where it rises, fresh samples join.
-
-    Attributes:
-        num_sweeps: Passes of the local operator per start.
-        planner: The planner whose sampling, local operator, cost and budget are used.
     """
 
     component: ClassVar[str] = "multi_start"
 
-    num_sweeps: Count
+    num_sweeps: Count  # passes of the local operator per start
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem.
@@ -44,27 +39,19 @@ class MultiStart(WrappedPlanner):
             raise SettingError("control", must, self.component)
         return problem
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
         """Yield one start after the other: fresh samples, then their sweeps."""
-        planner, keeper = self.planner, Keeper()
-        population: FloatArray | None = None
-        for index in range(planner.num_generations + 1):
-            count = planner.num_evaluations(index)
-            if population is None or index % (self.num_sweeps + 1) == 0:
+        planner, population = self.planner, np.empty(0)
+        for index in itertools.count():
+            count, improved = planner.num_evaluations(index), None
+            if index % (self.num_sweeps + 1):
+                improved = planner.improve(problem, population[..., :count], rng)
+                missing = count - population.shape[-1]
+            if improved is None:
                 population = planner.sample(problem, rng, count)
+            elif missing > 0:
+                fresh = planner.sample(problem, rng, missing)
+                population = np.concatenate([improved, fresh], axis=-1)
             else:
-                population = self._swept(problem, population, rng, count)
-            judged = planner.cost(problem, population)
-            yield keeper.record_judged(planner, problem, population, judged)
-
-    def _swept(
-        self, problem: Any, population: FloatArray, rng: np.random.Generator, count: int
-    ) -> FloatArray:
-        """Return the first `count` individuals after one more sweep, fresh ones where they lack."""
-        improved = self.planner.improve(problem, population[..., :count], rng)
-        assert improved is not None, "prepare refuses planners without a local operator"
-        missing = count - improved.shape[-1]
-        if missing <= 0:
-            return improved
-        fresh = self.planner.sample(problem, rng, missing)
-        return np.concatenate([improved, fresh], axis=-1)
+                population = improved
+            yield population

@@ -1,6 +1,5 @@
 """NSGA-II (Deb et al. 2002) on a planner's own coding and the terms of its cost, by pymoo."""
 
-from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -8,8 +7,8 @@ from pydantic import Field
 
 from evoexp.errors import SettingError, nearest
 from evoexp.planners.baselines.real_vectors import RealVectorControl, real_vectors
-from evoexp.planners.planner import Judgement, Keeper, Reproducibility
-from evoexp.records import Block, FloatArray
+from evoexp.planners.planner import JudgementArrays, Populations, Reproducibility
+from evoexp.records import FloatArray
 
 SEEDS = 2**32  # of numpy's older generators
 ENDLESS = 10**9  # generations: this planner counts them itself
@@ -24,16 +23,15 @@ class Nsga2(RealVectorControl):
     drawn at first. A generation has as many individuals as a later one of the planner.
 
     Linear algebra of libraries makes the last bits those of an environment.
-
-    Attributes:
-        objectives: Names of terms, to be minimised; a name stands for the sum of all terms that
-            begin with it, as `length` does for the lengths of all arms.
-        planner: The planner whose coding, terms, cost and budget are used.
     """
 
     component: ClassVar[str] = "nsga2"
     reproducibility: ClassVar[Reproducibility] = "environment"
 
+    fewest: ClassVar[int] = 4
+
+    # names of terms, to be minimised; a name stands for the sum of all terms that begin with it,
+    # as `length` does for the lengths of all arms
     objectives: Annotated[tuple[str, ...], Field(min_length=2)]
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
@@ -51,12 +49,12 @@ class Nsga2(RealVectorControl):
                 raise SettingError(f"control.objectives[{k}]", must, name, nearest(name, names))
         return problem
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
         """Yield one generation after the other."""
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.core.problem import Problem
 
-        planner, keeper, size = self.planner, Keeper(), self.num_evaluations(1)
+        planner, size = self.planner, self.num_evaluations(1)
         drawn = planner.sample(problem, rng, max(self.num_drawn, size))
         coding = real_vectors(planner, problem, drawn)
         vectors = drawn[coding.changes].T
@@ -69,19 +67,13 @@ class Nsga2(RealVectorControl):
         search = NSGA2(pop_size=size, sampling=vectors[:size], eliminate_duplicates=False)
         forever = ("n_gen", ENDLESS)
         search.setup(box, termination=forever, seed=int(rng.integers(SEEDS)), verbose=False)
-        for _ in range(planner.num_generations + 1):
+        while True:
             asked = search.ask()
-            population = coding.population(np.asarray(asked.get("X"), dtype=np.float64))
-            judged = planner.cost(problem, population)
+            judged = yield coding.population(np.asarray(asked.get("X"), dtype=np.float64))
             asked.set("F", self._values(judged))
             search.tell(infills=asked)
-            yield keeper.record_judged(planner, problem, population, judged)
 
-    def num_evaluations(self, index: int) -> int:
-        """Return the planner's evaluations of a later generation, at least four."""
-        return max(4, self.planner.num_evaluations(max(1, index)))
-
-    def _values(self, judged: Judgement) -> FloatArray:
+    def _values(self, judged: JudgementArrays) -> FloatArray:
         """Return the objectives of judged individuals, (individuals, objectives)."""
         rows = []
         for k, cost in enumerate(judged.cost):

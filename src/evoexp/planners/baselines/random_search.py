@@ -1,13 +1,12 @@
 """Random search: the best of as many samples as a planner evaluates, without any evolution."""
 
-from collections.abc import Iterator
+import itertools
 from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.planners.planner import judged_samples
+from evoexp.planners.planner import Populations
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import Block
 
 
 class RandomSearch(WrappedPlanner):
@@ -15,13 +14,11 @@ class RandomSearch(WrappedPlanner):
 
     A generation draws as many individuals as the planner would evaluate in it, so that both are
     equal in evaluations at every generation.
-
-    Attributes:
-        planner: The planner whose sampling, cost and budget are used.
     """
 
     component: ClassVar[str] = "random_search"
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
         """Yield one generation of new samples after the other."""
-        return judged_samples(self.planner, problem, rng)
+        for index in itertools.count():
+            yield self.planner.sample(problem, rng, self.planner.num_evaluations(index))

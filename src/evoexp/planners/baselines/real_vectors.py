@@ -42,6 +42,7 @@ class RealVectorControl(WrappedPlanner):
     """Base of the controls that search among the real vectors of a planner's individuals."""
 
     matrices: ClassVar[int] = 1  # of (variables, variables) that a search keeps
+    fewest: ClassVar[int] = 2  # individuals of a generation that a search takes
 
     num_drawn: Count  # individuals drawn for the first vectors and their covariance; not judged
 
@@ -57,6 +58,10 @@ class RealVectorControl(WrappedPlanner):
             raise SettingError("control", must, self.component)
         return super().prepare(robot, scenario)
 
+    def num_evaluations(self, index: int) -> int:
+        """Return the planner's evaluations of a later generation, or the fewest there may be."""
+        return max(self.fewest, self.planner.num_evaluations(max(1, index)))
+
     def memory(self, problem: Any) -> int:
         """Return the planner's estimate, and that of the drawn individuals and of matrices."""
         values = num_values(self.shape(problem))
@@ -64,7 +69,7 @@ class RealVectorControl(WrappedPlanner):
         return self.planner.memory(problem) + own
 
 
-def real_vectors(planner: Planner, problem: Any, drawn: FloatArray) -> RealVectors:
+def real_vectors(planner: Planner[Any], problem: Any, drawn: FloatArray) -> RealVectors:
     """Return where a search among individuals begins: as the planner's own first ones are spread.
 
     Args:

@@ -1,7 +1,7 @@
 """Stochastic trajectory optimisation on a planner's own coding and cost, in the manner of STOMP."""
 
+import itertools
 import math
-from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,8 +13,8 @@ from evoexp.planners.baselines.real_vectors import (
     real_vectors,
     transposed_root,
 )
-from evoexp.planners.planner import Keeper
-from evoexp.records import Block, FloatArray
+from evoexp.planners.planner import Populations
+from evoexp.records import FloatArray
 from evoexp.validation import Count, Positive, Rate
 
 
@@ -27,39 +27,30 @@ class Stomp(RealVectorControl):
     trajectory that results is judged too, as the first of the next generation. Noise shrinks by a
     factor per generation; after `patience` generations without a better trajectory the search
     starts anew from an individual that the planner draws, with the first noise.
-
-    Attributes:
-        sigma: Standard deviation of the first noise, in those of the drawn individuals [-].
-        shrinkage: Share of the noise that is left after a generation [-].
-        sensitivity: h, the weight's decay from the least cost to the largest [-].
-        patience: Generations without a better trajectory until it starts anew.
-        planner: The planner whose coding, cost and budget are used.
     """
 
     component: ClassVar[str] = "stomp"
     matrices: ClassVar[int] = 4  # the covariance, its root, and those of its factorisation
 
-    sigma: Positive
-    shrinkage: Rate
-    sensitivity: Positive
-    patience: Count
+    sigma: Positive  # standard deviation of the first noise, in those of the drawn individuals [-]
+    shrinkage: Rate  # share of the noise that is left after a generation [-]
+    sensitivity: Positive  # h, the weight's decay from the least cost to the largest [-]
+    patience: Count  # generations without a better trajectory until it starts anew
 
-    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
+    def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
         """Yield one generation of noisy trajectories after the other, the middle one first."""
-        planner, keeper = self.planner, Keeper()
+        planner = self.planner
         vectors = real_vectors(planner, problem, planner.sample(problem, rng, self.num_drawn))
         root, scale = transposed_root(vectors.covariance), vectors.deviation
         middle, sigma, least, idle = vectors.mean, self.sigma, np.inf, 0
-        for index in range(planner.num_generations + 1):
+        for index in itertools.count():
             if idle > self.patience:
                 middle = planner.sample(problem, rng, 1)[vectors.changes][:, 0]
                 sigma, least, idle = self.sigma, np.inf, 0
             normals = standard_normal(rng, (self.num_evaluations(index), len(middle)))
             normals[0] = 0.0
             noise = matrix_product(sigma * scale * normals, root)
-            population = vectors.population(middle + noise)
-            judged = planner.cost(problem, population)
-            yield keeper.record_judged(planner, problem, population, judged)
+            judged = yield vectors.population(middle + noise)
             idle = 0 if judged.cost.min() < least else idle + 1
             least = min(least, float(judged.cost.min()))
             middle = middle + matrix_product(self.weights(judged.cost), noise)
@@ -77,7 +68,3 @@ class Stomp(RealVectorControl):
         decay = self.sensitivity / (high - low) if high > low else 0.0
         found = [exp(-decay * (c - low)) if math.isfinite(c) else 0.0 for c in costs.tolist()]
         return np.array(found) / sum(found)
-
-    def num_evaluations(self, index: int) -> int:
-        """Return the planner's evaluations of a later generation, at least two."""
-        return max(2, self.planner.num_evaluations(max(1, index)))

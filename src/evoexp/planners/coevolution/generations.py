@@ -5,7 +5,7 @@ Python between the steps would take a third of the time. Others are evaluated by
 `Coevolution.evaluated`, one generation after the other.
 """
 
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -26,9 +26,12 @@ from evoexp.planners.coevolution.kernels import (
 from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.teams import Evaluated, survey, teamable_costs
+from evoexp.planners.driver import TableSearch, generations_per_call
 from evoexp.planners.planner import Candidate
-from evoexp.planners.table_search import TableSearch, generations_per_call
 from evoexp.records import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from evoexp.planners.coevolution.planner import Coevolution
 
 PER_CALL = 8  # generations that are computed in one call, at most
 CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
@@ -151,12 +154,8 @@ def per_call(robots: int, count: int) -> int:
 class TeamSearch(TableSearch):
     """One run, and memory for its generations."""
 
-    def __init__(self, planner: Any, problem: Problem) -> None:
-        """Begin a run.
-
-        Args:
-            planner: A `Coevolution`.
-        """
+    def __init__(self, planner: "Coevolution", problem: Problem) -> None:
+        """Begin a run."""
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size
         self._proven = ProvenTeams(planner, problem) if planner.answers_are_proven else None

@@ -2,12 +2,8 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from evoexp.collision.planar.link_collision import LinkCollision
 from evoexp.collision.scene import Scene
-from evoexp.errors import SettingError
-from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 
@@ -25,20 +21,3 @@ class Problem(NamedTuple):
     moving: BoolArray  # (robots,) false for robots that stand still
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
     security_margin: float  # clearance that the task requires [length unit]
-
-
-def check_ends(problem: Problem) -> None:
-    """Refuse a start or goal at which robots touch.
-
-    Raises:
-        SettingError: Naming the bodies.
-    """
-    for name, posture in (("q_start", problem.start), ("q_goal", problem.goal)):
-        if contact := problem.collision.contact(posture):
-            relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
-            closest = " and ".join(problem.scene.nearest_pair(relative))
-            raise SettingError(
-                f"scenario.{name}",
-                f"free of collision ({contact}: {closest})",
-                (posture / DEGREE).round(9).tolist(),
-            )

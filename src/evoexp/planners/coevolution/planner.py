@@ -27,11 +27,11 @@ from evoexp.planners.answers import of_limits, of_place
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.generations import TeamSearch
 from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, evaluate_lines, measure
-from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem, check_ends
+from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
-from evoexp.planners.coevolution.teams import Evaluated, Judgement
-from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
+from evoexp.planners.coevolution.teams import Evaluated
+from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
@@ -41,7 +41,7 @@ from evoexp.validation import Component, LayoutCount
 PAIR_BYTES = 7  # of a pair of individuals: collisions in two generations, whether they are a team
 
 
-class Coevolution(PlannerDefaults, Component):
+class Coevolution(PlannerDefaults[Problem], Component):
     """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
 
     Methods I–VIII are settings of it.
@@ -96,9 +96,13 @@ class Coevolution(PlannerDefaults, Component):
         start, goal = (DEGREE * ends for ends in scenario.ends(arms[:, :2], arms[:, 2:]))
         moving = np.array([r not in scenario.stationary for r in range(len(arms))])
         bodies, margin = scene(assembly, scenario.obstacles), scenario.security_margin
-        problem = Problem(assembly, collision, arms, start, goal, moving, bodies, margin)
-        check_ends(problem)
-        return problem
+        for name, posture in (("q_start", start), ("q_goal", goal)):
+            if contact := collision.contact(posture):
+                relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1)
+                closest = " and ".join(bodies.nearest_pair(relative.ravel()))
+                must = f"free of collision ({contact}: {closest})"
+                raise SettingError(f"scenario.{name}", must, (posture / DEGREE).round(9).tolist())
+        return Problem(assembly, collision, arms, start, goal, moving, bodies, margin)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
@@ -159,13 +163,15 @@ class Coevolution(PlannerDefaults, Component):
         weights = self.objective.own_weights, self.objective.collision_weight
         return LineTask(problem.start, problem.goal, problem.arms, *weights)
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""
         found, count = self.evaluated(problem, population), population.shape[2]
         costs = np.array([found.cost_of(found.team_of(i)) for i in range(count)])
         if self.answers_are_proven:
             ProvenTeams(self, problem).settle_each(population, found, costs)
-        return Judgement(costs, found, self.queries(problem, count))
+        named = [found.terms_of(found.team_of(i)) for i in range(count)]
+        terms = {name: np.array([own[name] for own in named]) for name in named[0]}
+        return JudgementArrays(costs, np.isfinite(costs), self.queries(problem, count), terms)
 
     def queries(self, problem: Problem, count: int) -> int:
         """Return the configurations that evaluating populations of `count` asks for."""

@@ -12,7 +12,7 @@ import numpy as np
 from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.compilation import kernel
-from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.records import FloatArray, IntArray
 
 
 class Evaluated(NamedTuple):
@@ -94,23 +94,6 @@ class Evaluated(NamedTuple):
             terms[f"rotation_robot_{r + 1}_rad"] = rotation
             terms[f"tip_unevenness_robot_{r + 1}"] = evenness
         return terms
-
-
-class Judgement(NamedTuple):
-    """Individuals of the first robot, each with its cheapest collision-free team."""
-
-    cost: FloatArray  # (individuals,) own costs of that team summed; inf if there is none
-    evaluated: Evaluated  # the populations
-    collision_queries: int  # configurations judged for it
-
-    @property
-    def feasible(self) -> BoolArray:
-        """(individuals,) whether each has a collision-free team."""
-        return np.isfinite(self.cost)
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the criteria of an individual's team by name."""
-        return self.evaluated.terms_of(self.evaluated.team_of(individual))
 
 
 @kernel

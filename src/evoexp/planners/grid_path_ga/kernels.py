@@ -13,6 +13,7 @@ from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
 from evoexp.paths.grid_walks import measure_path
 from evoexp.paths.grids import NodeArray
+from evoexp.planners.driver import TableSearch
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,
     Scratch,
@@ -22,7 +23,6 @@ from evoexp.planners.grid_path_ga.path_operators import (
     mutate,
 )
 from evoexp.planners.planner import Candidate
-from evoexp.planners.table_search import TableSearch
 from evoexp.records import FloatArray
 
 RESULTS = 3

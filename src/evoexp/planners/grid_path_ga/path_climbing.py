@@ -30,15 +30,11 @@ class PathClimbing(WrappedPlanner):
 
     At first as many random walks are drawn as the planner draws, and the best `num_paths` of them
     are kept. Every generation makes as many trials as the planner evaluates individuals in it.
-
-    Attributes:
-        num_paths: Paths that climb side by side.
-        planner: The path search whose sampling, mutation, cost and budget are used.
     """
 
     component: ClassVar[str] = "path_climbing"
 
-    num_paths: Count
+    num_paths: Count  # paths that climb side by side
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Prepare the wrapped planner's problem.

@@ -25,6 +25,7 @@ from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import LANES, WORDS, SumArray, walk, walk_all, weigh_all
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, spread_front
 from evoexp.paths.motion import Motion
+from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
@@ -40,7 +41,6 @@ from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.table_search import ScaledSearch
 from evoexp.records import Block, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -74,7 +74,7 @@ class Problem(NamedTuple):
         return WORDS * (int(STEPS_PER_WALK * count * fewest / LANES) + 1)
 
 
-class GridPathGa(PlannerDefaults, Component):
+class GridPathGa(PlannerDefaults[Problem], Component):
     """The algorithm of Chen & Zalzala, section 2.3."""
 
     component: ClassVar[str] = "grid_path_ga"

@@ -23,11 +23,11 @@ from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import of_limits
+from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.table_search import ScaledSearch
 from evoexp.records import Block, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
@@ -52,7 +52,7 @@ class Problem(NamedTuple):
     security_margin: float  # clearance that the task requires [length unit]
 
 
-class PlacementGa(PlannerDefaults, Component):
+class PlacementGa(PlannerDefaults[Problem], Component):
     """The algorithm of Chen & Zalzala, section 3.2."""
 
     component: ClassVar[str] = "placement_ga"

@@ -49,22 +49,20 @@ class Ancestry:
 
 
 class Search:
-    """One phase being searched.
+    """One phase being searched."""
 
-    Attributes:
-        offspring: (nq, individuals) of the last cycle, one array for all cycles of a size [rad].
-        costs: (individuals,) of the last cycle.
-        least: Least cost of any feasible individual so far.
-        lowest: Lowest cost of the cycle, feasible or not.
-        mean: Mean cost of the feasible.
-        std: Standard deviation of these costs.
-        num_feasible: Feasible individuals of the cycle.
-        best: Node of the best so far: the winner once there is one.
-        best_row: (ROWS,) its terms and cost.
-        cycles: Cycles so far.
-        idle: Cycles since the last improvement.
-        won: Whether somebody meets the goal.
-    """
+    offspring: FloatArray  # (nq, individuals) [rad] of the last cycle; one array for a size
+    costs: FloatArray  # (individuals,) of the last cycle
+    least: float  # least cost of any feasible individual so far
+    lowest: float  # lowest cost of the cycle, feasible or not
+    mean: float  # mean cost of the feasible
+    std: float  # standard deviation of these costs
+    num_feasible: int  # feasible individuals of the cycle
+    best: int  # node of the best so far: the winner once there is one
+    best_row: FloatArray  # (ROWS,) its terms and cost
+    cycles: int  # so far
+    idle: int  # cycles since the last improvement
+    won: bool  # whether somebody meets the goal
 
     def __init__(
         self,

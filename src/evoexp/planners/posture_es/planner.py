@@ -31,6 +31,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing, joint_names, of_limits, of_place
+from evoexp.planners.arm_tasks import cover_shapes
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
@@ -55,7 +56,7 @@ def _one_or_several(value: Any) -> Any:
     return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-class PostureEs(PlannerDefaults, Component):
+class PostureEs(PlannerDefaults[Problem], Component):
     """The evolution strategy of Corsépius, section 4."""
 
     component: ClassVar[str] = "posture_es"
@@ -209,9 +210,7 @@ class PostureEs(PlannerDefaults, Component):
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the spheres or capsules around the robot's bodies."""
-        shapes = problem.bodies.shapes
-        columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
-        return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
+        return cover_shapes(problem.bodies)
 
     def _tilts(self, found: list[Span], postures: FloatArray) -> dict[str, float]:
         """Return the greatest limited tilts, at postures and on the motion between them."""

@@ -53,6 +53,9 @@ def prepare(
     task = posture_task(assembly, scenario)
     limits = _limits(assembly)
     start = _start(task, assembly, limits)
+    if len(scope) not in (1, len(start)):
+        must = f"one number, or one per joint ({len(start)})"
+        raise SettingError("planner.scope", must, list(scope))
     obstacles = obstacle_table(task.objects).without_ellipses()
     bodies = _bodies(robot, collision, assembly.disabled)
     tool = assembly.tools[0]
@@ -73,7 +76,7 @@ def prepare(
         objective,
         start,
         limits,
-        _scope(scope, len(start)),
+        np.array(scope * len(start) if len(scope) == 1 else scope),
         None,
         task.security_margin,
         {},
@@ -178,19 +181,14 @@ def _limits(assembly: Assembly) -> FloatArray:
     return limits
 
 
-def _units(assembly: Assembly) -> FloatArray:
-    """Return (nq,) model units per unit of the scenario: degrees, lengths of sliding joints."""
-    units = np.full(assembly.model.nq, DEGREE)
-    units[assembly.table.slides] = 1.0
-    return units
-
-
 def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatArray:
     if len(task.q_start) != assembly.model.nq:
         raise SettingError(
             "scenario.q_start", f"one value per joint ({assembly.model.nq})", len(task.q_start)
         )
-    units = _units(assembly)
+    # model units per unit of the scenario: degrees, lengths of sliding joints
+    units = np.full(assembly.model.nq, DEGREE)
+    units[assembly.table.slides] = 1.0
     start = np.array(task.q_start) * units
     for k, (value, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
         if not least <= value <= greatest:
@@ -200,13 +198,6 @@ def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatAr
                 task.q_start[k],
             )
     return start
-
-
-def _scope(scope: tuple[float, ...], nq: int) -> FloatArray:
-    given = scope * nq if len(scope) == 1 else scope
-    if len(given) != nq:
-        raise SettingError("planner.scope", f"one number, or one per joint ({nq})", list(given))
-    return np.array(given, dtype=np.float64)
 
 
 def _weights(task: PostureTask, objective: PostureCost, obstacles: ObstacleTable) -> FloatArray:

@@ -39,7 +39,7 @@ from evoexp.validation import Component, Count, Positive
 CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellipses.Contact`
 
 
-class RedundantGa(PlannerDefaults, Component):
+class RedundantGa(PlannerDefaults[Problem], Component):
     """The algorithm of Lavoie & Boudreau, sections 3 to 5.
 
     Random search takes the generations and evaluations of one search, those of `ga`; sequential

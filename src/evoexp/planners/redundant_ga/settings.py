@@ -1,6 +1,6 @@
 """Hyperparameters of genetic algorithms whose operators can be chosen."""
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field
 
@@ -38,12 +38,12 @@ class SelectiveSettings(PopulationSettings):
     @property
     def selection_operator(self) -> Selection:
         """The selection that `selection` stands for."""
-        if isinstance(self.selection, Selection):
-            return self.selection
-        if self.selection == "tournament":
-            return Tournament(tournament_size=self.tournament_size)
-        is_ranked = self.selection == "rank"
-        return LinearRanking(rank_pressure=self.rank_pressure) if is_ranked else InverseRoulette()
+        named: dict[Any, Any] = {
+            "tournament": Tournament(tournament_size=self.tournament_size),
+            "roulette": InverseRoulette(),
+            "rank": LinearRanking(rank_pressure=self.rank_pressure),
+        }
+        return cast(Selection, named.get(self.selection, self.selection))
 
 
 class RealGenetic(SelectiveSettings):

@@ -4,22 +4,25 @@ Lavoie & Boudreau 2001.
 """
 
 from collections.abc import Generator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from evoexp.evolution.operators.operator import Genome
 from evoexp.numeric.generator_state import state_bytes
 from evoexp.numeric.vectors import LANES
+from evoexp.planners.driver import GeneticSearch, generations_per_call
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import SubPath
-from evoexp.planners.redundant_ga.settings import BinaryGenetic
+from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
 from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
-from evoexp.planners.table_search import GeneticSearch, generations_per_call
 from evoexp.records import Best, Block, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from evoexp.planners.redundant_ga.planner import RedundantGa
 
 TERMS = tuple(
     f"{name}_sp{path}{unit}"
@@ -48,14 +51,10 @@ class Search(GeneticSearch):
     evolving = True
     end: BestEnd
 
-    def __init__(self, planner: Any, problem: Problem, rng: np.random.Generator) -> None:
-        """Take memory.
-
-        Args:
-            planner: A `RedundantGa`.
-            rng: Source of all random numbers.
-        """
+    def __init__(self, planner: "RedundantGa", problem: Problem, rng: np.random.Generator) -> None:
+        """Take memory."""
         ga, limits = planner.ga, problem.joint_limits
+        assert isinstance(ga, RealGenetic | BinaryGenetic), "prepare refuses others"
         size, bits = ga.population_size, ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 0
         genome = Genome.of(np.repeat([[0.0, 1.0]], bits * len(limits), axis=0) if bits else limits)
         num_genes = len(genome.limits)

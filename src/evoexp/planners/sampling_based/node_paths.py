@@ -36,7 +36,7 @@ MOST_STEPS = 10_000  # of a line through the whole space of configurations
 MOST_TESTED = 1_000_000  # configurations on such a line
 
 
-class TreePaths(PlannerDefaults):
+class TreePaths(PlannerDefaults[Any]):
     """The answers that all planners of such paths share, whatever unit their solutions have."""
 
     component: ClassVar[str]

@@ -10,7 +10,7 @@ C (Eq. 1). In the first stage there is no path: the cost of the plan is inf, the
 """
 
 from collections.abc import Generator, Iterator
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
-from evoexp.planners.planner import Judgement, PlannerDefaults
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Best, Block, FloatArray
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
@@ -45,7 +45,7 @@ class Problem(NamedTuple):
     security_margin: float  # clearance that the task requires [length unit]
 
 
-class TwoStage(PlannerDefaults, Component):
+class TwoStage(PlannerDefaults[Problem], Component):
     """The placement search, then the path search."""
 
     component: ClassVar[str] = "two_stage"
@@ -169,17 +169,13 @@ class TwoStage(PlannerDefaults, Component):
             else self.path.num_evaluations(index - first)
         )
 
-    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+    def _refused(self, problem: Problem, *arguments: Any) -> NoReturn:
         """Refuse: there are two populations, one per stage."""
-        raise _no_population()
+        raise SettingError("planner", "one with a single population", self.component)
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
-        """Refuse: there are two populations, one per stage."""
-        raise _no_population()
-
-    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
-        """Refuse: there are two populations, one per stage."""
-        raise _no_population()
+    sample: ClassVar[Any] = _refused
+    cost: ClassVar[Any] = _refused
+    solution: ClassVar[Any] = _refused
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the motion, (nodes + 2, 5) in equal times; None without a feasible posture."""
@@ -231,7 +227,3 @@ class TwoStage(PlannerDefaults, Component):
     def _parts(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return θ1 and θ2, and the nodes (nodes, 2)."""
         return solution[:ANGLES], solution[ANGLES:].reshape(-1, 2)
-
-
-def _no_population() -> SettingError:
-    return SettingError("planner", "one with a single population", TwoStage.component)

@@ -4,20 +4,23 @@ A generation goes through the same steps as one of `strings`, each a call of its
 covered bodies takes far longer than Python takes between the steps.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.evolution.operators.breeding import breed
 from evoexp.evolution.succession import choose_elites
-from evoexp.objectives.string_fitness import count_collisions, weigh
+from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
+from evoexp.planners.via_point_ga.strings import Problem, Strings
 from evoexp.records import FloatArray
+
+if TYPE_CHECKING:
+    from evoexp.planners.via_point_ga.search import Search
 
 
 class CoveredStrings(Strings):
@@ -45,13 +48,7 @@ class CoveredStrings(Strings):
         own = strings[:, :, :count]
         np.minimum(np.maximum(own, self.low, out=own), self.high, out=own)
 
-    def judge(self, strings: FloatArray, count: int) -> Judgement:
-        """Judge the first `count` strings; the arrays of terms keep the padding."""
-        judged = self.unjudged(strings, count)
-        self._judge(strings, judged)
-        return judged
-
-    def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
+    def evolve(self, run: "Search", uniforms: FloatArray, normals: FloatArray, first: int) -> None:
         """Go on from a generation to the next one; see `Strings`."""
         (offspring, terms, elites, parents), rules = run.scratch, run.breeding
         here, there = first % len(run.summaries), (first + 1) % len(run.summaries)
@@ -64,13 +61,13 @@ class CoveredStrings(Strings):
         rest = first, rate, rules, before.costs, genomes, parents, out
         breed(select, cross, mutate, uniforms[0], normals, *rest)
         self.smooth(offspring, len(parents))
-        self._judge(offspring, Judgement(terms.cost, terms, 0))
+        self.write_terms(offspring, terms)
         kernels.follow(before, run.scratch, after)
         kernels.summarise_strings(*after[1:], run.summaries[there])
 
-    def _judge(self, strings: FloatArray, judged: Judgement) -> None:
+    def write_terms(self, strings: FloatArray, terms: StringTerms) -> None:
         """Write the terms of strings (Eqs. 2–7)."""
-        terms, count, substeps = judged.terms, len(judged.cost), self.settings.substeps
+        count, substeps = len(terms.cost), self.settings.substeps
         measure_paths(strings, self.problem.arm_slices, terms.lengths, terms.unevenness)
         between = interpolate_linear(np.ascontiguousarray(strings[:, :, :count]), substeps)
         collides = self.collision.collides(between.reshape(len(between), -1))

@@ -18,6 +18,7 @@ from evoexp.paths.interpolation import interpolate
 from evoexp.paths.lengths import measure_paths
 from evoexp.paths.redistribution import redistribute_arms
 from evoexp.paths.relaxation import relax_points
+from evoexp.paths.workspace import Redistribution
 from evoexp.records import FloatArray, IntArray
 
 
@@ -26,10 +27,7 @@ class Settings(NamedTuple):
 
     arm_slices: IntArray  # (arms, 2) rows of each arm
     redistribution: bool  # whether to redistribute (section 3.4 c)
-    samples: int  # of the arc length per segment
-    pivots: FloatArray  # factor of the spline's system; see `Redistribution`
-    floats: FloatArray  # scratch
-    integers: np.ndarray  # scratch
+    spline: Redistribution  # its samples, factor and scratch
     relaxation_step: float  # delta of Eqs. 8, 9
     substeps: int  # configurations tested per segment
     weights: tuple[float, float, float]  # k1, k2, k3 of Eq. 7
@@ -130,9 +128,7 @@ def smooth(strings: FloatArray, count: int, settings: Settings) -> None:
     """Redistribute and relax the first `count` of strings (nq, N + 1, ≥ count) (section 3.4 c)."""
     lanes = -(-count // 8) * 8  # whole vectors
     if settings.redistribution and count > 0 and strings.shape[1] > 2:
-        arms, samples, pivots = settings.arm_slices, settings.samples, settings.pivots
-        scratch = settings.floats, settings.integers
-        redistribute_arms(strings, arms, lanes, samples, pivots, *scratch)
+        redistribute_arms(strings, settings.arm_slices, lanes, settings.spline)
     if settings.relaxation_step > 0.0 and count > 0:
         relax_points(strings, settings.relaxation_step, lanes)
 

@@ -28,12 +28,12 @@ from evoexp.planners.arm_tasks import (
     cover_notes,
     cover_shapes,
 )
-from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
+from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
 from evoexp.planners.via_point_ga.search import ProvenSearch, Search, settle
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
+from evoexp.planners.via_point_ga.strings import Problem, Strings
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
@@ -41,7 +41,7 @@ from evoexp.validation import Component
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
-class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
+class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4."""
 
     component: ClassVar[str] = "via_point_ga"
@@ -74,14 +74,15 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
         return self._strings(problem).drawn(rng, count)[:, :, :count]
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge a population (nq, N + 1, individuals); if so asked, its cheapest ones by proof."""
         strings = self._strings(problem)
         padded = strings.padded(population)
         judged = strings.judge(padded, population.shape[2])
         if self.answers_are_proven:
-            hits = judged.terms.collisions[: population.shape[2]]
+            hits = judged.terms["collisions"]
             settle(Proofs(self, problem), padded, judged.cost, hits)
+            judged = judged._replace(feasible=hits == 0.0)
         return judged
 
     def bounds(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
@@ -128,7 +129,8 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         squares = (problem.goal - problem.start) ** 2
         straight = sum(float(np.sqrt(np.sum(squares[a:b]))) for a, b in problem.arm_slices)
         if straight > 0.0:
-            terms["path_length_ratio"] = float(np.sum(judged.terms.lengths[:, 0])) / straight
+            lengths = [value for name, value in terms.items() if name.startswith("length_arm_")]
+            terms["path_length_ratio"] = float(np.sum(lengths)) / straight
         at = problem.collision.clearance(strings)
         between = problem.collision.clearance(sampled(strings, SAMPLES_BETWEEN))
         return terms | _least_distances(problem, at, between)

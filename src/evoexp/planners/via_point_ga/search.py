@@ -1,36 +1,37 @@
 """One run of the search over strings of via-points, and one whose answers are proven."""
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evoexp.planners.driver import GeneticSearch
 from evoexp.planners.planner import Candidate
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.table_search import GeneticSearch
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.kernels import Scratch
 from evoexp.planners.via_point_ga.strings import Problem, Strings
 from evoexp.records import Best, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from evoexp.planners.via_point_ga.planner import ViaPointGa
 
 
 class Search(GeneticSearch):
     """One run, and memory for its generations."""
 
     def __init__(
-        self, planner: Any, problem: Problem, strings: Strings, per_call: int | None = None
+        self,
+        planner: "ViaPointGa",
+        problem: Problem,
+        strings: Strings,  # the planner's steps on this problem
+        per_call: int | None = None,  # generations computed at once; None: as many as is best
     ) -> None:
-        """Begin a run.
-
-        Args:
-            planner: A `ViaPointGa`.
-            strings: Its steps on this problem.
-            per_call: Generations computed at once; None: as many as is best.
-        """
+        """Begin a run."""
         ga, operators = planner.ga, planner.operators
         super().__init__(ga, operators, strings.genome, per_call or strings.generations_per_call)
         self._planner, self._problem, self._strings = planner, problem, strings
         self.table, offspring = strings.table(self.num_places), strings.empty(ga.num_offspring)
-        terms = strings.unjudged(offspring, ga.num_offspring).terms
+        terms = strings.no_terms(offspring, ga.num_offspring)
         self.scratch = Scratch(offspring, terms, self.elites, self.parents)
         self.costs, self._shown = self.table.costs, np.empty(self.table.strings.shape[1:])
         self.queries_each = planner.num_via_points * planner.collision.collision_substeps
@@ -39,8 +40,8 @@ class Search(GeneticSearch):
         """Draw and judge the initial population."""
         strings, size = self._strings, self.costs.shape[1]
         self.table.strings[:] = strings.drawn(rng, size)
-        _, terms, _ = strings.judge(self.table.strings[0], size)
-        self.costs[0], self.table.collisions[0] = terms.cost, terms.collisions[:size]
+        judged = strings.judge(self.table.strings[0], size)
+        self.costs[0], self.table.collisions[0] = judged.cost, judged.terms["collisions"]
         self._summarise(0)
 
     def advance(self, uniforms: FloatArray, normals: FloatArray, first: int) -> int:
@@ -71,7 +72,7 @@ class Search(GeneticSearch):
 class ProvenSearch(Search):
     """A run whose best string is proven: what is refuted costs more in the next generation."""
 
-    def __init__(self, planner: Any, problem: Problem, strings: Strings) -> None:
+    def __init__(self, planner: "ViaPointGa", problem: Problem, strings: Strings) -> None:
         """Begin a run, see `Search`, without any verdict."""
         super().__init__(planner, problem, strings, per_call=1)
         self._proofs = Proofs(planner, problem)

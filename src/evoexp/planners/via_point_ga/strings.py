@@ -1,7 +1,7 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -12,11 +12,15 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.paths.workspace import Redistribution
+from evoexp.planners.answers import JudgementArrays
 from evoexp.planners.arm_tasks import ArmProblem
-from evoexp.planners.table_search import generations_per_call
+from evoexp.planners.driver import generations_per_call
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.records import BoolArray, FloatArray
+from evoexp.records import FloatArray
+
+if TYPE_CHECKING:
+    from evoexp.planners.via_point_ga.search import Search
 
 LANES = 8  # individuals are padded to whole vectors
 PER_CALL = 16  # generations that are computed in one call of a kernel, at most,
@@ -78,41 +82,16 @@ class Problem(ArmProblem):
         return np.asarray(self.collision.clearance(q).to_obstacles + self.sphere_radius)
 
 
-class Judgement(NamedTuple):
-    """A judged population."""
-
-    cost: FloatArray  # (individuals,) lower is better
-    terms: StringTerms  # terms of Eq. 7.
-    collision_queries: int  # configurations judged for it
-
-    @property
-    def feasible(self) -> BoolArray:
-        """(individuals,) whether each is free of collision at every instant tested."""
-        return np.asarray(self.terms.collisions[: len(self.cost)] == 0.0)
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the terms of one individual by name: C1 … of Eqs. 2–6."""
-        lengths, unevenness, collisions, _ = self.terms
-        named = {f"length_arm_{a + 1}_deg": float(row[individual]) for a, row in enumerate(lengths)}
-        for a, row in enumerate(unevenness):
-            named[f"unevenness_arm_{a + 1}_deg"] = float(row[individual])
-        return named | {"collisions": float(collisions[individual])}
-
-
 class Strings:
     """The population-wide steps of one planner on one problem."""
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
-        self.planner, self.problem, spline = planner, problem, problem.spline
-        self.num_arms = len(problem.arm_slices)
+        self.planner, self.problem = planner, problem
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
         self.settings = kernels.Settings(
             arm_slices=problem.arm_slices,
             redistribution=planner.redistribution,
-            samples=spline.samples_per_segment,
-            pivots=spline.pivots,
-            floats=spline.floats,
-            integers=spline.integers,
+            spline=problem.spline,
             relaxation_step=planner.relaxation_step,
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,
@@ -167,11 +146,21 @@ class Strings:
         """Redistribute and relax the first `count` strings."""
         kernels.smooth(strings, count, self.settings)
 
-    def judge(self, strings: FloatArray, count: int) -> Judgement:
-        """Judge the first `count` strings; the arrays of terms keep the padding."""
-        judged = self.unjudged(strings, count)
-        kernels.judge(strings, self.settings, judged.terms)
-        return judged
+    def judge(self, strings: FloatArray, count: int) -> JudgementArrays:
+        """Judge the first `count` strings: the terms are C1 … C5 of Eqs. 2–6."""
+        terms = self.no_terms(strings, count)
+        self.write_terms(strings, terms)
+        collisions = terms.collisions[:count]
+        tested = self.planner.num_via_points * self.settings.substeps * count
+        named = {f"length_arm_{a + 1}_deg": row[:count] for a, row in enumerate(terms.lengths)}
+        for a, row in enumerate(terms.unevenness):
+            named[f"unevenness_arm_{a + 1}_deg"] = row[:count]
+        named["collisions"] = collisions
+        return JudgementArrays(terms.cost, collisions == 0.0, tested, named)
+
+    def write_terms(self, strings: FloatArray, terms: StringTerms) -> None:
+        """Write the terms of strings (Eqs. 2–7)."""
+        kernels.judge(strings, self.settings, terms)
 
     def table(self, places: int) -> kernels.Population:
         """Return memory for the populations of some generations; the padding holds zeros."""
@@ -179,22 +168,19 @@ class Strings:
         costs, collisions = np.empty((2, places, size))
         return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
 
-    def evolve(self, run: Any, uniforms: FloatArray, normals: FloatArray, first: int) -> None:
-        """Go on from a generation to those behind it (section 3.4).
-
-        Args:
-            run: A `Search`, whose operators breed and whose generations are written.
-            uniforms: (generations, numbers) in [0, 1).
-            normals: Normal deviates, see `breed`.
-            first: The present generation.
-        """
+    def evolve(
+        self,
+        run: "Search",  # whose operators breed and whose generations are written
+        uniforms: FloatArray,  # (generations, numbers) in [0, 1)
+        normals: FloatArray,  # normal deviates, see `breed`
+        first: int,  # the present generation
+    ) -> None:
+        """Go on from a generation to those behind it (section 3.4)."""
         arguments = run.breeding, self.settings, run.table, run.scratch, run.summaries
         select, cross, mutate = run.operators
         kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
 
-    def unjudged(self, strings: FloatArray, count: int) -> Judgement:
-        """Return memory for a judgement."""
-        lengths, unevenness = np.empty((2, self.num_arms, strings.shape[2]))
-        terms = StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))
-        tested = self.planner.num_via_points * self.settings.substeps
-        return Judgement(terms.cost, terms, tested * count)
+    def no_terms(self, strings: FloatArray, count: int) -> StringTerms:
+        """Return memory for the terms of the first `count` strings; all but costs are padded."""
+        lengths, unevenness = np.empty((2, len(self.problem.arm_slices), strings.shape[2]))
+        return StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))

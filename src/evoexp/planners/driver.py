@@ -40,31 +40,21 @@ class TableSearch(ABC):
     """One run, whose generations are rows of tables: number g is at place g modulo `num_places`.
 
     The best of a generation is one individual, unless a subclass says otherwise.
-
-    Attributes:
-        num_places: Generations computed per call, and the one before them.
-        summaries: (places, SUMMARY).
-        costs: (places, …, individuals).
-        states: Of the generator behind each generation computed last, where it is ahead of them.
-        is_done: Whether the search ends before its last generation.
-        queries_each: Configurations that judging an individual asks for.
-        keeper: Of the best so far.
-        reached: Index of the generation computed last.
     """
 
-    costs: FloatArray
+    costs: FloatArray  # (places, …, individuals)
+    # of the generator behind each generation computed last, where it is ahead of them
     states: list[bytes] | None = None
-    queries_each, is_done = 0, False
+    queries_each = 0  # configurations that judging an individual asks for
+    is_done = False  # whether the search ends before its last generation
 
     def __init__(self, ga: PopulationSettings, per_call: int) -> None:
-        """Begin a run.
-
-        Args:
-            per_call: Generations computed per call, at most.
-        """
+        """Begin a run that computes `per_call` generations per call, at most."""
+        # the generations of a call, and the one before them
         self.num_places = min(per_call, ga.num_generations) + 1
         self.summaries = np.empty((self.num_places, SUMMARY))
-        self.keeper, self.reached, self._ga = Keeper(), 0, ga
+        self.reached = 0  # index of the generation computed last
+        self.keeper, self._ga = Keeper(), ga
 
     def blocks(self, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then every other generation, one block per call."""
@@ -152,32 +142,23 @@ class TableSearch(ABC):
 
 
 class GeneticSearch(TableSearch):
-    """A run whose generations are bred by the operators of a configuration.
+    """A run whose generations are bred by the operators of a configuration."""
 
-    Attributes:
-        operators: Their kernels, the first arguments of a kernel that breeds.
-        breeding: Their rules.
-        num_drawn: Uniform numbers of a generation.
-        num_normals: Normal deviates of a generation: genes, offspring.
-        parents: (offspring,) memory.
-        elites: (elites,) memory.
-    """
-
-    def __init__(self, ga: Any, operators: Operators, genome: Genome, per_call: int) -> None:
-        """Begin a run.
-
-        Args:
-            ga: PopulationSettings, rates and generations.
-            operators: By which offspring are made.
-            genome: Of every individual.
-            per_call: Generations computed per call, at most.
-        """
+    def __init__(
+        self,
+        ga: PopulationSettings,
+        operators: Operators,  # by which offspring are made
+        genome: Genome,  # of every individual
+        per_call: int,  # generations computed per call, at most
+    ) -> None:
+        """Begin a run."""
         # normal deviates take no fixed number of uniform ones: generations are drawn one by one
         takes_normals, count = operators.mutation.takes_normals, ga.num_offspring
         super().__init__(ga, 1 if takes_normals else per_call)
-        self.operators = operators.addresses
-        self.breeding = Breeding.of(operators, genome, ga, [count])
-        self.num_drawn = int(self.breeding.sizes.sum())
+        self.operators = operators.addresses  # the first arguments of a kernel that breeds
+        self.breeding = Breeding.of(operators, genome, ga, [count])  # and their rules
+        self.num_drawn = int(self.breeding.sizes.sum())  # uniform numbers of a generation
+        # normal deviates of a generation: genes, offspring
         self.num_normals = len(genome.limits) if takes_normals else 0, count
         self.parents, self.elites = (np.empty(n, np.int64) for n in (count, ga.num_elites))
 
@@ -211,19 +192,10 @@ class ScaledSearch(TableSearch):
     Numbers are drawn when the last ones are used up. All generations of a call are recorded with
     the generator as it is behind the last of them: the number of generations per call enters the
     digest.
-
-    Attributes:
-        draws: Uniform numbers.
-        chosen: Memory of the selection.
     """
 
     def __init__(self, ga: ScaledGenetic, per_call: int, num_drawn: int) -> None:
-        """Begin a run.
-
-        Args:
-            per_call: Generations computed per call, at most.
-            num_drawn: Uniform numbers drawn at once, at least.
-        """
+        """Begin a run that draws `num_drawn` uniform numbers at once, at least."""
         super().__init__(ga, per_call)
         self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
         self.draws = Draws(num_drawn)

@@ -134,7 +134,7 @@ class _Search:
         while self._path.num_attempts < self._settings.num_improvements:
             if self.edges.queries >= most:
                 break
-            self._path.improve(self._settings, rng)
+            self._path.improve(self._settings, rng, 1)
         else:
             self.stop_reason = "solution"
         self._path.settle()

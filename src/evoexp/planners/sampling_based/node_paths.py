@@ -122,7 +122,7 @@ class NodePaths(TreePaths, EdgeSettings):
         judged = judge_paths(edges, population.transpose(2, 1, 0))
         feasible, segments = judged.feasible, np.full(len(judged.cost), population.shape[1] - 1)
         for k in np.flatnonzero(feasible):
-            feasible[k] = edges.unproven(np.ascontiguousarray(population[:, :, k].T)) < 0
+            feasible[k] = edges.unproven(np.ascontiguousarray(population[:, :, k].T)) is None
         cost, length = np.where(feasible, judged.cost, np.inf), judged.terms["length_deg"]
         terms = {"length_deg": length, "segments": segments, **judged.terms}
         return judged._replace(cost=cost, terms=terms)

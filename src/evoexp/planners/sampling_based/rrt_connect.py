@@ -31,7 +31,7 @@ class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
     """RRT-Connect and shortcuts."""
 
     component: ClassVar[str] = "rrt_connect"
-    revision: ClassVar[int] = 2
+    revision: ClassVar[int] = 3
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last path is shortened or given up."""

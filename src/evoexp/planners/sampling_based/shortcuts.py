@@ -43,7 +43,7 @@ class ShortenedPath:
 
     def settle(self) -> None:
         """Go back to the last path that is proven, if the one in hand is not."""
-        while self._before and self._edges.unproven(self.nodes) >= 0:
+        while self._before and self._edges.unproven(self.nodes) is not None:
             self.nodes = self._before.pop()
         self._before, self.lengths = [], lengths_along(self.nodes)
 

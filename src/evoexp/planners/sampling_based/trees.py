@@ -64,16 +64,22 @@ class EdgeTest:
         self.queries += asked
         return tuple(shortened)
 
-    def unproven(self, path: FloatArray) -> int:
-        """Return the first edge of a path (nodes, nq) [deg] that is not proven; −1 if all are.
+    def unproven(self, path: FloatArray) -> FloatArray | None:
+        """Return a node (1, nq) or an edge (2, nq) of a path that is not proven; None if all are.
 
-        All are where no proof is asked for. An edge that was judged before is not judged again.
+        All are where no proof is asked for. Nodes come first: a contact that the model does not
+        see, as of bodies whose covers always touch, mostly lasts longer than an edge, and a node
+        costs a fraction of one. What was judged before is not judged again.
+
+        Args:
+            path: (nodes, nq) [deg].
         """
         if self._proofs is not None:
-            for k in range(len(path) - 1):
-                if not self._proofs.is_proven(path[k : k + 2].ravel()):
-                    return k
-        return -1
+            nodes = [path[k : k + 1] for k in range(1, len(path) - 1)]
+            for piece in (*nodes, *(path[k : k + 2] for k in range(len(path) - 1))):
+                if not self._proofs.is_proven(piece[[0, -1]].ravel()):
+                    return piece
+        return None
 
     def certificates(self) -> dict[str, float]:
         """Return how many paths and edges were judged as a term; none where none are."""
@@ -129,7 +135,7 @@ class TreePair:
 
         Returns:
             The path from start to goal (nodes, nq) if the trees have met and it is proven, where
-            that is asked for; None if not. The first edge that is not is cut from its tree.
+            that is asked for; None if not. The node or edge that is not is cut from its tree.
         """
         turn = self.num_iterations % 2
         self.num_iterations += 1
@@ -140,10 +146,11 @@ class TreePair:
         branches = self._branch(turn, end), self._branch(1 - turn, met)
         first, last = branches if turn == 0 else branches[::-1]
         path = np.concatenate([first, last[-2::-1]])
-        if (edge := self._edges.unproven(path)) < 0:
+        piece = self._edges.unproven(path)
+        if piece is None:
             return path
         for tree in range(2):
-            self._cut(tree, path[edge], path[edge + 1])
+            self._cut(tree, piece)
         return None
 
     def _branch(self, tree: int, index: int) -> FloatArray:
@@ -154,12 +161,14 @@ class TreePair:
             index = int(self._trees.parents[tree, index])
         return np.ascontiguousarray(self._trees.nodes[tree][:, branch[::-1]].T)
 
-    def _cut(self, tree: int, one: FloatArray, two: FloatArray) -> None:
-        """Remove the edge between two nodes, if there is one, and all that grew behind it."""
+    def _cut(self, tree: int, piece: FloatArray) -> None:
+        """Remove a node (1, nq) or an edge (2, nq), if it is there, and all that grew behind it."""
         count = self._trees.counts[tree]
         nodes, parents = self._trees.nodes[tree][:, :count], self._trees.parents[tree, :count]
-        is_one, is_two = ((nodes == end[:, None]).all(axis=0) for end in (one, two))
-        cut = (is_one & is_two[parents]) | (is_two & is_one[parents])
+        is_first, is_last = ((nodes == piece[k, :, None]).all(axis=0) for k in (0, -1))
+        cut = (is_first & is_last[parents]) | (is_last & is_first[parents])
+        if len(piece) == 1:
+            cut = is_first
         stays = np.ones(count, dtype=np.bool_)
         for k in range(1, count):
             stays[k] = stays[parents[k]] and not cut[k]

@@ -7,6 +7,7 @@ from collision.touching_arms import ONE_PLANAR, THREE_PLANAR, TWO_PLANAR, TWO_SP
 from evoexp.collision.bodies.body_collision import leading_free
 from evoexp.collision.bodies.planar_contacts import contacts, link_lines
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
+from evoexp.numeric.elementary import DEGREE
 from evoexp.robots.arms import Arms
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_chain import PlanarChain
@@ -39,7 +40,7 @@ def test_circles_at_equal_steps_collide_where_their_clearance_is_negative(
         exact = collision.clearance(q).least
         assert np.abs(exact).min() > 1e-10
         assert np.array_equal(collision.collides(q), exact < 0.0)
-        assert collision.num_free(q) == leading_free(exact < 0.0)
+        assert collision.general.num_free(DEGREE * q) == leading_free(exact < 0.0)
 
 
 def test_circles_that_touch_are_measured_exactly() -> None:

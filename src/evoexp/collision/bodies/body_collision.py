@@ -5,16 +5,19 @@ z = 0. A body is all shapes that move with one joint, unless the shapes name the
 are radians here, as in Pinocchio.
 """
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 
 from evoexp.collision.bodies.body_shapes import Pairs, Shapes, arms_of_joints, default_pairs
-from evoexp.collision.bodies.body_tables import FlatTables, flattened
+from evoexp.collision.bodies.body_tables import FlatTables, flattened, named_tables
 from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.packing import pack_tables
+from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.numeric.vectors import LANES
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
@@ -37,9 +40,56 @@ class Clearances(NamedTuple):
         return np.minimum(np.minimum(self.to_obstacles, self.between_arms), self.to_self)
 
 
+@kernel
 def leading_free(hits: BoolArray) -> int:
     """Return how many configurations come before the eight of the first hit; all without any."""
-    return int(np.argmax(hits)) // LANES * LANES if hits.any() else len(hits)
+    for k in range(len(hits)):
+        if hits[k]:
+            return k // LANES * LANES
+    return len(hits)
+
+
+@kernel
+def num_free(tables: FlatTables, q: FloatArray) -> int:
+    """Return how many configurations come before the eight among which the first collides.
+
+    All of them if none collides. A robot made of spheres alone is tested until a contact is met, so
+    configurations that are likely to collide should come first; others are tested to the end.
+
+    Args:
+        tables: Of `flattened`.
+        q: (nq, configurations) [rad], lengths for joints that slide; contiguous.
+    """
+    count = q.shape[1]
+    if len(named_tables(tables[0], tables[1]).capsules) == 0:
+        answer = find_contacts(tables, True, q, np.empty(count, dtype=np.bool_))
+        if answer <= 0:
+            return count if answer == 0 else -1 - answer
+    rows = np.empty((3, count))
+    least_clearances(tables, 0.0, True, q, rows)
+    return leading_free(~(rows[0] >= 0.0))
+
+
+class FreeTest(NamedTuple):
+    """A collision model as kernels of other rooms ask it: a kernel's address, and its tables.
+
+    The kernel takes the tables and a contiguous batch (nq, configurations) [rad], and answers as
+    `num_free` does.
+    """
+
+    num_free: KernelAddress
+    tables: Any
+
+    @classmethod
+    def of(cls, function: Callable[..., int], tables: Any) -> "FreeTest":
+        """Return the test of a kernel that is compiled for tables like these."""
+        kinds = numba.int64(numba.typeof(tables), numba.float64[:, ::1])
+        return cls(_address(function, kinds), tables)
+
+
+@functools.cache
+def _address(function: Callable[..., int], kinds: Any) -> KernelAddress:
+    return KernelAddress(function, kinds)
 
 
 class BodyCollision(NamedTuple):
@@ -134,22 +184,18 @@ class BodyCollision(NamedTuple):
         least_clearances(self.tables, 0.0, True, q, rows)
         return np.asarray(~(rows[0] >= 0.0))  # all rows are the same
 
-    def num_free(self, q: FloatArray) -> int:
-        """Return how many configurations come before the eight among which the first collides.
+    @property
+    def free_test(self) -> FreeTest:
+        """The test of configurations for kernels of other rooms."""
+        return FreeTest.of(num_free, self.tables)
 
-        All of them if none collides. For edges of a planner's graph: a robot made of spheres alone
-        is tested until a contact is met, eight configurations at a time, so those that are likely
-        to collide should come first. Others are tested to the end.
+    def num_free(self, q: FloatArray) -> int:
+        """Return the answer of the kernel `num_free` for a batch (nq, configurations) [rad].
 
         Raises:
             ValueError: If q has another number of rows than the model has coordinates.
         """
-        q = self._checked(q)
-        if self.only_spheres:
-            answer = find_contacts(self.tables, True, q, np.empty(q.shape[1], dtype=np.bool_))
-            if answer <= 0:
-                return q.shape[1] if answer == 0 else -1 - answer
-        return leading_free(self.collides(q))
+        return num_free(self.tables, self._checked(q))
 
     def _checked(self, q: FloatArray) -> FloatArray:
         nq = self.table.num_coordinates

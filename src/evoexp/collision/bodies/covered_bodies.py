@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
 from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.derived_pairs import Pair
@@ -82,9 +82,10 @@ class CoveredCollision(NamedTuple):
         """Return which configurations (nq, configurations) [deg] collide."""
         return self.collision.collides(DEGREE * q)
 
-    def num_free(self, q: FloatArray) -> int:
-        """Return how many configurations (nq, configurations) [deg] precede a contact's eight."""
-        return self.collision.num_free(DEGREE * q)
+    @property
+    def free_test(self) -> FreeTest:
+        """The test of configurations for kernels of other rooms."""
+        return self.collision.free_test
 
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""

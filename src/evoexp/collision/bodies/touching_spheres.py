@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances
+from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
 from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
 from evoexp.errors import SettingError
@@ -192,15 +192,10 @@ class SphereCollision(NamedTuple):
         contacts(self.tables, q, 0, out)
         return np.asarray(~(out >= 0.0))
 
-    def num_free(self, q: FloatArray) -> int:
-        """Return how many configurations precede the eight among which the first collides.
-
-        The batch (nq, configurations) [deg] is tested no further: see `BodyCollision.num_free`.
-
-        Raises:
-            ValueError: If q has another number of rows than the robot has joints.
-        """
-        return self.general.num_free(DEGREE * self._checked(q))
+    @property
+    def free_test(self) -> FreeTest:
+        """The test of configurations for kernels of other rooms."""
+        return self.general.free_test
 
     def _centers(self, q: FloatArray) -> FloatArray:
         """Return the centres (spheres, 3, configurations) at q (nq, configurations) [rad]."""

@@ -107,12 +107,15 @@ class CoalDistance:
         return self._places[body]
 
 
-def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> float | None:
+def first_contact(
+    distance: CoalDistance, pair: int, t: float, level: float, wants_first: bool
+) -> float | None:
     """Find the instant near t from which on a pair's distance is at or below a level.
 
     Args:
         distance: Coal's.
         t: Where the sweep saw it first.
+        wants_first: Whether the first instant is wanted, or any near t.
 
     Returns:
         The instant up to `TIME_RESOLUTION`; None if coal sees no such distance there.
@@ -125,6 +128,8 @@ def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> 
         step *= 10.0
         if step > 1e-4:
             return None
+    if not wants_first:
+        return touching
     # backward until the pair is free
     free, step = touching, 16.0 * TIME_RESOLUTION
     while free > 0.0 and distance(pair, free) <= level:
@@ -195,8 +200,8 @@ def search_interval(
     proven, stack = np.inf, [(ends[0], ends[1])]
     while stack:
         (a, d_a), (b, d_b) = stack.pop()
-        if d_a <= goals.level:
-            return Leaf(least, at, a, proven)
+        if d_a <= goals.level or (least <= goals.level and not goals.wants_first):
+            return Leaf(least, at, a if d_a <= goals.level else at, proven)
         width, way = b - a, speed * (b - a)
         low = 0.5 * (d_a + d_b - way) - goals.slack
         if low >= goals.target(min(least, goals.known)) or (
@@ -222,11 +227,12 @@ class LeafGoals(NamedTuple):
     """The question that coal answers on an interval."""
 
     goal: float  # distance that is to be proven at least
-    level: float  # the first instant is wanted at which the distance is at or below it
+    level: float  # a distance at or below it is a contact
     slack: float  # coal's error
     known: float  # an upper bound of the least distance of the scene
     resolution: float
     floor: float
+    wants_first: bool = True  # whether the first instant of a contact is wanted, or any
 
     def target(self, upper: float) -> float:
         """Return the lower bound that is enough while `upper` is the least distance found."""

@@ -146,7 +146,7 @@ class _Judgement:
         self.tolerances, self.resolution, self.limits = tolerances, resolution, limits
         self.coal = CoalDistance(scene, motion, limits.queries)
         self.floor = 1e-6 * scene.size
-        self.intervals, self.looked = 0, False
+        self.intervals, self.looked, self.wants_first = 0, False, True
         self.best = _Candidate(np.inf, np.nan, -1)
         polynomials = motion.polynomials
         if motion.num_segments == 0:
@@ -188,6 +188,7 @@ class _Judgement:
         """Return whether all pairs are proven to keep their margins, and not to touch."""
         if len(self.scene.pairs) == 0:
             return True
+        self.wants_first = False  # any contact is an answer
         goal = np.maximum(self.margins, self.tolerances)
         level = np.maximum(self.margins - self.tolerances, self.tolerances)
         try:
@@ -252,7 +253,8 @@ class _Judgement:
             contact = None
             if found.first < np.inf:
                 pair = found.first_pair
-                t = first_contact(self.coal, pair, min(found.first, self.task.last), level[pair])
+                near = min(found.first, self.task.last)
+                t = first_contact(self.coal, pair, near, level[pair], self.wants_first)
                 if t is None:  # coal sees no contact there: coal alone judges this pair
                     self.task.exact[pair] = self.all_exact = self.looked = False
                     continue
@@ -284,15 +286,16 @@ class _Judgement:
         if len(found.leaves) == 0:
             return contact, proven
         for pair, begin, end in _joined(found.leaves):
-            if contact is not None and begin >= contact.t:
-                break
+            if contact is not None and (begin >= contact.t or not self.wants_first):
+                break  # later leaves do not matter, or any contact is an answer
             task, p = self.task, int(pair)
             segment = min(int(begin), len(task.coefficients) - 1)
             speeds, scratch = np.empty((2, len(task.pairs))), np.empty(len(task.chain.parent))
             piece, u, v = task.coefficients[segment], begin - segment, end - segment
             approach_bounds(task.chain, piece, u, v, task.weights, speeds, scratch)
             known = min(self.best.distance, found.least)
-            goals = LeafGoals(goal[p], level[p], self.tolerances[p], known, resolution, self.floor)
+            asked = goal[p], level[p], self.tolerances[p], known, resolution, self.floor
+            goals = LeafGoals(*asked, self.wants_first)
             end = min(end, float(self.motion.num_segments))
             leaf = search_interval(self.coal, p, (begin, end), speeds[0, p], goals)
             self._note(_Candidate(leaf.least, leaf.at, p))

@@ -4,7 +4,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import leading_free
+from evoexp.collision.bodies.body_collision import FreeTest, leading_free
 from evoexp.collision.planar.ellipse_kernels import (
     Ellipses,
     TestedPath,
@@ -136,12 +136,20 @@ class EllipseConfigurations:
         angles = np.ascontiguousarray(DEGREE * q)
         return self._collision.collide(angles, angles)
 
-    def num_free(self, q: FloatArray) -> int:
-        """Return how many configurations (N, count) [deg] precede the eight of the first contact.
+    @property
+    def free_test(self) -> FreeTest:
+        """The test of configurations for kernels of other rooms."""
+        collision = self._collision
+        return FreeTest.of(_num_free, (collision.arm, collision.ellipses, collision.path))
 
-        All of them if none collides.
-        """
-        return leading_free(self.collides(q))
+
+@kernel
+def _num_free(tables: tuple[PlanarArm, Ellipses, TestedPath], q: FloatArray) -> int:
+    """Return how many configurations (N, count) [rad] precede the eight of the first contact."""
+    arm, ellipses, path = tables
+    lanes, hit = np.arange(q.shape[1]), np.zeros(q.shape[1], dtype=np.bool_)
+    paths_collide(q, q, lanes, len(lanes), arm, ellipses, path, hit)
+    return leading_free(hit)
 
 
 @kernel

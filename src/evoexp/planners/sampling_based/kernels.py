@@ -1,13 +1,16 @@
-"""Kernels of trees of configurations: nearest node, steps, tested configurations, path lengths.
+"""Kernels of straight edges between configurations: tests, trees that grow, paths made shorter.
 
 All sums run joint by joint in order, so that every processor finds the same nearest node. Distances
 are Euclidean, all joints alike [deg].
 """
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.numeric.elementary import DEGREE
+from evoexp.records import FloatArray, IntArray
 
 NODES = 64
 """Nodes whose squared distances are computed together, as vectors."""
@@ -17,6 +20,18 @@ LANES = 8
 
 SLACK = 1e-6
 """[-] by which an edge may be longer than a whole number of tested parts, for rounding's sake."""
+
+
+TRAPPED, ADVANCED, REACHED = range(3)
+"""What comes of a step toward a configuration (Kuffner & LaValle 2000, Fig. 2)."""
+
+
+class Trees(NamedTuple):
+    """Two trees of configurations, each reached from its parent along a free edge."""
+
+    nodes: FloatArray  # (2, nq, room) [deg]
+    parents: IntArray  # (2, room), −1: the root; nodes are younger than their parents
+    counts: IntArray  # (2,) number of nodes
 
 
 @kernel
@@ -108,6 +123,103 @@ def tested_configurations(one: FloatArray, two: FloatArray, resolution: float) -
 
 
 @kernel
+def edge_is_free(
+    num_free: Any, tables: Any, one: FloatArray, two: FloatArray, resolution: float
+) -> tuple[bool, int]:
+    """Return whether an edge is free where it is tested, and how many configurations were asked.
+
+    They are asked for eight at a time, up to the first contact; the second end is the first.
+
+    Args:
+        num_free: The kernel of a `FreeTest`.
+        tables: Its tables.
+        one: (nq,) one end, known to be free [deg].
+        two: (nq,) the other end.
+        resolution: Greatest distance of tested neighbours [deg].
+    """
+    q = DEGREE * tested_configurations(one, two, resolution)
+    free = num_free(tables, q)
+    return free == q.shape[1], min(q.shape[1], free + LANES)
+
+
+@kernel
+def _extended(
+    num_free: Any,
+    tables: Any,
+    trees: Trees,
+    tree: int,
+    near: int,
+    target: FloatArray,
+    step: float,
+    resolution: float,
+) -> tuple[Trees, int, int, int]:
+    """EXTEND (Fig. 2) from a given node.
+
+    Returns:
+        The trees; the node that is new or, where none is, the given one; `TRAPPED`, `ADVANCED` or
+        `REACHED`; configurations asked for.
+    """
+    q = trees.nodes[tree, :, near].copy()
+    new = step_toward(q, target, step)
+    outcome = REACHED if (new == target).all() else ADVANCED
+    if (new == q).all():  # nothing between them
+        return trees, near, outcome if outcome == REACHED else TRAPPED, 0
+    is_free, asked = edge_is_free(num_free, tables, q, new, resolution)
+    if not is_free:
+        return trees, near, TRAPPED, asked
+    index, room = trees.counts[tree], trees.parents.shape[1]
+    if index == room:
+        nodes = np.empty((2, len(q), 2 * room))
+        parents = np.empty((2, 2 * room), dtype=np.int64)
+        nodes[:, :, :room], parents[:, :room] = trees.nodes, trees.parents
+        trees = Trees(nodes, parents, trees.counts)
+    trees.nodes[tree, :, index], trees.parents[tree, index] = new, near
+    trees.counts[tree] += 1
+    return trees, index, outcome, asked
+
+
+@kernel
+def grow(
+    num_free: Any,
+    tables: Any,
+    trees: Trees,
+    tree: int,
+    target: FloatArray,
+    step: float,
+    resolution: float,
+) -> tuple[Trees, int, int, int]:
+    """Let one tree step toward a configuration, and the other connect to its end (Fig. 5).
+
+    Args:
+        num_free: The kernel of a `FreeTest`.
+        tables: Its tables.
+        trees: Both trees; where a tree has no room left, the result has arrays of twice the size.
+        tree: The one that steps, 0 or 1.
+        target: (nq,) q_rand [deg].
+        step: The paper's ε [deg].
+        resolution: Greatest distance of tested neighbours [deg].
+
+    Returns:
+        The trees; where they met, the node of the tree that stepped and that of the other one, the
+        same configuration, else −1 for the latter; configurations asked for.
+    """
+    near = nearest_node(trees.nodes[tree], trees.counts[tree], target)
+    trees, end, outcome, asked = _extended(
+        num_free, tables, trees, tree, near, target, step, resolution
+    )
+    if outcome == TRAPPED:
+        return trees, end, -1, asked
+    other, new = 1 - tree, trees.nodes[tree, :, end].copy()
+    met, outcome = nearest_node(trees.nodes[other], trees.counts[other], new), ADVANCED
+    while outcome == ADVANCED:  # CONNECT
+        trees, met, outcome, more = _extended(
+            num_free, tables, trees, other, met, new, step, resolution
+        )
+        asked += more
+    return trees, end, met if outcome == REACHED else -1, asked
+
+
+@kernel
 def lengths_along(path: FloatArray) -> FloatArray:
     """Return the length of a path up to each of its nodes, (nodes,), of a path (nodes, nq)."""
     lengths = np.zeros(len(path))
@@ -143,3 +255,64 @@ def place_on_path(
         between = ((parts - part) * path[k, joint] + part * path[k + 1, joint]) / parts
         q[joint] = between if 0 < part < parts else path[k + part // parts, joint]  # a node itself
     return k, q
+
+
+@kernel
+def shortcut(
+    num_free: Any,
+    tables: Any,
+    path: FloatArray,
+    lengths: FloatArray,
+    ends: FloatArray,
+    resolution: float,
+) -> tuple[FloatArray, FloatArray, int, int]:
+    """Try straight lines between places of a path, until one makes it shorter.
+
+    A line begins and ends at the tested configurations next to its places.
+
+    Args:
+        num_free: The kernel of a `FreeTest`.
+        tables: Its tables.
+        path: (nodes, nq) [deg].
+        lengths: (nodes,) of `lengths_along`.
+        ends: (lines, 2) the places, as shares of the length.
+        resolution: Greatest distance of tested neighbours [deg].
+
+    Returns:
+        The path and its lengths, new ones where it became shorter; how many lines were tried;
+        configurations asked for.
+    """
+    asked = 0
+    for line in range(len(ends)):
+        places = np.sort(ends[line] * lengths[-1])
+        first, one = place_on_path(path, lengths, places[0], resolution)
+        last, two = place_on_path(path, lengths, places[1], resolution)
+        if first == last:  # the line between them is already part of the path
+            continue
+        new = _with_line(path, first, one, last, two)
+        shorter = lengths_along(new)
+        if shorter[-1] < lengths[-1]:
+            is_free, more = edge_is_free(num_free, tables, one, two, resolution)
+            asked += more
+            if is_free:
+                return new, shorter, line + 1, asked
+    return path, lengths, len(ends), asked
+
+
+@kernel
+def _with_line(
+    path: FloatArray, first: int, one: FloatArray, last: int, two: FloatArray
+) -> FloatArray:
+    """Return a path (nodes, nq) with a line from its segment `first` to its segment `last`."""
+    new, count = np.empty((len(path) + 2, path.shape[1])), 0
+    for k in range(len(path) + 2 - (last - first)):
+        if k <= first:
+            q = path[k]
+        elif k <= first + 2:
+            q = one if k == first + 1 else two
+        else:
+            q = path[k + last - first - 2]
+        if count == 0 or (new[count - 1] != q).any():  # a node of the path stays once
+            new[count] = q
+            count += 1
+    return new[:count].copy()

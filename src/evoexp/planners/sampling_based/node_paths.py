@@ -122,7 +122,7 @@ class NodePaths(TreePaths, EdgeSettings):
         judged = judge_paths(edges, population.transpose(2, 1, 0))
         feasible, segments = judged.feasible, np.full(len(judged.cost), population.shape[1] - 1)
         for k in np.flatnonzero(feasible):
-            feasible[k] = edges.unproven(np.ascontiguousarray(population[:, :, k].T)) < 0
+            feasible[k] = edges.unproven(np.ascontiguousarray(population[:, :, k].T)) is None
         cost, length = np.where(feasible, judged.cost, np.inf), judged.terms["length_deg"]
         terms = {"length_deg": length, "segments": segments, **judged.terms}
         return judged._replace(cost=cost, terms=terms)
@@ -201,15 +201,14 @@ class InIterations:
         """Yield a record per batch of iterations, until the search comes to its end."""
         keeper = Keeper()
         for index in range(self.num_generations + 1):
-            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
-            count = 0
-            while count < len(costs) and not search.stop_reason:
-                cost = search.iterate(rng)
-                if cost is None:
+            costs, asked = np.empty(0), search.edges.queries
+            left = self.num_evaluations(index)
+            while left > len(costs) and not search.stop_reason:
+                some = search.iterate(rng, left - len(costs))
+                if len(some) == 0:
                     break
-                costs[count] = cost
-                count += 1
-            costs = costs[: max(1, count)]
+                costs = np.concatenate([costs, some])
+            costs = costs if len(costs) else np.full(1, np.inf)
             best = search.candidate()  # may take the best path over
             keeper.keep(search.best_cost, best)
             yield keeper.record(
@@ -240,8 +239,11 @@ class IteratedSearch(Protocol):
     def population(self) -> FloatArray:
         """(nodes, nq) what a record shows."""
 
-    def iterate(self, rng: np.random.Generator) -> float | None:
-        """Go on by one iteration; return the length in hand [deg], None if all was done before."""
+    def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
+        """Go on by some iterations, one at least and `most` at most.
+
+        Returns the length in hand after each [deg]; none if all was done before.
+        """
 
     def candidate(self) -> Candidate:
         """Return the shortest path as it is recorded."""

@@ -41,7 +41,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
     """A planner of OMPL, by its name."""
 
     component: ClassVar[str] = "ompl"
-    revision: ClassVar[int] = 2
+    revision: ClassVar[int] = 3
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
@@ -124,7 +124,7 @@ class _Search:
         if self._path is None:
             found = self._library.solve(most)
             shorter = found is not None and path_length(found) < self.cost
-            if found is not None and shorter and self.edges.unproven(found) < 0:
+            if found is not None and shorter and self.edges.unproven(found) is None:
                 self.nodes, self._shown = found, found.flatten()
             if self._library.is_done:
                 self.stop_reason = "solution" if len(self.nodes) > 1 else "no solution"
@@ -134,7 +134,7 @@ class _Search:
         while self._path.num_attempts < self._settings.num_improvements:
             if self.edges.queries >= most:
                 break
-            self._path.improve(self._settings, rng)
+            self._path.improve(self._settings, rng, 1)
         else:
             self.stop_reason = "solution"
         self._path.settle()
@@ -179,7 +179,7 @@ class _Library:
             def checkMotion(self, one: Any, two: Any, last: Any = None) -> bool:  # noqa: N802
                 """Whether the edge between two states is free."""
                 ends = np.array([_array(one, nq), _array(two, nq)])
-                return edges.is_free(*ends) and edges.unproven(ends) < 0
+                return edges.is_free(*ends) and edges.unproven(ends) is None
 
         self._motions = Edges(self._info)  # kept: OMPL holds no reference
         self._info.setMotionValidator(self._motions)

@@ -31,7 +31,7 @@ class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
     """RRT-Connect and shortcuts."""
 
     component: ClassVar[str] = "rrt_connect"
-    revision: ClassVar[int] = 2
+    revision: ClassVar[int] = 3
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per batch of iterations, until the last path is shortened or given up."""
@@ -80,22 +80,21 @@ class _Search:
     @property
     def population(self) -> FloatArray:
         """(nodes, nq) all nodes of both trees [deg]."""
-        return np.concatenate([tree.nodes for tree in self.pair.trees])
+        return self.pair.nodes
 
-    def iterate(self, rng: np.random.Generator) -> float:
-        """Grow the trees toward a random configuration, or try a shortcut of the path.
+    def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
+        """Grow the trees toward a random configuration, or try some shortcuts of the path.
 
-        Returns the length of the path in hand [deg], inf without one.
+        Returns the length of the path in hand after each iteration [deg], inf without one.
         """
         if self._is_done():
             self._keep_shortest()
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)
             self._path, self._starts = None, self._starts + 1
         if self._path is not None:
-            self._path.improve(self._planner, rng)
-        else:
-            self._grow(rng)
-        return np.inf if self._path is None else self._path.length
+            return self._path.improve(self._planner, rng, most)
+        self._grow(rng)
+        return np.array([np.inf if self._path is None else self._path.length])
 
     def candidate(self) -> Candidate:
         """Return the shortest path as it is recorded, the same array as long as it is the same."""
@@ -103,7 +102,7 @@ class _Search:
         terms = {
             "length_deg": self.best_cost,
             "iterations": float(self._iterations),
-            "nodes": float(sum(tree.count for tree in self.pair.trees)),
+            "nodes": float(len(self.pair.nodes)),
         }
         terms |= self._first | self.edges.certificates()
         return Candidate(self._solution, terms, bool(np.isfinite(self.best_cost)))

@@ -138,13 +138,13 @@ class _Search:
         self._plans = self._iterations = 0
         self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
 
-    def iterate(self, rng: np.random.Generator) -> float | None:
+    def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
         """Go on by one iteration; return the length of the plan that it completes [deg], or inf."""
         self._steps = self._steps or self.steps(rng)
         length = next(self._steps, None)
         if length is None:
             self.stop_reason = "solution" if np.isfinite(self.best_cost) else "no solution"
-        return length
+        return np.array([] if length is None else [length])
 
     def candidate(self) -> Candidate:
         """Return the shortest plan as it is recorded."""
@@ -198,7 +198,7 @@ class _Search:
             return None
         path = ShortenedPath(found, self.edges)
         for _ in range(planner.num_shortcuts):
-            path.attempt(rng.random(2))
+            path.attempt(rng.random((1, 2)))
             yield np.inf
         return np.concatenate([nodes, path.nodes[1:]])
 

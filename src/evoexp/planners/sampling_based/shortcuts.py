@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from evoexp.planners.sampling_based.kernels import lengths_along, place_on_path
+from evoexp.planners.sampling_based.kernels import lengths_along
 from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray
@@ -43,37 +43,36 @@ class ShortenedPath:
 
     def settle(self) -> None:
         """Go back to the last path that is proven, if the one in hand is not."""
-        while self._before and self._edges.unproven(self.nodes) >= 0:
+        while self._before and self._edges.unproven(self.nodes) is not None:
             self.nodes = self._before.pop()
         self._before, self.lengths = [], lengths_along(self.nodes)
 
-    def improve(self, settings: EdgeSettings, rng: np.random.Generator) -> None:
-        """Try a shortcut, or cut the corners where all shortcuts were tried."""
-        if self.num_attempts < settings.num_shortcuts:
-            self.attempt(rng.random(2))
-        else:
-            self.cut_corners()
+    def improve(self, settings: EdgeSettings, rng: np.random.Generator, most: int) -> FloatArray:
+        """Try some shortcuts, `most` at most, or cut the corners where all were tried.
 
-    def attempt(self, uniforms: FloatArray) -> None:
-        """Try the straight line between the tested configurations next to two places of the path.
+        Returns the length of the path after each attempt [deg].
+        """
+        left = settings.num_shortcuts - self.num_attempts
+        if left > 0:
+            return self.attempt(rng.random((min(left, most), 2)))
+        self.cut_corners()
+        return self.lengths[-1:]
+
+    def attempt(self, uniforms: FloatArray) -> FloatArray:
+        """Try straight lines between places of the path; return its length after each [deg].
 
         Args:
-            uniforms: (2,) the places, as shares of the length.
+            uniforms: (attempts, 2) the places, as shares of the length.
         """
-        self.num_attempts += 1
-        (first, one), (last, two) = (
-            place_on_path(self.nodes, self.lengths, at, self._edges.resolution)
-            for at in sorted(float(share) * self.length for share in uniforms)
-        )
-        if first == last:  # the line between them is already part of the path
-            return
-        kept = [*self.nodes[: first + 1], one, two, *self.nodes[last + 1 :]]
-        # a place that is a node of the path stays once
-        rows = [kept[0], *(b for a, b in itertools.pairwise(kept) if (a != b).any())]
-        found = np.array(rows)
-        lengths = lengths_along(found)
-        if lengths[-1] < self.length and self._edges.is_free(one, two):
-            self._take(found, lengths)
+        lengths, done = np.empty(len(uniforms)), 0
+        while done < len(uniforms):
+            nodes, along, tried = self._edges.shortcut(self.nodes, self.lengths, uniforms[done:])
+            lengths[done : done + tried - 1] = self.length
+            self._take(nodes, along)
+            done += tried
+            lengths[done - 1] = self.length
+        self.num_attempts += len(uniforms)
+        return lengths
 
     def cut_corners(self) -> None:
         """Cut every corner whose cut is free, if all that is left of the segments is free, too."""
@@ -93,6 +92,7 @@ class ShortenedPath:
             self._take(found, lengths)
 
     def _take(self, nodes: FloatArray, lengths: FloatArray) -> None:
-        """Go on with a shorter path."""
-        self._before.append(self.nodes)
-        self.nodes, self.lengths = nodes, lengths
+        """Go on with a shorter path, if it is one."""
+        if lengths[-1] < self.length:
+            self._before.append(self.nodes)
+            self.nodes, self.lengths = nodes, lengths

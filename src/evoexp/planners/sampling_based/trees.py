@@ -60,9 +60,9 @@ class EdgeTest:
         self, path: FloatArray, lengths: FloatArray, ends: FloatArray
     ) -> tuple[FloatArray, FloatArray, int]:
         """Return those of the kernel `shortcut`, likewise."""
-        *shortened, asked = shortcut(*self._test, path, lengths, ends, self.resolution)
+        path, lengths, tried, asked = shortcut(*self._test, path, lengths, ends, self.resolution)
         self.queries += asked
-        return tuple(shortened)
+        return path, lengths, tried
 
     def unproven(self, path: FloatArray) -> FloatArray | None:
         """Return a node (1, nq) or an edge (2, nq) of a path that is not proven; None if all are.

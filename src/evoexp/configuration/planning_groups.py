@@ -13,8 +13,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
 from evoexp.robots.joint_choice import joint_roles
 from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_reading import urdf_file
-from evoexp.robots.urdf_text import JointText
+from evoexp.robots.urdf_reading import UrdfJoint, urdf_file
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
 
@@ -72,12 +71,12 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
     return {**plain, "robot": settings}
 
 
-def _joints(robot: dict[str, Any]) -> dict[str, JointText]:
+def _joints(robot: dict[str, Any]) -> dict[str, UrdfJoint]:
     return urdf_file(File(**robot["urdf"]).content).joints
 
 
 def _standing(
-    state: dict[str, float], robot: dict[str, Any], joints: dict[str, JointText]
+    state: dict[str, float], robot: dict[str, Any], joints: dict[str, UrdfJoint]
 ) -> dict[str, float]:
     """Return the start state of joints that stand still [deg, m].
 

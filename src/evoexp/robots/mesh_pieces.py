@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 import coal
 import numpy as np
-import pinocchio as pin
 
 from evoexp.errors import SettingError
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
@@ -69,7 +68,7 @@ def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, In
     Raises:
         SettingError: If it cannot be read.
     """
-    mesh = load(content, ending, f"mesh{ending}", field)
+    mesh = load(content, f"mesh{ending}", field)
     corners = np.asarray(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
     return corners, triangles_of(mesh)
 
@@ -104,34 +103,6 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
         return [convex_shape(np.array(corners) * scale, faces) for corners, faces in pieces]
     except (ValueError, IndexError, UnicodeDecodeError):
         raise SettingError(field, "pieces of a mesh", content[:40]) from None
-
-
-def in_pieces(geometry: Any, pieces: dict[str, list[Any]]) -> Any:
-    """Return a `pin.GeometryModel` with convex pieces in the place of its meshes.
-
-    Bodies of a link are numbered anew, as Pinocchio numbers them.
-
-    Args:
-        geometry: With meshes, as Pinocchio read it.
-        pieces: Path of a mesh and the scale → coal shapes; see `mesh_key`.
-    """
-    found, counts = pin.GeometryModel(), dict[str, int]()
-    for item in geometry.geometryObjects:
-        stem = item.name.rpartition("_")[0]
-        for shape in pieces.get(mesh_key(item), [item.geometry]):
-            number = counts.get(stem, 0)
-            counts[stem] = number + 1
-            found.addGeometryObject(
-                pin.GeometryObject(
-                    f"{stem}_{number}", item.parentJoint, item.parentFrame, item.placement, shape
-                )
-            )
-    return found
-
-
-def mesh_key(item: Any) -> str:
-    """Return the path and the scale of the mesh of a `pin.GeometryObject`, as one text."""
-    return f"{item.meshPath} {np.array(item.meshScale).ravel().tolist()}"
 
 
 def convex_shape(corners: FloatArray, faces: Sequence[Sequence[int]] | IntArray) -> Any:

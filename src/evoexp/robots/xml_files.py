@@ -1,7 +1,8 @@
-"""XML of a URDF or an SRDF, and the joints that a URDF names."""
+"""Files of XML: a URDF or an SRDF, parsed once per content."""
 
+import functools
 import xml.etree.ElementTree as ET
-from typing import Any, NamedTuple
+from typing import Any
 from xml.parsers import expat
 
 from evoexp.attachments import located
@@ -9,26 +10,6 @@ from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded, stand_in
 
 MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
-
-
-class Mimic(NamedTuple):
-    """The rule of a joint that follows another: q = multiplier · q of the source + offset."""
-
-    source: str
-    multiplier: float
-    offset: float
-
-
-class JointText(NamedTuple):
-    """A joint as the URDF names it."""
-
-    name: str  # its name
-    kind: str  # its type
-    parent: str  # the link that carries it
-    child: str  # the link that it carries
-    mimic: Mimic | None  # the rule by which it follows another joint; None: it moves of its own
-    # its least and greatest coordinate [rad, m]; None: the file gives none
-    limits: tuple[float | None, float | None]
 
 
 def file_content(path: Any, field: str) -> bytes:
@@ -46,8 +27,9 @@ def file_content(path: Any, field: str) -> bytes:
         raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
 
 
+@functools.lru_cache(maxsize=32)
 def parsed_xml(content: bytes, field: str, tag: str) -> Any:
-    """Read XML as TinyXML does, which knows no namespaces; return its root element.
+    """Read XML as TinyXML does, which knows no namespaces; return its root element, shared by all.
 
     Args:
         field: That names it in errors.
@@ -95,38 +77,3 @@ class _PlainTree(ET.TreeBuilder):
         """Close an element."""
         self._depth -= 1
         return super().end(tag)
-
-
-def read_joints(root: Any) -> dict[str, JointText]:
-    """Read the joints of a URDF that `read_urdf` returned, in the file's order, by their names."""
-    found = {}
-    for joint in root.iterfind("joint"):
-        rule, mimic = joint.find("mimic"), None
-        if rule is not None:
-            numbers = (float(rule.get("multiplier", "1")), float(rule.get("offset", "0")))
-            mimic = Mimic(str(rule.get("joint")), *numbers)
-        parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
-        name, limit = joint.get("name"), joint.find("limit")
-        texts = [None if limit is None else limit.get(side) for side in ("lower", "upper")]
-        lower, upper = (None if text is None else float(text) for text in texts)
-        found[name] = JointText(name, joint.get("type"), parent, child, mimic, (lower, upper))
-    return found
-
-
-def check_rules(joints: dict[str, JointText], field: str) -> None:
-    """Check that each rule leads to a joint that moves of its own or stands.
-
-    Raises:
-        SettingError: If a joint follows one that is not there, or itself.
-    """
-    for joint in joints.values():
-        passed = [joint.name]
-        while joint.mimic is not None:
-            if joint.mimic.source not in joints:
-                must = "a URDF whose joints follow joints that are there"
-                raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
-            joint = joints[joint.mimic.source]
-            if joint.name in passed:
-                must = "a URDF whose joints do not follow themselves"
-                raise SettingError(field, must, " → ".join([*passed, joint.name]))
-            passed.append(joint.name)

@@ -110,7 +110,7 @@ class ArmStates(NamedTuple):
 
 
 class ArmParts(NamedTuple):
-    """What an arm adds to a robot."""
+    """The links, bodies and rules that an arm adds to a robot."""
 
     links: list[Link]
     bodies: list[Any] | None = None  # each a pin.GeometryObject; None: the links, as capsules

@@ -143,7 +143,9 @@ def record_motion(
         frames=frames_of(model, carried),
         poses=where,
         shapes=shapes,
-        traces=np.array([points(where.world, *tool) for tool in _tools(assembly)]),
+        traces=np.array(
+            [points(where.world, tool.joint - 1, tool.position) for tool in assembly.tools]
+        ),
         targets=places,
         clearance=clearance(parts, motion, times),
         margin=margin,
@@ -183,7 +185,7 @@ def _carried(parts: list[Part]) -> list[str]:
 
 
 def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape, ...]:
-    arms = assembly.body_arms or (0,) * assembly.geometry.ngeoms
+    arms = assembly.body_arms
     joints = assembly.model.njoints - 1
     found = []
     for k, (name, (shape, joint, placement)) in enumerate(
@@ -197,14 +199,6 @@ def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape
         role: Role = "arm" if of_robot else "object" if name in carried else "obstacle"
         found.append(Shape(name, frame, pose(where), drawn, role, arms[k] if of_robot else -1))
     return tuple(found)
-
-
-def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
-    """Return frame and point of every arm's tool; of a robot without tools its last link's end."""
-    if assembly.tools:
-        return [(tool.joint - 1, tool.position) for tool in assembly.tools]
-    last = assembly.links[-1]
-    return [(last.joint - 1, last.end)]
 
 
 def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ...]) -> View:

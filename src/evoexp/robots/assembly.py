@@ -57,9 +57,9 @@ class Assembly(NamedTuple):
     arm_slices: np.ndarray  # (arms, 2) first and one-past-last index of each arm in q
     table: KinematicTable  # the kinematic table of the model
     body_arms: tuple[int, ...]  # which arm each body belongs to
-    tools: tuple[Tool, ...] = ()  # the tool's frame of each arm
+    tools: tuple[Tool, ...]  # the tool's frame of each arm
     # pairs of bodies' names that are never judged (an SRDF's)
-    disabled: frozenset[frozenset[str]] = frozenset()
+    disabled: frozenset[frozenset[str]]
     # data of `collision.derived_pairs`, attached to the condition; None: there is none
     pairs: bytes | None = None
     # spheres that are given as the covers of bodies, by name: (spheres, 4) middles in the body's

@@ -8,6 +8,7 @@ attached to the condition; whoever has it needs neither the library nor the time
 import contextlib
 import hashlib
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import Any, Literal
 
 import coal
@@ -47,7 +48,7 @@ def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> 
         return _written([corners], field)
     coacd = _coacd(field)
     key = hashlib.sha256(content)
-    key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, _version())).encode())
+    key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, version("coacd"))).encode())
     kept = cache_root() / "pieces" / f"{key.hexdigest()}.obj"
     with contextlib.suppress(FileNotFoundError, Damaged):
         return read_kept(kept)
@@ -134,15 +135,6 @@ def _coacd(field: str) -> Any:
         must = "hulls, or coacd with it installed (pip install 'evoexp[meshes]')"
         raise SettingError(field, must, "coacd") from None
     return coacd
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("coacd")
-    except PackageNotFoundError:
-        return ""
 
 
 def _written(pieces: list[FloatArray], field: str) -> bytes:

@@ -117,7 +117,7 @@ class Urdf(Chain):
     @property
     def robot_name(self) -> str:
         """The robot's name in the URDF."""
-        return self._file.name
+        return self.file.name
 
     def build(self) -> Assembly:
         """Return the robot with its derived pairs, given spheres and the frames of its links."""
@@ -139,7 +139,7 @@ class Urdf(Chain):
     def notes(self) -> list[str]:
         """Remark on what the URDF leaves open: bodies, limits, units."""
         meshes = {mesh.name: mesh.file.content for mesh in self.meshes}
-        return list(urdf_notes(self._file, self._roles(), self._rules, meshes))
+        return list(urdf_notes(self.file, self.roles, self._rules, meshes))
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
@@ -190,19 +190,26 @@ class Urdf(Chain):
         return settings
 
     @property
-    def _file(self) -> UrdfFile:
+    def file(self) -> UrdfFile:
+        """The URDF."""
         return urdf_file(self.urdf.content)
 
     @property
     def _srdf(self) -> Srdf | None:
-        return None if self.srdf is None else Srdf(self.srdf.content, self._file.joints)
+        return None if self.srdf is None else Srdf(self.srdf.content, self.file.joints)
 
     @property
     def _rules(self) -> JointRules:
         return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)
 
-    def _roles(self) -> JointRoles:
-        groups, joints = self.groups or ((self.group,) if self.group else ()), self._file.joints
+    @property
+    def roles(self) -> JointRoles:
+        """The roles of its joints.
+
+        Raises:
+            SettingError: If a joint or group is not there, or cannot be chosen.
+        """
+        groups, joints = self.groups or ((self.group,) if self.group else ()), self.file.joints
         several = bool(self.groups)
         return joint_roles(joints, self._srdf, self.joints, groups, self.base, several=several)
 
@@ -225,10 +232,10 @@ class Urdf(Chain):
 
     def _tree(self) -> UrdfTree:
         """Return the model, the bodies and the roles of the joints."""
-        roles = self._roles()
-        check_room(self._file, roles, PATH)
-        values, tips = standing_values(self.fixed, self._file.joints, roles), self._tips(roles.tips)
-        model, meshes = urdf_model(self._file, self._rules), enumerate(self.meshes)
+        roles = self.roles
+        check_room(self.file, roles, PATH)
+        values, tips = standing_values(self.fixed, self.file.joints, roles), self._tips(roles.tips)
+        model, meshes = urdf_model(self.file, self._rules), enumerate(self.meshes)
         files = {mesh.name: (mesh, f"robot.meshes[{k}]") for k, mesh in meshes}
 
         def shapes(body: UrdfBody) -> list[Any]:
@@ -245,7 +252,7 @@ class Urdf(Chain):
                 raise SettingError("robot.meshes", "given with their pieces", None)
             return read_pieces(mesh.pieces.content, np.array(body.sizes), "robot.meshes")
 
-        bodies = list(placed_bodies(model, self._file.links, shapes, PATH))
+        bodies = list(placed_bodies(model, self.file.links, shapes, PATH))
         return UrdfTree(model, bodies, self._base(model), roles, values, tips, self._srdf)
 
     def _given_spheres(self, tree: UrdfTree) -> dict[str, FloatArray]:
@@ -257,9 +264,9 @@ class Urdf(Chain):
         assert self.spheres is not None
         given = read_urdf(self.spheres.content, SPHERES).links
         for link, bodies in given.items():
-            if bodies and link not in self._file.links:
+            if bodies and link not in self.file.links:
                 must = "a URDF whose spheres belong to links of the robot"
-                raise SettingError(SPHERES, must, link, nearest(link, list(self._file.links)))
+                raise SettingError(SPHERES, must, link, nearest(link, list(self.file.links)))
             if any(body.kind != "sphere" for body in bodies):
                 raise SettingError(SPHERES, "a URDF of spheres", f"another body of '{link}'")
         if not any(given.values()):

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import BeforeValidator
 
-from evoexp.attachments import SHA256, File, keep, located
+from evoexp.attachments import SHA256, File, file_content, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.records import FloatArray
@@ -34,7 +34,7 @@ from evoexp.robots.urdf_model import (
 )
 from evoexp.robots.urdf_notes import check_room, urdf_notes
 from evoexp.robots.urdf_reading import UrdfBody, UrdfFile, read_urdf, urdf_file
-from evoexp.robots.xml_files import file_content, parsed_xml
+from evoexp.robots.xml_files import parsed_xml
 from evoexp.validation import Positive, Settings
 
 PATH, SPHERES = "robot.path", "robot.spheres"  # settings, as errors name them
@@ -153,6 +153,8 @@ class Urdf(Chain):
         if "path" not in settings:
             return settings
         path = robot_file(settings.pop("path"), f"{field}.path")
+        if path in (None, "???"):
+            raise SettingError(f"{field}.path", "given: the path of a URDF", None)
         srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
         packages = package_folders(settings.pop("packages", None), f"{field}.packages")
         content = file_content(path, f"{field}.path")

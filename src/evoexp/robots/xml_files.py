@@ -5,26 +5,10 @@ import xml.etree.ElementTree as ET
 from typing import Any
 from xml.parsers import expat
 
-from evoexp.attachments import located
 from evoexp.errors import SettingError
-from evoexp.input_files import read_bounded, stand_in
+from evoexp.input_files import stand_in
 
 MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
-
-
-def file_content(path: Any, field: str) -> bytes:
-    """Read a file.
-
-    Raises:
-        SettingError: If no path is given, or the file cannot be read.
-    """
-    if path in (None, "???"):
-        raise SettingError(field, "given: the path of a URDF", None)
-    try:
-        return read_bounded(located(str(path)))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
 
 
 @functools.lru_cache(maxsize=32)

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from evoexp.errors import EvoexpError, SettingError
-from evoexp.input_files import read_bounded
+from evoexp.input_files import MAX_INPUT, read_bounded
 from evoexp.validation import Settings
 
 FILE, SHA256 = "file", "sha256"
@@ -80,6 +80,23 @@ def read(path: Any, folders: Sequence[Path], field: str) -> str:
     places = [Path(str(path)), *(folder / str(path) for folder in folders)]
     try:
         return keep(read_bounded(next((place for place in places if place.exists()), places[0])))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
+
+
+def file_content(path: Any, field: str, limit: int = MAX_INPUT) -> bytes:
+    """Read a file, which may be one that evoexp ships.
+
+    Args:
+        field: That names it, for errors.
+        limit: [B] of the largest file that is read.
+
+    Raises:
+        SettingError: If it cannot be read.
+    """
+    try:
+        return read_bounded(located(str(path)), limit)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None

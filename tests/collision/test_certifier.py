@@ -16,7 +16,7 @@ from evoexp.collision.certifier.verdict import Limits, certify
 from evoexp.collision.scene import Scene, geometry_scene, scene
 from evoexp.paths.motion import Motion, cubic_motion
 from evoexp.robots.arms import Arms
-from evoexp.robots.assembly import Chain, Link
+from evoexp.robots.assembly import ArmParts, Chain, Link
 from evoexp.robots.planar_chain import PlanarChain
 from evoexp.scenarios.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle
 
@@ -28,11 +28,11 @@ class Slider(Chain):
     base: tuple[float, float, float]
     radius: float
 
-    def append_to(self, model: pin.Model, arm: int) -> list[Link]:
+    def append_to(self, model: pin.Model, arm: int) -> ArmParts:
         joint = model.addJoint(
             0, pin.JointModelPX(), pin.SE3(np.eye(3), np.array(self.base)), f"{arm}_x"
         )
-        return [Link(arm, joint, np.zeros(3), np.array([1.0, 0.0, 0.0]), self.radius)]
+        return ArmParts([Link(arm, joint, np.zeros(3), np.array([1.0, 0.0, 0.0]), self.radius)])
 
 
 def link(

@@ -61,10 +61,10 @@ def built_triangles(mesh: Any) -> set[tuple[tuple[float, ...], ...]]:
 
 def test_triangles_of_several_materials_end_where_the_file_says() -> None:
     """coal's loader, and with it Pinocchio's, joins those of the second to the first's vertices."""
-    read_by_coal = load(MATERIALS, ".obj", "a.obj")
+    read_by_coal = load(MATERIALS, "a.obj", "")
     assert unused_vertices(read_by_coal) == 3
     assert built_triangles(read_by_coal) != obj_triangles(MATERIALS)
-    mended = load(whole_mesh(MATERIALS, "a.obj", "robot.path"), ".obj", "a.obj")
+    mended = load(whole_mesh(MATERIALS, "a.obj", "robot.path"), "a.obj", "")
     assert unused_vertices(mended) == 0
     assert built_triangles(mended) == obj_triangles(MATERIALS)
 
@@ -74,14 +74,14 @@ def test_the_shipped_mesh_is_read_whole_and_with_materials_too() -> None:
     plain = (PANDA / "link6.obj").read_bytes()
     assert whole_mesh(plain, "link6.obj", "robot.path") is plain
     expected = obj_triangles(plain)
-    assert len(expected) == 1308 and built_triangles(load(plain, ".obj", "")) == expected
+    assert len(expected) == 1308 and built_triangles(load(plain, "a.obj", "")) == expected
     lines = plain.splitlines()
     faces = [k for k, line in enumerate(lines) if line.startswith(b"f ")]
     for k in (faces[900], faces[0]):
         lines.insert(k, b"usemtl shell_%d" % k)
     painted = b"\n".join(lines)
-    assert unused_vertices(load(painted, ".obj", "")) > 100
-    assert built_triangles(load(whole_mesh(painted, "a.obj", ""), ".obj", "")) == expected
+    assert unused_vertices(load(painted, "a.obj", "")) > 100
+    assert built_triangles(load(whole_mesh(painted, "a.obj", ""), "a.obj", "")) == expected
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_the_shipped_mesh_is_read_whole_and_with_materials_too() -> None:
     ],
 )
 def test_files_of_objects_are_read_like_by_the_slow_reader(content: bytes) -> None:
-    mesh = load(whole_mesh(content, "a.obj", "robot.path"), ".obj", "a.obj")
+    mesh = load(whole_mesh(content, "a.obj", "robot.path"), "a.obj", "")
     expected = obj_triangles(content.replace(b"\\\n", b""))
     area = [
         sum(np.linalg.norm(np.cross(np.subtract(b, a), np.subtract(c, a))) for a, b, c in triangles)
@@ -201,7 +201,7 @@ def test_a_mesh_that_is_none_is_refused_with_the_reason(
 )
 def test_a_mesh_travels_as_it_is(name: str, content: bytes) -> None:
     assert whole_mesh(content, name, "robot.path") is content
-    assert unused_vertices(load(content, Path(name).suffix, name)) == 0
+    assert unused_vertices(load(content, name, "")) == 0
 
 
 def robot(folder: Path, name: str, scale: str = "", **settings: Any) -> Urdf:
@@ -230,7 +230,7 @@ def test_meshes_of_a_stored_condition_are_compared_with_the_file(tmp_path: Path)
     from evoexp.attachments import keep
 
     stored = whole.meshes[0].model_copy(update={"file": File(sha256=keep(MATERIALS))})
-    with pytest.raises(SettingError, match=r"link 'b', mesh m\.obj 1 1 1: 3 of 6 vertices end in"):
+    with pytest.raises(SettingError, match=r"'m\.obj': 3 of 6 vertices end in"):
         whole.model_copy(update={"meshes": (stored,)}).build()
 
 

@@ -19,9 +19,10 @@ from evoexp.cli import main
 from evoexp.errors import SettingError
 from evoexp.mesh_files import mesh_content
 from evoexp.records import FloatArray
-from evoexp.robots import urdf_bodies
 from evoexp.robots.robot_data import ROBOT_DATA
 from evoexp.robots.urdf import Urdf
+from evoexp.robots.urdf_model import JointRules, urdf_model
+from evoexp.robots.urdf_reading import urdf_file
 from evoexp.testing.small_conditions import conditions
 
 DATA = Path(__file__).parent / "data"
@@ -177,25 +178,19 @@ def test_every_body_of_every_link_is_built_where_the_file_has_it(path: Path) -> 
                 assert np.abs(placed.oMg[index].homogeneous - frame @ local).max() < 1e-9
 
 
-def test_a_body_that_is_lost_on_the_way_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whatever the reason: the text that Pinocchio is given lacks a body, or has another size."""
-    path = tmp_path / "r.urdf"
-    path.write_text(CAPSULE.format(shape='<cylinder radius="0.05" length="0.3"/>'))
-    settings = Urdf.read_files({"path": str(path)}, "robot")
-    robot = Urdf.model_validate(settings, strict=False)
-    rewritten = urdf_bodies.plain_urdf
-
-    def changed(old: str, new: str) -> Any:
-        return lambda *args: rewritten(*args).replace(old, new)
-
-    monkeypatch.setattr(urdf_bodies, "plain_urdf", changed("cylinder", "cone"))
-    with pytest.raises(SettingError, match=r"\(link 'b': 1\), was '0 bodies'"):
-        robot.build()
-    monkeypatch.setattr(urdf_bodies, "plain_urdf", changed('length="0.3"', 'length="0.2"'))
-    with pytest.raises(SettingError, match=r"cylinder 0\.05 0\.3: built as cylinder 0\.05 0\.2"):
-        robot.build()
+@pytest.mark.parametrize("path", [*map(Path, SHIPPED)], ids=lambda path: path.name)
+def test_joints_and_frames_stand_as_by_pinocchios_reader_bit_by_bit(path: Path) -> None:
+    model = urdf_model(urdf_file(path.read_bytes()), JointRules(1.0, 180.0, 1.0, "fixed"))
+    other = pin.buildModelFromUrdf(str(path))
+    assert list(model.names) == list(other.names)
+    for placement, expected in zip(model.jointPlacements, other.jointPlacements, strict=True):
+        assert np.array_equal(placement.homogeneous, expected.homogeneous)
+    found = {(str(frame.name), frame.type): frame for frame in model.frames}
+    for frame in other.frames:
+        if frame.type != pin.FrameType.SENSOR:
+            own = found[str(frame.name), frame.type]
+            assert own.parentJoint == frame.parentJoint
+            assert np.array_equal(own.placement.homogeneous, frame.placement.homogeneous)
 
 
 # the ball lies on the circle on which the body's middle moves

@@ -6,15 +6,11 @@ settings alone.
 
 from typing import Any
 
-from evoexp.attachments import SHA256, File
 from evoexp.condition import PARTS
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
-from evoexp.robots.joint_choice import joint_roles
-from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_reading import urdf_file
-from evoexp.robots.urdf_text import JointText
+from evoexp.robots.urdf import Urdf
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
 
@@ -45,7 +41,6 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(robot, dict) or robot.get(TARGET) != "urdf" or "urdf" not in robot:
         return plain
     task: MoveitTask = build(scenario, component_class, PARTS[1])
-    joints = _joints(robot)
     settings = dict(robot)
     if group := task.plan_request.group:
         given = robot.get("group") or ""
@@ -60,38 +55,20 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
             must = f"'{link}', the link whose goal scenario.request gives (or left out)"
             raise SettingError("robot.tool_frame", must, given)
         settings["tool_frame"] = link
-    standing = _standing(task.state, settings, joints)
-    settings["fixed"] = dict(robot.get("fixed") or {}) | standing
+    settings["fixed"] = dict(robot.get("fixed") or {}) | _standing(task.state, settings)
     return {**plain, "robot": settings}
 
 
-def _joints(robot: dict[str, Any]) -> dict[str, JointText]:
-    return urdf_file(File(**robot["urdf"]).content).joints
-
-
-def _standing(
-    state: dict[str, float], robot: dict[str, Any], joints: dict[str, JointText]
-) -> dict[str, float]:
+def _standing(state: dict[str, float], settings: dict[str, Any]) -> dict[str, float]:
     """Return the start state of joints that stand still [deg, m].
 
     A state also names joints without a value of their own, which a URDF may have fixed: those are
     left out, as are joints that follow others.
     """
-    srdf = robot.get("srdf")
-    tree = Srdf(File(sha256=srdf[SHA256]).content, joints) if srdf else None
-    groups = tuple(robot.get("groups") or ()) or ((robot["group"],) if robot.get("group") else ())
-    roles = joint_roles(
-        joints,
-        tree,
-        tuple(robot.get("joints") or ()),
-        groups,
-        str(robot.get("base", "fixed")),
-        several=bool(robot.get("groups")),
-    )
-    moving = frozenset[str]().union(*roles.arms)
-    found = {}
+    robot: Urdf = build(settings, component_class, PARTS[0])
+    moving, found = frozenset[str]().union(*robot.roles.arms), {}
     for name, value in state.items():
-        joint = joints.get(name)
+        joint = robot.file.joints.get(name)
         if joint is None or joint.mimic is not None or name in moving:
             continue
         if joint.kind in TURNING:

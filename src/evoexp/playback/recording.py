@@ -1,7 +1,7 @@
 """The recording of one motion, from which pages, playable logs and trajectories are written."""
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,6 @@ from evoexp.paths.motion import Motion
 from evoexp.playback.body_poses import Frame, Poses, frames_of, points, poses, ticks
 from evoexp.playback.contacts import Clearance, clearance
 from evoexp.playback.shapes import Role, Shape, outline, pose
-from evoexp.playback.targets import Target, targets
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
@@ -40,6 +39,13 @@ class Joint(NamedTuple):
 
     name: str  # name of the joint
     prismatic: bool  # whether the coordinate is a length, not an angle
+
+
+class Target(NamedTuple):
+    """A place that a tool or a robot is to reach."""
+
+    name: str  # name beside the mark
+    point: FloatArray  # (3,) in the world [length unit]
 
 
 class View(NamedTuple):
@@ -127,7 +133,7 @@ def record_motion(
     where = poses(model, motion, times, parts, carried)
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
-    places = targets(condition.scenario, robot)
+    places = _targets(condition.scenario, robot)
     return Recording(
         heading=heading,
         condition_id=condition.id,
@@ -143,7 +149,9 @@ def record_motion(
         frames=frames_of(model, carried),
         poses=where,
         shapes=shapes,
-        traces=np.array([points(where.world, *tool) for tool in _tools(assembly)]),
+        traces=np.array(
+            [points(where.world, tool.joint - 1, tool.position) for tool in assembly.tools]
+        ),
         targets=places,
         clearance=clearance(parts, motion, times),
         margin=margin,
@@ -151,6 +159,21 @@ def record_motion(
         view=_view(shapes, where.world, places),
         parts=tuple(parts),
         velocity_limits=_velocity_limits(assembly),
+    )
+
+
+def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
+    """Return the places that a scenario names for a robot; none if it names configurations.
+
+    Args:
+        scenario: One that names places has a method `named_places(robot)`, which returns names and
+            points, in the plane or in space.
+    """
+    if not hasattr(scenario, "named_places"):
+        return ()
+    return tuple(
+        Target(name.replace("_", " "), np.array([*point, 0.0][:3]))
+        for name, point in scenario.named_places(robot)
     )
 
 
@@ -183,7 +206,7 @@ def _carried(parts: list[Part]) -> list[str]:
 
 
 def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape, ...]:
-    arms = assembly.body_arms or (0,) * assembly.geometry.ngeoms
+    arms = assembly.body_arms
     joints = assembly.model.njoints - 1
     found = []
     for k, (name, (shape, joint, placement)) in enumerate(
@@ -197,14 +220,6 @@ def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape
         role: Role = "arm" if of_robot else "object" if name in carried else "obstacle"
         found.append(Shape(name, frame, pose(where), drawn, role, arms[k] if of_robot else -1))
     return tuple(found)
-
-
-def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
-    """Return frame and point of every arm's tool; of a robot without tools its last link's end."""
-    if assembly.tools:
-        return [(tool.joint - 1, tool.position) for tool in assembly.tools]
-    last = assembly.links[-1]
-    return [(last.joint - 1, last.end)]
 
 
 def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ...]) -> View:

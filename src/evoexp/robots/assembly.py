@@ -57,9 +57,9 @@ class Assembly(NamedTuple):
     arm_slices: np.ndarray  # (arms, 2) first and one-past-last index of each arm in q
     table: KinematicTable  # the kinematic table of the model
     body_arms: tuple[int, ...]  # which arm each body belongs to
-    tools: tuple[Tool, ...] = ()  # the tool's frame of each arm
+    tools: tuple[Tool, ...]  # the tool's frame of each arm
     # pairs of bodies' names that are never judged (an SRDF's)
-    disabled: frozenset[frozenset[str]] = frozenset()
+    disabled: frozenset[frozenset[str]]
     # data of `collision.derived_pairs`, attached to the condition; None: there is none
     pairs: bytes | None = None
     # spheres that are given as the covers of bodies, by name: (spheres, 4) middles in the body's
@@ -109,45 +109,26 @@ class ArmStates(NamedTuple):
         return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
 
 
+class ArmParts(NamedTuple):
+    """The links, bodies and rules that an arm adds to a robot."""
+
+    links: list[Link]
+    bodies: list[Any] | None = None  # each a pin.GeometryObject; None: the links, as capsules
+    tool: Tool | None = None  # its frame; None: at the end of the last link, turned as its joint
+    disabled: frozenset[frozenset[str]] = frozenset()  # pairs of bodies that are never judged
+    followers: tuple[Follower, ...] = ()  # the joints that follow others
+
+
 class Arm:
     """Base of a part of a robot: joints, bodies, a tool and what a file tells of them."""
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the arm's joints to a model; return its links."""
+    def append_to(self, model: Any, arm: int) -> ArmParts:
+        """Add the joints of the arm of a number to a `pin.Model`; return what comes with them."""
         raise NotImplementedError
-
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies as `pin.GeometryObject`: the links, unless an arm has others.
-
-        Args:
-            model: With the arm's joints.
-            arm: Its number.
-            first_joint: Its first joint.
-        """
-        return [link_capsule(link, "") for link in links]
-
-    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame: at the end of the last link, turned as its joint.
-
-        An arm with another tool overrides this.
-        """
-        return Tool(links[-1].joint, np.eye(3), links[-1].end)
-
-    def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs of bodies' names that are never judged."""
-        return set()
 
     def own_names(self) -> tuple[set[str], set[str]]:
         """Return the names of joints and of bodies that a file gives, which are kept; or none."""
         return set(), set()
-
-    def followers(self, first_joint: int) -> list[Follower]:
-        """Return the joints that follow others.
-
-        Args:
-            first_joint: Index of the arm's first joint.
-        """
-        return []
 
     def states(self) -> tuple[ArmStates, ...]:
         """Return the named states: none, unless a file names some."""
@@ -175,48 +156,50 @@ class Robot(Component):
         return []
 
     def build(self) -> Assembly:
-        """Append all arms to one model.
+        """Append all arms to one model, with q = (arm 0, arm 1, …)."""
+        return assembled(self.chains())
 
-        Returns:
-            The model with q = (arm 0, arm 1, …), its exact geometry and its kinematic table.
-        """
-        model, geometry = pin.Model(), pin.GeometryModel()
-        chains = self.chains()
-        prefixed = _needs_prefix(chains)
-        links: list[Link] = []
-        ranges, arms, tools, disabled, followers = [], [], [], set(), []
-        for k, chain in enumerate(chains):
-            joint, prefix = model.njoints, f"arm_{k + 1}_" if prefixed[k] else ""
-            own = chain.append_to(model, k)
-            check_size(model)  # before bodies are added, which takes ever longer
-            if any(chain.own_names()):
-                for added in range(joint, model.njoints):
-                    name = str(model.names[added]).removeprefix(f"arm_{k}_")
-                    model.names[added] = prefix + name
-            bodies = chain.append_bodies(model, k, joint, own)
-            for body in bodies:
-                body.name = prefix + body.name if body.name else f"link_{geometry.ngeoms}"
-                geometry.addGeometryObject(body)
-            links += own
-            arms += [k] * len(bodies)
-            tools.append(chain.tool(model, joint, own))
-            pairs = chain.disabled_pairs()
-            disabled |= {frozenset(prefix + name for name in pair) for pair in pairs}
-            followers += chain.followers(joint)
-            ranges.append((joint, model.njoints))
-        for follower in followers:
-            source, joint, *rule = follower.source, follower.joint, *follower[2:]
-            model = pin.transformJointIntoMimic(model, source, joint, *rule)
-        return Assembly(
-            model,
-            geometry,
-            tuple(links),
-            _slices(model, ranges),
-            kinematic_table(model),
-            tuple(arms),
-            tuple(tools),
-            frozenset(disabled),
+
+def assembled(arms: tuple[Arm, ...]) -> Assembly:
+    """Append arms to one model, with q = (arm 0, arm 1, …)."""
+    model, geometry = pin.Model(), pin.GeometryModel()
+    links: list[Link] = []
+    disabled: set[frozenset[str]] = set()
+    followers: list[Follower] = []
+    slices, body_arms, tools = [], [], []
+    for k, (arm, is_prefixed) in enumerate(zip(arms, _needs_prefix(arms), strict=True)):
+        first, prefix = model.njoints, f"arm_{k + 1}_" if is_prefixed else ""
+        parts = arm.append_to(model, k)
+        check_size(model)  # before bodies are added, which takes ever longer
+        if any(arm.own_names()):
+            for joint in range(first, model.njoints):
+                model.names[joint] = prefix + str(model.names[joint]).removeprefix(f"arm_{k}_")
+        bodies = parts.bodies
+        for body in [link_capsule(link, "") for link in parts.links] if bodies is None else bodies:
+            body.name = prefix + body.name if body.name else f"link_{geometry.ngeoms}"
+            geometry.addGeometryObject(body)
+            body_arms.append(k)
+        links += parts.links
+        tools.append(parts.tool or Tool(links[-1].joint, np.eye(3), links[-1].end))
+        disabled |= {frozenset(prefix + name for name in pair) for pair in parts.disabled}
+        followers += parts.followers
+        slices.append((first, model.njoints))
+    for follower in followers:
+        model = pin.transformJointIntoMimic(
+            model, follower.source, follower.joint, follower.multiplier, follower.offset
         )
+    # joints that follow have no coordinates
+    ends = np.cumsum([0] + [sum(model.nqs[first:last]) for first, last in slices])
+    return Assembly(
+        model,
+        geometry,
+        tuple(links),
+        np.stack([ends[:-1], ends[1:]], axis=1).astype(np.int64),
+        kinematic_table(model),
+        tuple(body_arms),
+        tuple(tools),
+        frozenset(disabled),
+    )
 
 
 def _needs_prefix(arms: tuple[Arm, ...]) -> list[bool]:
@@ -227,16 +210,6 @@ def _needs_prefix(arms: tuple[Arm, ...]) -> list[bool]:
         for kind in range(2)
     ]
     return [len(arms) > 1 and (any(several) or not any(own)) for own in names]
-
-
-def _slices(model: Any, ranges: list[tuple[int, int]]) -> np.ndarray:
-    """Return (arms, 2) first and one-past-last place in q of the joints of each arm."""
-    slices, first = [], 0
-    for start, stop in ranges:
-        after = first + sum(int(model.nqs[joint]) for joint in range(start, stop))
-        slices.append((first, after))
-        first = after
-    return np.array(slices, dtype=np.int64)
 
 
 class Chain(Arm, Robot):

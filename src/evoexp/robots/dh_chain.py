@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import Chain, Link, Tool
+from evoexp.robots.assembly import ArmParts, Chain, Link, Tool
 from evoexp.robots.bodies import AnyBody, Point3, body_geometry, placed
 from evoexp.validation import Settings, check_range
 
@@ -65,41 +65,30 @@ class DhChain(Chain):
                 raise SettingError(f"bodies[{k}].name", "a name that no other body has", body.name)
         return self
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
+    def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add the joints; a link is the line from one joint to the next, the last to the tool."""
-        before, parent, links = placed(self.base_position, self.base_rotation), 0, []
+        base, first = placed(self.base_position, self.base_rotation), model.njoints
+        before, parent, start, links = base, 0, np.array(self.base_position), []
         for k, joint in enumerate(self.joints):
             sliding = joint.kind == "prismatic"
             kind = pin.JointModelPZ() if sliding else pin.JointModelRZ()
-            links.append(Link(arm, parent, *self._ends(before, first=k == 0), 0.0))
+            links.append(Link(arm, parent, start, np.array(before.translation), 0.0))
             parent = model.addJoint(parent, kind, before, f"arm_{arm}_joint_{k}")
             unit = 1.0 if sliding else DEGREE
             model.lowerPositionLimit[parent - 1] = unit * joint.limits[0]
             model.upperPositionLimit[parent - 1] = unit * joint.limits[1]
-            before = joint.behind()
+            before, start = joint.behind(), np.zeros(3)
         tip = before * placed(self.tool_position, self.tool_rotation)
-        links.append(Link(arm, parent, np.zeros(3), np.array(tip.translation), 0.0))
-        return [link for link in links if not np.array_equal(link.start, link.end)]
-
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies as geometry objects."""
-        objects = []
+        links.append(Link(arm, parent, start, np.array(tip.translation), 0.0))
+        # a body of joint k is given in the frame behind it
+        frames = [(0, base)] + [(first + k, joint.behind()) for k, joint in enumerate(self.joints)]
+        bodies = []
         for k, body in enumerate(self.bodies):
             shape, placement = body_geometry(body, f"robot.bodies[{k}]")
-            if body.joint > 0:
-                joint, frame = first_joint + body.joint - 1, self.joints[body.joint - 1].behind()
-            else:
-                joint, frame = 0, placed(self.base_position, self.base_rotation)
-            objects.append(pin.GeometryObject(body.name, joint, 0, frame * placement, shape))
-        return objects
-
-    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame."""
-        last = first_joint + len(self.joints) - 1
-        placement = self.joints[-1].behind() * placed(self.tool_position, self.tool_rotation)
-        return Tool(last, np.array(placement.rotation), np.array(placement.translation))
-
-    def _ends(self, placement: Any, first: bool) -> tuple[FloatArray, FloatArray]:
-        """Return where the link to a joint begins and ends, in the frame before."""
-        start = np.array(self.base_position) if first else np.zeros(3)
-        return start, np.array(placement.translation)
+            index, frame = frames[body.joint]
+            bodies.append(pin.GeometryObject(body.name, index, 0, frame * placement, shape))
+        return ArmParts(
+            [link for link in links if not np.array_equal(link.start, link.end)],
+            bodies,
+            Tool(parent, np.array(tip.rotation), np.array(tip.translation)),
+        )

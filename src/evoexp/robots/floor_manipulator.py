@@ -1,21 +1,19 @@
 """A platform that moves over a floor, with an arm of three links on it (Chen & Zalzala 1995)."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.robots.assembly import Assembly, Link, Robot, link_capsule
+from evoexp.robots.assembly import ArmParts, Chain, Link, link_capsule
 from evoexp.robots.floor_platform import FloorPlatform
-from evoexp.robots.kinematics import kinematic_table
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.validation import NonNegative, Positive
 
 NUM_JOINTS = 5
 
 
-class FloorManipulator(Robot):
+class FloorManipulator(Chain):
     """Prismatic joints along x and y, then three revolute ones in the upright plane through x.
 
     The configuration is q = (x, y, θ1, θ2, θ3).
@@ -31,30 +29,18 @@ class FloorManipulator(Robot):
     link_lengths: tuple[Positive, Positive, Positive]  # l1, l2, l3
     link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
 
-    def build(self) -> Assembly:
-        """Return the model: the platform as its first body, then the links of the arm."""
-        model, geometry = pin.Model(), pin.GeometryModel()
-        first = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "platform_x")
-        parent = model.addJoint(first, pin.JointModelPY(), pin.SE3.Identity(), "platform_y")
-        top = np.array([0.0, 0.0, self.body_height])
-        body = pin.SE3(np.eye(3), 0.5 * top)
-        shape = coal.Cylinder(self.body_radius, self.body_height)
-        geometry.addGeometryObject(pin.GeometryObject("platform", parent, 0, body, shape))
-        links, place = [Link(0, parent, np.zeros(3), top, self.body_radius)], top
+    def append_to(self, model: Any, arm: int) -> ArmParts:
+        """Add the platform, whose link is the first, and the joints of the arm on it."""
+        platform = self.platform().append_to(model, arm)
+        (body,), bodies = platform.links, platform.bodies or []
+        links, parent, place = [body], body.joint, body.end
         for k, length in enumerate(self.link_lengths):
             joint = pin.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))
             parent = model.addJoint(parent, joint, pin.SE3(np.eye(3), place), f"arm_joint_{k}")
             place = np.array([length, 0.0, 0.0])
             links.append(Link(0, parent, np.zeros(3), place, self.link_radius))
-            geometry.addGeometryObject(link_capsule(links[-1], f"link_{k + 1}"))
-        return Assembly(
-            model,
-            geometry,
-            tuple(links),
-            np.array([[0, model.nq]]),
-            kinematic_table(model),
-            (0,) * len(links),
-        )
+            bodies.append(link_capsule(links[-1], f"link_{k + 1}"))
+        return ArmParts(links, bodies)
 
     def platform(self) -> FloorPlatform:
         """Return the platform alone."""

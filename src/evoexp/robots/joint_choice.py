@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from evoexp.errors import SettingError, nearest
 from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_rewriting import BASE, coordinate_names
-from evoexp.robots.urdf_text import JointText, Mimic
+from evoexp.robots.urdf_model import BASE, coordinate_names
+from evoexp.robots.urdf_reading import Mimic, UrdfJoint
 
 
 class JointRoles(NamedTuple):
@@ -19,7 +19,7 @@ class JointRoles(NamedTuple):
 
 
 def joint_roles(
-    joints: dict[str, JointText],
+    joints: dict[str, UrdfJoint],
     srdf: Srdf | None,
     names: tuple[str, ...],
     groups: tuple[str, ...],
@@ -81,7 +81,7 @@ def joint_roles(
 
 
 def standing_values(
-    fixed: tuple[tuple[str, float], ...], joints: dict[str, JointText], roles: JointRoles
+    fixed: tuple[tuple[str, float], ...], joints: dict[str, UrdfJoint], roles: JointRoles
 ) -> dict[str, float]:
     """Check the values that are given to joints that stand still.
 
@@ -105,7 +105,7 @@ def standing_values(
     return dict(fixed)
 
 
-def _free(name: str, joints: dict[str, JointText], free: dict[str, tuple[str, ...]]) -> str:
+def _free(name: str, joints: dict[str, UrdfJoint], free: dict[str, tuple[str, ...]]) -> str:
     """Check that a named joint moves of its own."""
     if name in free:
         return name
@@ -118,7 +118,7 @@ def _free(name: str, joints: dict[str, JointText], free: dict[str, tuple[str, ..
     raise SettingError("robot.joints", must, f"'{name}', which is {joint.kind}")
 
 
-def _to_the_end(joint: JointText, joints: dict[str, JointText]) -> Mimic:
+def _to_the_end(joint: UrdfJoint, joints: dict[str, UrdfJoint]) -> Mimic:
     """Join the rules of joints that follow followers, to one of the joint that leads them all."""
     assert joint.mimic is not None
     rule = joint.mimic

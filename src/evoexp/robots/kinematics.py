@@ -165,10 +165,8 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
     name = model.names[joint]
     if _follows(model, joint):
         # Pinocchio's motion subspace of such a joint is its own times the multiplier
-        own = model.joints[joint].createData()
-        model.joints[joint].calc(own, neutral)
-        motion = np.reshape(own.S, 6) / _rule(model, joint)[0]
-        return (motion[:3], True) if motion[:3].any() else (motion[3:], False)
+        axis, slides = own_axis(model, joint)
+        return axis / _rule(model, joint)[0], slides
     if model.nqs[joint] != 1 or model.nvs[joint] != 1:
         kind = model.joints[joint].shortname()
         raise UnsupportedJoint(
@@ -182,6 +180,19 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
     if not slides and length(linear) > 1e-12:
         raise UnsupportedJoint(f"robot: joint '{name}' must turn or slide, does both at once")
     return (linear if slides else angular), slides
+
+
+def own_axis(model: Any, joint: int) -> tuple[FloatArray, bool]:
+    """Return the axis (3,) of a joint of one coordinate by its motion subspace; whether it slides.
+
+    Args:
+        model: The joint's.
+        joint: Its index.
+    """
+    data = model.joints[joint].createData()
+    model.joints[joint].calc(data, pin.neutral(model))
+    motion = np.reshape(data.S, 6)
+    return (motion[:3], True) if motion[:3].any() else (motion[3:], False)
 
 
 def _frame_with_z(axis: FloatArray) -> FloatArray:

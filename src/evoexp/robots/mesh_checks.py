@@ -15,8 +15,10 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.input_files import stand_in
+from evoexp.mesh_files import MESHES
 from evoexp.records import IntArray
 
+PARTED = (".obj", ".dae")  # endings of meshes with parts
 BINARY = 84  # [B] of a binary STL before its triangles
 TRIANGLE = np.dtype([("numbers", "<f4", 12), ("attribute", "<u2")])  # of a binary STL
 # a vertex that is no number, in files of text
@@ -63,29 +65,57 @@ def whole_mesh(content: bytes, name: str, field: str) -> bytes:
 def _is_joined_wrongly(content: bytes, name: str, field: str) -> bool:
     """Whether a DAE has several parts, and coal reads them wrongly."""
     several = len(DAE_PARTS.findall(content)) > 2
-    return several and unused_vertices(load(content, ".dae", name, field)) > 0
+    return several and unused_vertices(load(content, name, field)) > 0
 
 
 def _same(content: bytes, plain: bytes, name: str, field: str) -> bool:
     """Whether coal reads as much of an OBJ as of its vertices and faces alone."""
     try:
-        mesh, other = (load(text, ".obj", name, field) for text in (content, plain))
+        mesh, other = (load(text, name, field) for text in (content, plain))
     except SettingError:
         return False
     return not unused_vertices(mesh) and mesh.num_tris == other.num_tris
 
 
-def load(content: bytes, ending: str, name: str, field: str = "robot.path") -> Any:
+def mesh_shape(
+    content: bytes, name: str, scale: tuple[float, ...], field: str, *, hull: bool
+) -> Any:
+    """Return a mesh as a coal shape of triangles, or as its convex hull.
+
+    Raises:
+        SettingError: If it cannot be read, or has vertices that are no numbers or, as a shape of
+            triangles, vertices that no triangle ends in.
+    """
+    mesh, reason = load(content, name, field, scale), ""
+    if not np.isfinite(mesh.vertices()).all():
+        reason = "a vertex that is no finite number"
+    elif not hull and name.lower().endswith(PARTED) and (count := unused_vertices(mesh)):
+        reason = f"{count} of {mesh.num_vertices} vertices end in no triangle"
+    if reason:
+        raise SettingError(field, "a URDF whose meshes can be read", f"'{name}': {reason}")
+    if hull:
+        mesh.buildConvexRepresentation(True)
+        return mesh.convex
+    return mesh
+
+
+def load(content: bytes, name: str, field: str, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Any:
     """Load a mesh by coal, as a model of triangles.
+
+    Args:
+        name: By which the URDF names it; its ending tells the format.
 
     Raises:
         SettingError: If it cannot be read.
     """
+    ending = Path(name).suffix.lower()
+    if ending not in MESHES:
+        raise SettingError(field, f"of meshes that end in {', '.join(MESHES)}", name)
     with tempfile.TemporaryDirectory() as directory:
-        place = Path(directory) / f"mesh{ending.lower()}"
+        place = Path(directory) / f"mesh{ending}"
         place.write_bytes(content)
         try:
-            return coal.MeshLoader().load(str(place), np.ones(3))
+            return coal.MeshLoader().load(str(place), np.array(scale))
         except (ValueError, RuntimeError) as error:
             reason = str(error).replace(directory, "").strip().splitlines()
     # coal says where in its own source it stopped, then what it could not load, then why

@@ -8,11 +8,11 @@ attached to the condition; whoever has it needs neither the library nor the time
 import contextlib
 import hashlib
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import Any, Literal
 
 import coal
 import numpy as np
-import pinocchio as pin
 
 from evoexp.errors import SettingError
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
@@ -48,7 +48,7 @@ def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> 
         return _written([corners], field)
     coacd = _coacd(field)
     key = hashlib.sha256(content)
-    key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, _version())).encode())
+    key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, version("coacd"))).encode())
     kept = cache_root() / "pieces" / f"{key.hexdigest()}.obj"
     with contextlib.suppress(FileNotFoundError, Damaged):
         return read_kept(kept)
@@ -69,7 +69,7 @@ def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, In
     Raises:
         SettingError: If it cannot be read.
     """
-    mesh = load(content, ending, f"mesh{ending}", field)
+    mesh = load(content, f"mesh{ending}", field)
     corners = np.asarray(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
     return corners, triangles_of(mesh)
 
@@ -106,34 +106,6 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
         raise SettingError(field, "pieces of a mesh", content[:40]) from None
 
 
-def in_pieces(geometry: Any, pieces: dict[str, list[Any]]) -> Any:
-    """Return a `pin.GeometryModel` with convex pieces in the place of its meshes.
-
-    Bodies of a link are numbered anew, as Pinocchio numbers them.
-
-    Args:
-        geometry: With meshes, as Pinocchio read it.
-        pieces: Path of a mesh and the scale → coal shapes; see `mesh_key`.
-    """
-    found, counts = pin.GeometryModel(), dict[str, int]()
-    for item in geometry.geometryObjects:
-        stem = item.name.rpartition("_")[0]
-        for shape in pieces.get(mesh_key(item), [item.geometry]):
-            number = counts.get(stem, 0)
-            counts[stem] = number + 1
-            found.addGeometryObject(
-                pin.GeometryObject(
-                    f"{stem}_{number}", item.parentJoint, item.parentFrame, item.placement, shape
-                )
-            )
-    return found
-
-
-def mesh_key(item: Any) -> str:
-    """Return the path and the scale of the mesh of a `pin.GeometryObject`, as one text."""
-    return f"{item.meshPath} {np.array(item.meshScale).ravel().tolist()}"
-
-
 def convex_shape(corners: FloatArray, faces: Sequence[Sequence[int]] | IntArray) -> Any:
     """Return a convex coal shape.
 
@@ -163,15 +135,6 @@ def _coacd(field: str) -> Any:
         must = "hulls, or coacd with it installed (pip install 'evoexp[meshes]')"
         raise SettingError(field, must, "coacd") from None
     return coacd
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("coacd")
-    except PackageNotFoundError:
-        return ""
 
 
 def _written(pieces: list[FloatArray], field: str) -> bytes:

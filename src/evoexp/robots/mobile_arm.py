@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import Chain, Link, link_capsule
+from evoexp.robots.assembly import ArmParts, Chain, Link, link_capsule
 from evoexp.validation import NonNegative, Positive, check_range
 
 Range = tuple[float, float]
@@ -55,7 +55,7 @@ class MobileArm(Chain):
         anything = ((-np.inf, np.inf),) * NUM_JOINTS
         return np.array([*(self.joint_limits or anything), *(self.torque_limits or anything)])
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
+    def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add the platform's joint and the arm's; the platform is the first link."""
         platform = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), f"arm_{arm}_platform")
         length, height = self.platform_size
@@ -67,12 +67,6 @@ class MobileArm(Chain):
             tip = np.array([link_length, 0.0, 0.0])
             links.append(Link(arm, parent, np.zeros(3), tip, self.link_radius))
             placement = pin.SE3(np.eye(3), tip)
-        return links
-
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the platform, by that name, and the arm's links."""
-        platform, *own = links
-        return [
-            link_capsule(platform, "platform"),
-            *super().append_bodies(model, arm, first_joint, own),
-        ]
+        names = ["platform", *[""] * NUM_JOINTS]
+        bodies = [link_capsule(link, name) for link, name in zip(links, names, strict=True)]
+        return ArmParts(links, bodies)

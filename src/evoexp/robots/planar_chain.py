@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
-from evoexp.robots.assembly import Chain, Link
+from evoexp.robots.assembly import ArmParts, Chain, Link
 from evoexp.validation import NonNegative, Positive, check_range
 
 Point2 = tuple[float, float]
@@ -42,7 +42,7 @@ class PlanarChain(Chain):
             check_range(f"joint_limits[{k}]", limits)
         return self
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
+    def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add one revolute joint per link; a tool is a link of no length on the last joint."""
         parent = 0
         s, c = sincos(DEGREE * self.base_angle)
@@ -62,4 +62,4 @@ class PlanarChain(Chain):
         if self.tool_radius > 0.0:
             tip = links[-1].end
             links.append(Link(arm, parent, tip, tip, self.tool_radius))
-        return links
+        return ArmParts(links)

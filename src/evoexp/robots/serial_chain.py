@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.robots.assembly import Chain, Link
+from evoexp.robots.assembly import ArmParts, Chain, Link
 from evoexp.robots.bodies import Point3
 from evoexp.validation import NonNegative, Settings
 
@@ -58,7 +58,7 @@ class SerialChain(Chain):
     base_angle: float = 0.0  # turn of the whole arm about the world's z [deg]
     link_radius: NonNegative = 0.0  # half the thickness of every link; 0: a line
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
+    def append_to(self, model: Any, arm: int) -> ArmParts:
         """Add the joints; links of no length are left out."""
         s, c = sincos(DEGREE * self.base_angle)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -72,4 +72,4 @@ class SerialChain(Chain):
             links.append(Link(arm, parent, start, end, self.link_radius))
             parent = model.addJoint(parent, joint.model(), placement, f"arm_{arm}_joint_{k}")
         links.append(Link(arm, parent, np.zeros(3), np.array(self.tip), self.link_radius))
-        return [link for link in links if not np.array_equal(link.start, link.end)]
+        return ArmParts([link for link in links if not np.array_equal(link.start, link.end)])

@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_text import JointText, parsed_xml
+from evoexp.robots.urdf_reading import UrdfJoint
+from evoexp.robots.xml_files import parsed_xml
 
 MOST_GROUPS = 300  # nested in one another
 
@@ -19,7 +20,7 @@ class NamedState(NamedTuple):
 class Srdf:
     """Groups, states and disabled pairs of the robot of a URDF."""
 
-    def __init__(self, content: bytes, joints: dict[str, JointText]) -> None:
+    def __init__(self, content: bytes, joints: dict[str, UrdfJoint]) -> None:
         """Read the text.
 
         Args:

@@ -6,44 +6,38 @@ identity.
 """
 
 import contextlib
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
-import pinocchio as pin
 from pydantic import BeforeValidator
 
-from evoexp.attachments import SHA256, File, keep, located
+from evoexp.attachments import SHA256, File, file_content, keep, located
 from evoexp.errors import SettingError, nearest
-from evoexp.mesh_files import MESHES, mesh_content, package_folders
+from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain, LinkFrames
+from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain, Robot, assembled
 from evoexp.robots.bodies import Point3, placed
-from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
 from evoexp.robots.joint_choice import JointRoles, joint_roles, standing_values
-from evoexp.robots.mesh_checks import whole_mesh
-from evoexp.robots.mesh_pieces import (
-    Decomposition,
-    in_pieces,
-    mesh_key,
-    mesh_pieces,
-    read_pieces,
-)
-from evoexp.robots.poses import pose_of
+from evoexp.robots.mesh_checks import mesh_shape, whole_mesh
+from evoexp.robots.mesh_pieces import Decomposition, mesh_pieces, read_pieces
 from evoexp.robots.robot_data import robot_file
 from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
-from evoexp.robots.urdf_bodies import built_bodies
+from evoexp.robots.urdf_arms import UrdfArm, UrdfTree
+from evoexp.robots.urdf_model import (
+    JointRules,
+    placed_bodies,
+    primitive_shape,
+    spheres_of_bodies,
+    urdf_model,
+)
 from evoexp.robots.urdf_notes import check_room, urdf_notes
-from evoexp.robots.urdf_reading import UrdfFile, read_urdf, urdf_file
-from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
-from evoexp.robots.urdf_text import file_content, parsed_xml
+from evoexp.robots.urdf_reading import UrdfBody, UrdfFile, read_urdf, urdf_file
+from evoexp.robots.xml_files import parsed_xml
 from evoexp.validation import Positive, Settings
 
-MESH = "collision/geometry/mesh"  # of a link
-SPHERES = "robot.spheres"
+PATH, SPHERES = "robot.path", "robot.spheres"  # settings, as errors name them
 
 
 class Mesh(Settings):
@@ -123,13 +117,29 @@ class Urdf(Chain):
     @property
     def robot_name(self) -> str:
         """The robot's name in the URDF."""
-        return str(self._file.root.get("name", ""))
+        return self.file.name
 
     def build(self) -> Assembly:
         """Return the robot with its derived pairs, given spheres and the frames of its links."""
-        pairs = self.pairs.content if self.pairs else None
-        found = super().build()._replace(pairs=pairs, frames=self._link_frames())
-        return found if self.spheres is None else found._replace(spheres=self._given_spheres())
+        tree = self._tree()
+        return assembled(_arms(tree))._replace(
+            pairs=self.pairs.content if self.pairs else None,
+            spheres=self._given_spheres(tree) if self.spheres else None,
+            frames=tree.link_frames(),
+        )
+
+    def chains(self) -> tuple[Arm, ...]:
+        """Return the arms: one, or one per group."""
+        return _arms(self._tree())
+
+    def states(self) -> tuple[ArmStates, ...]:
+        """Return the named states of each arm."""
+        return Robot.states(self)
+
+    def notes(self) -> list[str]:
+        """Remark on what the URDF leaves open: bodies, limits, units."""
+        meshes = {mesh.name: mesh.file.content for mesh in self.meshes}
+        return list(urdf_notes(self.file, self.roles, self._rules, meshes))
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
@@ -143,17 +153,19 @@ class Urdf(Chain):
         if "path" not in settings:
             return settings
         path = robot_file(settings.pop("path"), f"{field}.path")
+        if path in (None, "???"):
+            raise SettingError(f"{field}.path", "given: the path of a URDF", None)
         srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
         packages = package_folders(settings.pop("packages", None), f"{field}.packages")
         content = file_content(path, f"{field}.path")
         file = Path(located(str(path)))
         with _named(file):
-            root = urdf_file(content, f"{field}.path").root
+            links = urdf_file(content, f"{field}.path").links
         found: dict[str, bytes] = {}
-        for link in root.iterfind("link"):
-            for name in (mesh.get("filename") for mesh in link.iterfind(MESH)):
-                if name not in found:
-                    with _named(f"link '{link.get('name')}' of {file}"):
+        for link, bodies in links.items():
+            for name in (body.mesh for body in bodies):
+                if name and name not in found:
+                    with _named(f"link '{link}' of {file}"):
                         data = mesh_content(name, file, packages, f"{field}.path")
                         found[name] = whole_mesh(data, name, f"{field}.path")
         settings["urdf"] = {SHA256: keep(content)}
@@ -179,38 +191,27 @@ class Urdf(Chain):
             settings[name] = {SHA256: keep(content)}
         return settings
 
-    def chains(self) -> tuple[Arm, ...]:
-        """Return the arms: one, or one per group."""
-        roles, model = self._roles(), self._model()
-        check_room(self._file, roles, "robot.path")
-        values, tips = standing_values(self.fixed, self._file.joints, roles), self._tips(roles.tips)
-        bodies, base = self._geometry(model), self._base(model)
-        tree = UrdfTree(model, bodies, base, roles, values, tips, self._srdf)
-        return tuple(UrdfArm(tree, k) for k in range(len(roles.arms)))
-
-    def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states of each arm."""
-        return tuple(own for chain in self.chains() for own in chain.states())
-
-    def notes(self) -> list[str]:
-        """Remark on what the URDF leaves open: bodies, limits, units."""
-        meshes = {mesh.name: mesh.file.content for mesh in self.meshes}
-        return list(urdf_notes(self._file, self._roles(), self._rules, meshes))
-
     @property
-    def _file(self) -> UrdfFile:
+    def file(self) -> UrdfFile:
+        """The URDF."""
         return urdf_file(self.urdf.content)
 
     @property
     def _srdf(self) -> Srdf | None:
-        return None if self.srdf is None else Srdf(self.srdf.content, self._file.joints)
+        return None if self.srdf is None else Srdf(self.srdf.content, self.file.joints)
 
     @property
     def _rules(self) -> JointRules:
         return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)
 
-    def _roles(self) -> JointRoles:
-        groups, joints = self.groups or ((self.group,) if self.group else ()), self._file.joints
+    @property
+    def roles(self) -> JointRoles:
+        """The roles of its joints.
+
+        Raises:
+            SettingError: If a joint or group is not there, or cannot be chosen.
+        """
+        groups, joints = self.groups or ((self.group,) if self.group else ()), self.file.joints
         several = bool(self.groups)
         return joint_roles(joints, self._srdf, self.joints, groups, self.base, several=several)
 
@@ -231,65 +232,49 @@ class Urdf(Chain):
             raise SettingError("robot.tool_frames", must, list(self.tool_frames))
         return tuple((name, f"robot.tool_frames[{k}]") for k, name in enumerate(self.tool_frames))
 
-    def _link_frames(self) -> LinkFrames:
-        model = self._model()
-        base = self._base(model)
-        links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
-        poses = [(str(link.name), base * link.placement) for link in links if not link.parentJoint]
-        standing = tuple(
-            (name, tuple(pose_of(pose.rotation, pose.translation).tolist())) for name, pose in poses
-        )
-        moving = frozenset(str(link.name) for link in links if link.parentJoint)
-        ground = "" if self._srdf is None else self._srdf.ground()
-        return LinkFrames(str(links[0].name), standing, moving, ground)
+    def _tree(self) -> UrdfTree:
+        """Return the model, the bodies and the roles of the joints."""
+        roles = self.roles
+        check_room(self.file, roles, PATH)
+        values, tips = standing_values(self.fixed, self.file.joints, roles), self._tips(roles.tips)
+        model, meshes = urdf_model(self.file, self._rules), enumerate(self.meshes)
+        files = {mesh.name: (mesh, f"robot.meshes[{k}]") for k, mesh in meshes}
 
-    def _model(self) -> Any:
-        try:
-            return pin.buildModelFromXML(plain_urdf(self._file.root, self._rules))
-        except (ValueError, RuntimeError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise SettingError("robot.path", "a URDF that Pinocchio reads", reason) from None
-
-    def _geometry(self, model: Any) -> Any:
-        with tempfile.TemporaryDirectory() as directory:
-            places = {}
-            for k, mesh in enumerate(self.meshes):
-                ending = Path(mesh.name).suffix.lower()
-                if ending not in MESHES:
-                    must = f"a name that ends in {', '.join(MESHES)}"
-                    raise SettingError(f"robot.meshes[{k}].name", must, mesh.name)
-                places[mesh.name] = Path(directory) / f"mesh_{k}{ending}"
-                places[mesh.name].write_bytes(mesh.file.content)
-            bodies = built_bodies(model, self._file.root, self._rules, places, "robot.path")
-        return bodies if self.decomposition is None else self._in_pieces(bodies, places)
-
-    def _given_spheres(self) -> dict[str, FloatArray]:
-        """Return the given spheres of each body by its name: middles in its frame, and radii."""
-        assert self.spheres is not None
-        model = self._model()
-        root = with_spheres(self._file.root, read_urdf(self.spheres.content, SPHERES), SPHERES)
-        spheres = built_bodies(model, root, self._rules, {}, SPHERES)
-        bodies = list(self._geometry(model).geometryObjects)
-        found = spheres_of_bodies(bodies, list(spheres.geometryObjects))
-        return dict(zip(body_names(bodies), found, strict=True))
-
-    def _in_pieces(self, geometry: Any, places: dict[str, Path]) -> Any:
-        """Return collision bodies with the pieces of meshes in their place.
-
-        Args:
-            geometry: The bodies, a `pin.GeometryModel`.
-            places: Name of each mesh → the path from which it was read.
-        """
-        files = {str(places[mesh.name]): mesh.pieces for mesh in self.meshes}
-        shapes = {}
-        for item in geometry.geometryObjects:
-            if item.meshPath not in files:
-                continue
-            pieces, scale = files[item.meshPath], np.array(item.meshScale).ravel()
-            if pieces is None:
+        def shapes(body: UrdfBody) -> list[Any]:
+            if not body.mesh:
+                return [primitive_shape(body)]
+            if body.mesh not in files:
+                must = "those that the URDF names"
+                raise SettingError("robot.meshes", must, f"without '{body.mesh}'")
+            mesh, field = files[body.mesh]
+            if self.decomposition is None:
+                is_hull = body.kind == "convex"
+                return [mesh_shape(mesh.file.content, mesh.name, body.sizes, field, hull=is_hull)]
+            if mesh.pieces is None:
                 raise SettingError("robot.meshes", "given with their pieces", None)
-            shapes[mesh_key(item)] = read_pieces(pieces.content, scale, "robot.meshes")
-        return in_pieces(geometry, shapes)
+            return read_pieces(mesh.pieces.content, np.array(body.sizes), "robot.meshes")
+
+        bodies = list(placed_bodies(model, self.file.links, shapes, PATH))
+        return UrdfTree(model, bodies, self._base(model), roles, values, tips, self._srdf)
+
+    def _given_spheres(self, tree: UrdfTree) -> dict[str, FloatArray]:
+        """Return the given spheres of each body by its name: middles in its frame, and radii.
+
+        Raises:
+            SettingError: If the file has no spheres, other bodies, or links that the robot has not.
+        """
+        assert self.spheres is not None
+        given = read_urdf(self.spheres.content, SPHERES).links
+        for link, bodies in given.items():
+            if bodies and link not in self.file.links:
+                must = "a URDF whose spheres belong to links of the robot"
+                raise SettingError(SPHERES, must, link, nearest(link, list(self.file.links)))
+            if any(body.kind != "sphere" for body in bodies):
+                raise SettingError(SPHERES, "a URDF of spheres", f"another body of '{link}'")
+        if not any(given.values()):
+            raise SettingError(SPHERES, "a URDF of spheres", "one without")
+        spheres = placed_bodies(tree.model, given, lambda body: [primitive_shape(body)], SPHERES)
+        return dict(zip(tree.names, spheres_of_bodies(tree.bodies, list(spheres)), strict=True))
 
     def _base(self, model: Any) -> Any:
         """Return the `pin.SE3` of the root in the world."""
@@ -305,3 +290,7 @@ class Urdf(Chain):
         if frame.parentJoint != 0:
             raise SettingError("robot.base_frame", "a frame that does not move", self.base_frame)
         return base * frame.placement.inverse()
+
+
+def _arms(tree: UrdfTree) -> tuple[Arm, ...]:
+    return tuple(UrdfArm(tree, k) for k in range(len(tree.order)))

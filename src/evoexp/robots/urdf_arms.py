@@ -8,13 +8,12 @@ import pinocchio as pin
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
-from evoexp.records import FloatArray
-from evoexp.robots.assembly import Arm, ArmStates, Follower, Link, Tool
+from evoexp.robots.assembly import Arm, ArmParts, ArmStates, Follower, Link, LinkFrames, Tool
 from evoexp.robots.joint_choice import JointRoles
+from evoexp.robots.kinematics import own_axis
+from evoexp.robots.poses import pose_of
 from evoexp.robots.srdf import Srdf
-
-SLIDING = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned")
-AXES = {"X": 0, "Y": 1, "Z": 2}
+from evoexp.robots.urdf_model import PlacedBody
 
 
 class Carrier(NamedTuple):
@@ -29,12 +28,12 @@ class Carrier(NamedTuple):
 
 
 class UrdfTree:
-    """A URDF as Pinocchio reads it, and which of its joints move, in which arm."""
+    """A URDF as a model of all its joints, and which of them move, in which arm."""
 
     def __init__(
         self,
         model: Any,
-        geometry: Any,
+        bodies: list[PlacedBody],
         base: Any,
         roles: JointRoles,
         values: dict[str, float],
@@ -44,22 +43,21 @@ class UrdfTree:
         """Find out which joints move.
 
         Args:
-            model: Of all joints, one coordinate each.
-            geometry: Its collision bodies.
+            model: Of all joints, one coordinate each, see `urdf_model`.
+            bodies: Its collision bodies.
             base: `pin.SE3` of the root in the world.
             roles: Which joints move, which follow.
             values: Of joints that stand [deg, m].
             tips: Frame of each arm's tool, empty where none is chosen, and the field that chose it.
             srdf: Its states and pairs that are never judged; None: there are none.
         """
-        self.model, self.base, self.tips = model, base, tips
+        self.model, self.bodies, self.base, self.tips = model, bodies, base, tips
         self.states = [] if srdf is None else srdf.states()
-        self.items = list(geometry.geometryObjects)  # with the joints of this model
-        stems = [item.name.rpartition("_")[0] for item in self.items]
-        self.names = body_names(self.items)
+        self._ground = "" if srdf is None else srdf.ground()
+        self.names = _body_names(bodies)
         of_link: dict[str, set[str]] = {}
-        for name, stem in zip(self.names, stems, strict=True):
-            of_link.setdefault(stem, set()).add(name)
+        for name, body in zip(self.names, bodies, strict=True):
+            of_link.setdefault(body.link, set()).add(name)
         self.disabled = {
             frozenset((a, b))
             for one, two in ([] if srdf is None else srdf.disabled_links())
@@ -74,10 +72,6 @@ class UrdfTree:
             for name, rule in roles.rules.items()
             if name in index
         }
-        lost = [name for arm in roles.arms for name in arm if name not in index]
-        if lost:
-            must = "a URDF whose joints all hang on its root"
-            raise SettingError("robot.path", must, f"joint '{lost[0]}' that does not")
         self._arms = [{index[name] for name in arm} for arm in roles.arms]
         self.order = self._ordered()  # joints of each arm, in the order in which they are added
         moving = [joint for arm in self.order for joint in arm]
@@ -103,6 +97,16 @@ class UrdfTree:
                 Carrier(before.joint, place * _motion(self.model, joint, self._values[joint]))
             )
         return found
+
+    def link_frames(self) -> LinkFrames:
+        """Return the frames of the links: of those that stand still with their poses."""
+        links = [frame for frame in self.model.frames if frame.type == pin.FrameType.BODY]
+        poses = [(str(f.name), self.base * f.placement) for f in links if not f.parentJoint]
+        standing = tuple(
+            (name, tuple(pose_of(pose.rotation, pose.translation).tolist())) for name, pose in poses
+        )
+        moving = frozenset(str(link.name) for link in links if link.parentJoint)
+        return LinkFrames(str(links[0].name), standing, moving, self._ground)
 
     def frame(self, name: str, field: str) -> Any:
         """Find a `pin.Frame` by its name.
@@ -159,8 +163,8 @@ class UrdfTree:
         for joint, place in self._place_in.items():
             above[1 + place] = carriers[self.model.parents[joint]].joint
         bodies = [
-            (name, self.arm_of(item.parentJoint), carriers[item.parentJoint].joint)
-            for name, item in zip(self.names, self.items, strict=True)
+            (name, self.arm_of(body.joint), carriers[body.joint].joint)
+            for name, body in zip(self.names, self.bodies, strict=True)
         ]
         for k, (name, arm, joint) in enumerate(bodies):
             for other, other_arm, by in bodies[k + 1 :]:
@@ -211,7 +215,7 @@ class UrdfTree:
                 float(limits[model.idx_qs[joint]])
                 for limits in (model.lowerPositionLimit, model.upperPositionLimit)
             )
-            unit = 1.0 if _axis(model, joint)[1] else DEGREE
+            unit = 1.0 if own_axis(model, joint)[1] else DEGREE
             if joint in moving or joint in self.rules:
                 continue
             if joint in given:
@@ -229,12 +233,12 @@ class UrdfTree:
         return found
 
 
-def body_names(items: list[Any]) -> list[str]:
+def _body_names(bodies: list[PlacedBody]) -> list[str]:
     """Return the names of bodies: those of their links, with a number where a link has several."""
-    stems = [item.name.rpartition("_")[0] for item in items]
+    links = [body.link for body in bodies]
     return [
-        stem if stems.count(stem) == 1 else item.name
-        for item, stem in zip(items, stems, strict=True)
+        link if links.count(link) == 1 else f"{link}_{links[:k].count(link)}"
+        for k, link in enumerate(links)
     ]
 
 
@@ -242,30 +246,27 @@ class UrdfArm(Arm):
     """One arm of a URDF; bodies that stand still belong to the first arm."""
 
     def __init__(self, tree: UrdfTree, index: int) -> None:
-        """Take a part of a tree.
-
-        Args:
-            tree: The URDF.
-            index: The arm's number in it.
-        """
+        """Take the arm of a number out of a tree."""
         self._tree, self._index = tree, index
         self._own = tree.order[index]
         self._before = sum(len(arm) for arm in tree.order[:index])
 
     def own_names(self) -> tuple[set[str], set[str]]:
         """Return the names of the joints and of the bodies, as the URDF has them."""
-        tree = self._tree
-        joints = {str(tree.model.names[joint]) for joint in self._own}
-        return joints, {name for name, _ in self._own_bodies()}
+        joints = {str(self._tree.model.names[joint]) for joint in self._own}
+        return joints, {name for name, _ in self._bodies()}
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the joints; a link is the line from a joint to one behind it.
+    def append_to(self, model: Any, arm: int) -> ArmParts:
+        """Add the joints; a link is the line from a joint to one behind it, the last to the tool.
 
-        The last to the tool.
+        Raises:
+            SettingError: If the URDF has no bodies, or the tool's frame stands still.
         """
-        tree, own, first = self._tree, self._tree.model, model.njoints
-        carriers = tree.carriers(first - self._before)
-        starts: list[tuple[Carrier, Any]] = []
+        tree, own = self._tree, self._tree.model
+        if not tree.bodies:
+            raise SettingError("robot.path", "a URDF with collision bodies", None)
+        first = model.njoints - self._before  # the place of the tree's first joint in the robot
+        carriers, links = tree.carriers(first), []
         for joint in self._own:
             before = carriers[own.parents[joint]]
             place = before.place(own.jointPlacements[joint])
@@ -274,62 +275,24 @@ class UrdfArm(Arm):
             index = own.idx_qs[joint]
             model.lowerPositionLimit[model.idx_qs[added]] = own.lowerPositionLimit[index]
             model.upperPositionLimit[model.idx_qs[added]] = own.upperPositionLimit[index]
-            # 0 where the URDF gives none: no limit
-            speed = own.velocityLimit[own.idx_vs[joint]]
-            model.velocityLimit[model.idx_vs[added]] = speed if speed > 0.0 else np.inf
-            starts.append((before, place))
-        links = []
-        for before, place in starts:
-            start = self.base_of(before)
+            model.velocityLimit[model.idx_vs[added]] = own.velocityLimit[own.idx_vs[joint]]
+            start = np.zeros(3) if before.joint else np.array(tree.base.translation)
             links.append(Link(arm, before.joint, start, np.array(place.translation), 0.0))
-        tool = self.tool(model, first, links)
+        tool = self._tool(carriers)
         links.append(Link(arm, tool.joint, np.zeros(3), tool.position, 0.0))
-        return [link for link in links if not np.array_equal(link.start, link.end)]
-
-    def base_of(self, before: Carrier) -> FloatArray:
-        """Return where a link begins: at the joint that carries it, or at the robot's base."""
-        return np.zeros(3) if before.joint else np.array(self._tree.base.translation)
-
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the collision bodies."""
-        carriers = self._tree.carriers(first_joint - self._before)
         bodies = []
-        for name, item in self._own_bodies():
-            carrier = carriers[item.parentJoint]
-            place = carrier.place(item.placement)
-            bodies.append(pin.GeometryObject(name, carrier.joint, 0, place, item.geometry))
-        if not self._tree.items:
-            raise SettingError("robot.path", "a URDF with collision bodies", None)
-        return bodies
-
-    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame."""
-        name, field = self._tree.tips[self._index]
-        frame = self._tree.frame(name, field) if name else self._tree.last_frame(self._index)
-        carrier = self._tree.carriers(first_joint - self._before)[frame.parentJoint]
-        if carrier.joint == 0:
-            raise SettingError(field, "a frame that moves", name)
-        place = carrier.place(frame.placement)
-        return Tool(carrier.joint, np.array(place.rotation), np.array(place.translation))
-
-    def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs of bodies that the SRDF switches off."""
-        return self._tree.disabled
-
-    def followers(self, first_joint: int) -> list[Follower]:
-        """Return the joints that follow others.
-
-        Args:
-            first_joint: Of this arm in the robot.
-        """
-        first, rules = first_joint - self._before, self._tree.rules
-        moving = [joint for arm in self._tree.order for joint in arm]
-        return [
-            Follower(first + moving.index(joint), first + moving.index(source), multiplier, offset)
+        for name, body in self._bodies():
+            carrier = carriers[body.joint]
+            place = carrier.place(body.placement)
+            bodies.append(pin.GeometryObject(name, carrier.joint, 0, place, body.shape))
+        followers = tuple(
+            Follower(carriers[joint].joint, carriers[source].joint, multiplier, offset)
             for joint in self._own
-            if joint in rules
-            for source, multiplier, offset in [rules[joint]]
-        ]
+            if joint in tree.rules
+            for source, multiplier, offset in [tree.rules[joint]]
+        )
+        links = [link for link in links if not np.array_equal(link.start, link.end)]
+        return ArmParts(links, bodies, tool, frozenset(tree.disabled), followers)
 
     def states(self) -> tuple[ArmStates, ...]:
         """Return the named states of the joints that move."""
@@ -337,34 +300,29 @@ class UrdfArm(Arm):
         found: dict[str, dict[str, float]] = {}
         for state in tree.states:  # of several groups: one state of all their joints
             found[state.name] = found.get(state.name, {}) | state.values
-        units = tuple(1.0 if _axis(tree.model, joint)[1] else DEGREE for joint in own)
+        units = tuple(1.0 if own_axis(tree.model, joint)[1] else DEGREE for joint in own)
         joints = tuple(str(tree.model.names[joint]) for joint in own)
         return (ArmStates(joints, units, found),)
 
-    def _own_bodies(self) -> list[tuple[str, Any]]:
+    def _tool(self, carriers: list[Carrier]) -> Tool:
+        """Return the tool's frame."""
+        name, field = self._tree.tips[self._index]
+        frame = self._tree.frame(name, field) if name else self._tree.last_frame(self._index)
+        carrier = carriers[frame.parentJoint]
+        if carrier.joint == 0:
+            raise SettingError(field, "a frame that moves", name)
+        place = carrier.place(frame.placement)
+        return Tool(carrier.joint, np.array(place.rotation), np.array(place.translation))
+
+    def _bodies(self) -> list[tuple[str, PlacedBody]]:
         """Return the bodies that this arm's joints carry, the first arm's with those that stand."""
-        tree = self._tree
-        bodies = zip(tree.names, tree.items, strict=True)
-        return [(n, item) for n, item in bodies if tree.arm_of(item.parentJoint) == self._index]
-
-
-def _axis(model: Any, joint: int) -> tuple[FloatArray, bool]:
-    """Return the axis (3,) of a joint of one coordinate, and whether it slides."""
-    kind = model.joints[joint].shortname()
-    if kind.endswith("Unaligned"):
-        return np.array(model.joints[joint].extract().axis), kind in SLIDING
-    return np.eye(3)[AXES[kind[-1]]], kind in SLIDING
+        bodies = zip(self._tree.names, self._tree.bodies, strict=True)
+        return [(n, body) for n, body in bodies if self._tree.arm_of(body.joint) == self._index]
 
 
 def _motion(model: Any, joint: int, value: float) -> Any:
-    """Return the `pin.SE3` by which a joint moves what it carries.
-
-    Args:
-        model: The joint's.
-        joint: Its index.
-        value: Its coordinate [rad, m].
-    """
-    axis, slides = _axis(model, joint)
+    """Return the `pin.SE3` by which a joint moves what it carries, by its coordinate [rad, m]."""
+    axis, slides = own_axis(model, joint)
     if slides:
         return pin.SE3(np.eye(3), axis * value)
     s, c = sincos(value)

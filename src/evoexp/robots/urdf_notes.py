@@ -1,14 +1,12 @@
 """Remarks on the bounds of joints, bodies of links and units of meshes that a URDF leaves open."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from evoexp.errors import SettingError
 from evoexp.robots.joint_choice import JointRoles
 from evoexp.robots.mesh_checks import unit_of
-from evoexp.robots.urdf_reading import UrdfFile
-from evoexp.robots.urdf_rewriting import JointRules, coordinate_names
-from evoexp.robots.urdf_text import JointText
+from evoexp.robots.urdf_model import JointRules, coordinate_names
+from evoexp.robots.urdf_reading import UrdfFile, UrdfJoint
 
 LIMIT_SETTINGS = {"revolute": ("turn_limit", "deg"), "prismatic": ("slide_limit", "m")}
 
@@ -44,7 +42,7 @@ def urdf_notes(
         meshes: Contents of meshes by their names.
     """
     moving = _moving_links(file, roles, rules)
-    if bare := [link.get("name") for link in moving if link.find("collision") is None]:
+    if bare := [link for link in moving if not file.links[link]]:
         yield f"links that move and have no body: {', '.join(bare)}"
     for joint, setting, unit in _limited(file, roles):
         sides = zip(("lower", "upper"), joint.limits, strict=True)
@@ -62,7 +60,7 @@ def urdf_notes(
             )
 
 
-def _limited(file: UrdfFile, roles: JointRoles) -> Iterator[tuple[JointText, str, str]]:
+def _limited(file: UrdfFile, roles: JointRoles) -> Iterator[tuple[UrdfJoint, str, str]]:
     """Yield the joints between limits that move of their own, with the setting without them."""
     moving = frozenset[str]().union(*roles.arms)
     for joint in file.joints.values():
@@ -70,12 +68,12 @@ def _limited(file: UrdfFile, roles: JointRoles) -> Iterator[tuple[JointText, str
             yield joint, *LIMIT_SETTINGS[joint.kind]
 
 
-def _moving_links(file: UrdfFile, roles: JointRoles, rules: JointRules) -> Iterator[Any]:
+def _moving_links(file: UrdfFile, roles: JointRoles, rules: JointRules) -> Iterator[str]:
     """Yield the links that a joint carries which moves of its own or follows one that does."""
     free = frozenset[str]().union(*roles.arms)
     above = {joint.child: joint for joint in file.joints.values()}
-    for link in file.root.iterfind("link"):
-        carried, name = rules.base in ("planar", "floating"), link.get("name")
+    for link in file.links:
+        carried, name = rules.base in ("planar", "floating"), link
         while not carried and (joint := above.get(name)) is not None:
             source = roles.rules[joint.name].source if joint.name in roles.rules else joint.name
             carried = not free.isdisjoint({source, *coordinate_names(source, joint.kind)})

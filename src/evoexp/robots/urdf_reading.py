@@ -1,20 +1,20 @@
-"""A URDF reduced to its links, collision bodies and joints, all of them checked.
+"""A URDF read once: its links, collision bodies and joints, all of them checked.
 
 urdfdom leaves out what it does not understand, says so on stderr only, and with one body all others
-of the link. It is given nothing of the kind: elements that are not used are dropped, numbers are
-written anew, and whatever it would pass over is refused here, by link or joint.
+of the link. Here nothing is passed over: what cannot be is refused, by link or joint.
 """
 
 import functools
+import math
 import re
-import xml.etree.ElementTree as ET
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_text import JointText, check_rules, parsed_xml, read_joints
+from evoexp.robots.xml_files import parsed_xml
 
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
@@ -25,7 +25,7 @@ DRAKE_CAPSULE = "drake:capsule"  # means the same
 ALIKE = 0.8  # [-] names of elements as similar as that are slips
 XACRO = "a URDF that xacro has expanded (xacro FILE > robot.urdf)"
 
-# elements and the elements in them that are read; all others are dropped; `collision_checking` is
+# elements and the elements in them that are read; all others are left out; `collision_checking` is
 # Pinocchio's: it names cylinders that are capsules, and meshes that are replaced by their hulls
 PARTS = {
     "robot": ("link", "joint"),
@@ -63,11 +63,49 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 
 
-class UrdfFile(NamedTuple):
-    """A URDF of one tree of links, read and checked once; shared, so not to be changed."""
+class Mimic(NamedTuple):
+    """The rule of a joint that follows another: q = multiplier · q of the source + offset."""
 
-    root: Any  # of the elements and attributes that are used, see `read_urdf`
-    joints: dict[str, JointText]  # by their names, in the file's order
+    source: str
+    multiplier: float
+    offset: float
+
+
+class UrdfJoint(NamedTuple):
+    """A joint as the URDF gives it."""
+
+    name: str
+    kind: str  # one of `KINDS`
+    parent: str  # the link that carries it
+    child: str  # the link that it carries
+    placement: Any = pin.SE3.Identity()  # of its frame in that of the parent
+    axis: tuple[float, ...] = (1.0, 0.0, 0.0)  # of any length but 0
+    # its least and greatest coordinate [rad, m]; None: the file gives none
+    limits: tuple[float | None, float | None] = (None, None)
+    speed: float = math.inf  # its greatest [rad/s, m/s]; inf: the file gives none
+    mimic: Mimic | None = None  # the rule by which it follows another joint; None: it does not
+
+
+class UrdfBody(NamedTuple):
+    """A collision body as the URDF gives it."""
+
+    kind: str  # one of `SHAPES`, or convex: the hull of a mesh
+    sizes: tuple[float, ...]  # edges | radius | radius, length | scale of a mesh
+    placement: Any  # pin.SE3 in the frame of its link
+    mesh: str = ""  # the name of its file
+
+
+class UrdfFile(NamedTuple):
+    """A URDF, shared by all who read it."""
+
+    name: str  # of the robot
+    links: dict[str, tuple[UrdfBody, ...]]  # the bodies of each link, in the file's order
+    joints: dict[str, UrdfJoint]  # by their names, in the file's order
+
+    @property
+    def root(self) -> str:
+        """The link that no joint carries."""
+        return next(iter(self.links.keys() - {joint.child for joint in self.joints.values()}))
 
 
 @functools.lru_cache(maxsize=32)
@@ -80,31 +118,26 @@ def urdf_file(content: bytes, field: str = "robot.path") -> UrdfFile:
     Raises:
         SettingError: If it cannot be, by link or joint.
     """
-    root = read_urdf(content, field)
-    joints = read_joints(root)
-    check_tree([link.get("name") for link in root.iterfind("link")], joints, field)
-    check_rules(joints, field)
-    return UrdfFile(root, joints)
+    file = read_urdf(content, field)
+    check_tree(list(file.links), file.joints, field)
+    check_rules(file.joints, field)
+    return file
 
 
-def read_urdf(content: bytes, field: str) -> Any:
+def read_urdf(content: bytes, field: str) -> UrdfFile:
     """Read the links, collision bodies and joints of a URDF.
 
     Args:
         field: That names it, for errors.
 
-    Returns:
-        The root of a tree of the elements and attributes that are used; numbers are written as
-        Python writes them, in the place of Drake's capsules stand others.
-
     Raises:
         SettingError: For an element, a number or a name that cannot be, by link or joint.
     """
-    source = parsed_xml(content, field, "robot")
-    for element in source.iter():
+    root = parsed_xml(content, field, "robot")
+    for element in root.iter():
         if element.tag.startswith("xacro:"):
             raise SettingError(field, XACRO, f"<{element.tag}>")
-    root = _Reader(field).reduced(source, "")
+    _Check(field).element(root, "")
     for what, path in {"links": "link", "collision bodies": "link/collision"}.items():
         if (count := len(root.findall(path))) > MOST_LINKS:
             raise SettingError(field, f"a URDF of at most {MOST_LINKS} {what}", count)
@@ -113,12 +146,85 @@ def read_urdf(content: bytes, field: str) -> Any:
         if double := [name for name in names if names.count(name) > 1]:
             must = f"a URDF whose {kind}s have different names"
             raise SettingError(field, must, f"two {kind}s '{double[0]}'")
-    for joint in root.iterfind("joint"):
-        _check_joint(joint, field)
-    return root
+    links = {
+        str(link.get("name")): tuple(_body(link, body) for body in link.iterfind("collision"))
+        for link in root.iterfind("link")
+    }
+    joints = (_joint(joint, field) for joint in root.iterfind("joint"))
+    return UrdfFile(str(root.get("name", "")), links, {joint.name: joint for joint in joints})
 
 
-def check_tree(links: list[str], joints: dict[str, JointText], field: str) -> None:
+def _numbers(element: Any, name: str, default: str) -> tuple[float, ...]:
+    """Return the numbers of an attribute; the default where element or attribute are absent."""
+    text = default if element is None else element.get(name, default)
+    return tuple(map(float, text.split()))
+
+
+def _placement(element: Any) -> Any:
+    """Return the `pin.SE3` of an element's origin, with the bits that urdfdom and Pinocchio give.
+
+    The rotation Rz(yaw) Ry(pitch) Rx(roll) goes through a quaternion.
+    """
+    origin = element.find("origin")
+    half = [0.5 * angle for angle in _numbers(origin, "rpy", "0 0 0")]
+    (sr, sp, sy), (cr, cp, cy) = map(math.sin, half), map(math.cos, half)
+    x, y = sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy
+    z, w = cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy
+    size = math.sqrt(x * x + y * y + z * z + w * w)
+    turn = pin.Quaternion(w / size, x / size, y / size, z / size).toRotationMatrix()
+    return pin.SE3(turn, np.array(_numbers(origin, "xyz", "0 0 0")))
+
+
+def _body(link: Any, collision: Any) -> UrdfBody:
+    shape = next(part for part in collision.find("geometry") if part.tag in SHAPES)
+    kind = str(shape.tag)
+    for other, plain in (("capsule", "cylinder"), ("convex", "mesh")):
+        names = [item.get("name") for item in link.iterfind(f"collision_checking/{other}")]
+        if kind == plain and collision.get("name") in names:
+            kind = other
+    attributes = {"box": ("size",), "sphere": ("radius",), "mesh": ("scale",)}
+    sizes = [_numbers(shape, n, "1 1 1") for n in attributes.get(shape.tag, ("radius", "length"))]
+    return UrdfBody(kind, sum(sizes, ()), _placement(collision), shape.get("filename", ""))
+
+
+def _joint(joint: Any, field: str) -> UrdfJoint:
+    """Read a joint; check its kind, ends, axis and limits."""
+    kind, name = joint.get("type"), joint.get("name")
+    if kind not in KINDS:
+        must = f"a URDF whose joints are {', '.join(KINDS[:-1])} or {KINDS[-1]}"
+        raise SettingError(field, must, f"joint '{name}' of type {kind}")
+    ends = [joint.find(end) for end in ("parent", "child")]
+    for end, element in zip(("parent", "child"), ends, strict=True):
+        if element is None:
+            must = f"a URDF whose joints have a <{end}>"
+            raise SettingError(field, must, f"joint '{name}' without")
+    parent, child = (element.get("link") for element in ends)
+    if kind == "fixed":
+        return UrdfJoint(name, kind, parent, child, _placement(joint))
+    axis, limit, rule = (joint.find(part) for part in ("axis", "limit", "mimic"))
+    direction = _numbers(axis, "xyz", "1 0 0")
+    if kind != "floating" and not sum(map(abs, direction)) > SHORTEST:
+        must = "a URDF whose axes point somewhere"
+        raise SettingError(field, must, f"joint '{name}': {axis.get('xyz')}")
+    texts = [None if limit is None else limit.get(side) for side in ("lower", "upper")]
+    low, high = (None if text is None else float(text) for text in texts)
+    if kind in ("revolute", "prismatic") and (low or 0.0) > (high or 0.0):
+        must = "a URDF whose lower limits do not exceed the upper ones"
+        absent = " (an absent limit is 0)" if None in (low, high) else ""
+        raise SettingError(
+            field, must, f"joint '{name}': {low or 0.0:g} to {high or 0.0:g}{absent}"
+        )
+    ((speed,), mimic) = _numbers(limit, "velocity", "inf"), None
+    if rule is not None:
+        (multiplier,), (offset,) = _numbers(rule, "multiplier", "1"), _numbers(rule, "offset", "0")
+        mimic = Mimic(str(rule.get("joint")), multiplier, offset)
+    return UrdfJoint(
+        name, kind, parent, child, _placement(joint), direction, (low, high),
+        speed if speed > 0.0 else math.inf, mimic,
+    )  # fmt: skip
+
+
+def check_tree(links: list[str], joints: dict[str, UrdfJoint], field: str) -> None:
     """Check that joints join the links of a URDF to one tree.
 
     Args:
@@ -130,7 +236,7 @@ def check_tree(links: list[str], joints: dict[str, JointText], field: str) -> No
         SettingError: If a link is not there, hangs on two joints or in a loop, or if there are
             several roots.
     """
-    above: dict[str, JointText] = {}  # link → the joint that carries it
+    above: dict[str, UrdfJoint] = {}  # link → the joint that carries it
     for joint in joints.values():
         for link in (joint.parent, joint.child):
             if link not in links:
@@ -157,42 +263,64 @@ def check_tree(links: list[str], joints: dict[str, JointText], field: str) -> No
         raise SettingError(field, must, was)
 
 
-class _Reader:
+def check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
+    """Check that each rule leads to a joint that moves of its own or stands.
+
+    Raises:
+        SettingError: If a joint follows one that is not there, or itself.
+    """
+    for joint in joints.values():
+        passed = [joint.name]
+        while joint.mimic is not None:
+            if joint.mimic.source not in joints:
+                must = "a URDF whose joints follow joints that are there"
+                raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
+            joint = joints[joint.mimic.source]
+            if joint.name in passed:
+                must = "a URDF whose joints do not follow themselves"
+                raise SettingError(field, must, " → ".join([*passed, joint.name]))
+            passed.append(joint.name)
+
+
+class _Check:
+    """Checks elements, attributes and numbers."""
+
     def __init__(self, field: str) -> None:
         self._field = field
 
-    def reduced(self, element: Any, where: str) -> Any:
-        """Return an element with the elements and attributes that are used.
+    def element(self, element: Any, where: str) -> None:
+        """Check an element and those in it.
 
         Args:
             where: Names the link or joint that it belongs to.
         """
-        tag = "capsule" if element.tag == DRAKE_CAPSULE else element.tag
+        if element.tag == DRAKE_CAPSULE:
+            element.tag = "capsule"
+        tag = element.tag
         if tag in ("link", "joint"):
             where = f"{tag} '{element.get('name', '')}'"
         if tag == "collision_checking":
-            return element
-        found = ET.Element(tag, self._attributes(element, tag, where))
+            return
+        self._attributes(element, tag, where)
         known: tuple[str, ...] = PARTS.get(tag, ())
         if tag == "joint" and element.get("type") == "fixed":
             known = known[:3]
+        names = []
         for child in element:
             if child.tag in known or (tag == "geometry" and child.tag == DRAKE_CAPSULE):
-                found.append(self.reduced(child, where))
+                self.element(child, where)
+                names.append(child.tag)
             else:
-                self._check_dropped(child, tag, where)
-        if tag in SINGLE:
-            names = [child.tag for child in found]
-            if double := [name for name in names if names.count(name) > 1]:
-                self._refuse(f"one <{double[0]}> in a <{tag}>", where, "several")
-        if tag == "geometry" and len(found) != 1:
+                self._check_left_out(child, tag, where)
+        if tag in SINGLE and (double := [name for name in names if names.count(name) > 1]):
+            self._refuse(f"one <{double[0]}> in a <{tag}>", where, "several")
+        if tag == "geometry" and len(names) != 1:
             shapes = f"one of {', '.join(SHAPES)} in a <geometry>"
-            self._refuse(shapes, where, " and ".join(child.tag for child in found) or "none")
-        if tag == "collision" and found.find("geometry") is None:
+            self._refuse(shapes, where, " and ".join(names) or "none")
+        if tag == "collision" and "geometry" not in names:
             self._refuse("a <geometry> in a <collision>", where, "none")
-        return found
 
-    def _check_dropped(self, child: Any, tag: str, where: str) -> None:
+    def _check_left_out(self, child: Any, tag: str, where: str) -> None:
         """Refuse an element that is not used, if somebody meant another one, or put it wrongly."""
         if tag == "geometry":
             self._refuse(f"one of {', '.join(SHAPES)} in a <geometry>", where, f"<{child.tag}>")
@@ -206,16 +334,16 @@ class _Reader:
             if (place := PLACES.get(element.tag)) is not None:
                 self._refuse(f"each <{element.tag}> in a <{place}>", where, f"one in a <{tag}>")
 
-    def _attributes(self, element: Any, tag: str, where: str) -> dict[str, str]:
-        """Return the attributes that are used, numbers written anew."""
-        kinds, found = ATTRIBUTES.get(tag, {}), {}
+    def _attributes(self, element: Any, tag: str, where: str) -> None:
+        """Check the attributes that are read, and whether others are slips for them."""
+        kinds = ATTRIBUTES.get(tag, {})
         for name, text in element.items():
             if "${" in text or "$(" in text:
                 raise SettingError(self._field, XACRO, f'<{tag} {name}="{text[:40]}"/>')
-            if name in kinds:
-                found[name] = text if kinds[name] == 0 else self._numbers(tag, name, text, where)
-        missing = [name for name in kinds if name not in found]
-        for name in element.keys() - found.keys():
+            if kinds.get(name):
+                self._check_numbers(tag, name, text, where)
+        missing = [name for name in kinds if element.get(name) is None]
+        for name in set(element.keys()) - kinds.keys():
             if (tag, name) == ("origin", "quat_xyzw"):
                 self._refuse("rpy in an <origin>", where, name)
             if meant := get_close_matches(name.lower(), missing, 1, 0.6):
@@ -224,53 +352,22 @@ class _Reader:
         for name in missing:
             if tag not in OPTIONAL and (tag, name) not in DEFAULTS:
                 self._refuse(f"{name} in a <{tag}>", where, "none")
-        return found
 
-    def _numbers(self, tag: str, name: str, text: str, where: str) -> str:
-        """Check the numbers of an attribute and write them anew."""
+    def _check_numbers(self, tag: str, name: str, text: str, where: str) -> None:
         words, count, here = text.split(), ATTRIBUTES[tag][name], f"as {name} of <{tag}>"
         if len(words) != count:
             self._refuse(f"{WORDS[count]} {here}", where, text[:60])
         values = []
         for word in words:
-            if name in UNBOUNDED and INFINITE.fullmatch(word):
-                values.append(float(word))
-                continue
-            value = float(word) if NUMBER.fullmatch(word) else np.nan
-            if not abs(value) <= LARGEST and not (name in UNBOUNDED and abs(value) > LARGEST):
+            is_infinite = name in UNBOUNDED and INFINITE.fullmatch(word)
+            values.append(float(word) if is_infinite or NUMBER.fullmatch(word) else math.nan)
+            if not abs(values[-1]) <= (math.inf if name in UNBOUNDED else LARGEST):
                 self._refuse(f"finite numbers, at most {LARGEST:g}, {here}", where, text[:60])
-            values.append(value)
         if name in POSITIVE and min(values) <= 0.0:
             self._refuse(f"numbers greater than 0 {here}", where, text[:60])
         if name == "scale" and 0.0 in values:
             self._refuse(f"numbers other than 0 {here}", where, text[:60])
-        return " ".join(map(repr, values))
 
     def _refuse(self, must: str, where: str, was: str, hint: str = "") -> None:
         must = f"a URDF with {must}"
         raise SettingError(self._field, must, f"{where}: {was}" if where else was, hint)
-
-
-def _check_joint(joint: Any, field: str) -> None:
-    """Check a joint's kind, ends, axis and limits."""
-    kind, name = joint.get("type"), joint.get("name")
-    if kind not in KINDS:
-        must = f"a URDF whose joints are {', '.join(KINDS[:-1])} or {KINDS[-1]}"
-        raise SettingError(field, must, f"joint '{name}' of type {kind}")
-    for end in ("parent", "child"):
-        if joint.find(end) is None:
-            must = f"a URDF whose joints have a <{end}>"
-            raise SettingError(field, must, f"joint '{name}' without")
-    axis, limit = joint.find("axis"), joint.find("limit")
-    if axis is not None and kind not in ("fixed", "floating"):
-        direction = [float(word) for word in str(axis.get("xyz", "1 0 0")).split()]
-        if not sum(map(abs, direction)) > SHORTEST:
-            must = "a URDF whose axes point somewhere"
-            raise SettingError(field, must, f"joint '{name}': {axis.get('xyz')}")
-    if limit is not None and kind in ("revolute", "prismatic"):
-        lower, upper = (float(limit.get(side, "0")) for side in ("lower", "upper"))
-        if lower > upper:
-            must = "a URDF whose lower limits do not exceed the upper ones"
-            is_whole = {"lower", "upper"} <= set(limit.keys())
-            absent = "" if is_whole else " (an absent limit is 0)"
-            raise SettingError(field, must, f"joint '{name}': {lower:g} to {upper:g}{absent}")

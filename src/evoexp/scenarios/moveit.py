@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.attachments import SHA256, File, keep, located
+from evoexp.attachments import SHA256, File, file_content, keep, located
 from evoexp.errors import SettingError, nearest
-from evoexp.input_files import read_bounded
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray, IntArray
@@ -22,7 +21,7 @@ from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit_files import MessagePart, Pose, read_document
 from evoexp.scenarios.moveit_frames import has_other_frames
 from evoexp.scenarios.moveit_meshes import Mesh, resources
-from evoexp.scenarios.moveit_messages import REQUEST, SCENE
+from evoexp.scenarios.moveit_messages import MAX_SCENE, REQUEST, SCENE
 from evoexp.scenarios.moveit_request import (
     LinkGoal,
     Request,
@@ -107,7 +106,7 @@ class MoveitTask(Component):
             if path in (None, "???"):
                 must = f"given: the path of MoveIt's planning {name} (YAML)"
                 raise SettingError(f"{field}.{name}", must, None)
-            content = _content(path, f"{field}.{name}")
+            content = file_content(path, f"{field}.{name}", MAX_SCENE)
             settings[name] = {SHA256: keep(content)}
             _paths[settings[name][SHA256]] = path
             document = _document(content, f"{field}.{name}: {path}", message)
@@ -303,13 +302,3 @@ def _world(
         field = f"{scene.field}: the mesh '{mesh.name}'"
         loaded[mesh.name] = load(mesh.file.content, Path(mesh.name).suffix, field)
     return read_world(scene, links, loaded)
-
-
-def _content(path: str, field: str) -> bytes:
-    try:
-        from evoexp.scenarios.moveit_yaml import MAX_SCENE  # and YAML
-
-        return read_bounded(located(path), MAX_SCENE)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError(field, f"a file that can be read ({reason})", path) from None

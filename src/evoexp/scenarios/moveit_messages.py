@@ -7,7 +7,9 @@ writes. A field that no message has is refused: whatever it says would be lost.
 from typing import Any
 
 from evoexp.errors import SettingError, nearest
+from evoexp.input_files import MEGABYTE
 
+MAX_SCENE = 4 * MEGABYTE  # the largest of the data set MotionBenchMaker has 12 kB
 SCENE, REQUEST = "PlanningScene", "MotionPlanRequest"
 READ = "read"
 LEFT_OUT = "left out"  # it changes neither the bodies nor the goal

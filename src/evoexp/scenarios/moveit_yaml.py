@@ -7,8 +7,8 @@ import yaml
 
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
+from evoexp.scenarios.moveit_messages import MAX_SCENE
 
-MAX_SCENE = 4 * MEGABYTE  # the largest of the data set MotionBenchMaker has 12 kB
 MOST_NESTED, MOST_VALUES = 30, 200_000
 MUST = "YAML as MoveIt writes it"
 ECHO = "; ros2 topic echo --once --full-length TOPIC writes it as YAML"

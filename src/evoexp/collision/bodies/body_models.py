@@ -114,19 +114,6 @@ class BodyModel(NamedTuple):
     shrunk: tuple[tuple[int, float], ...] = ()
 
     @property
-    def uncovered(self) -> tuple[tuple[str, float], ...]:
-        """Names of bodies that stand out of their covers, and how far [length unit]."""
-        named = zip(self.names, self.covers, strict=True)
-        return tuple((name, cover.uncovered) for name, cover in named if cover.uncovered > 0.0)
-
-    @property
-    def wider(self) -> tuple[tuple[str, float], ...]:
-        """Names of bodies whose covers reach farther than asked, and how far [length unit]."""
-        named = zip(self.names, self.covers, strict=True)
-        most = self.asked * (1.0 + 1e-6)
-        return tuple((name, cover.inflation) for name, cover in named if cover.inflation > most)
-
-    @property
     def pairs(self) -> tuple[Pair, ...]:
         """Pairs of bodies that a search tests."""
         return self.sorted_pairs.tested
@@ -150,6 +137,21 @@ class BodyModel(NamedTuple):
             f"{len(self.names)} bodies covered by {self.num_shapes} spheres and capsules, which "
             f"reach at most {self.inflation:.3g} {unit} beyond {beyond}"
         )
+
+    def reach_notes(self, unit: str) -> list[str]:
+        """Remark on covers that do not contain their bodies, or reach farther than asked."""
+        named, lines = list(zip(self.names, self.covers, strict=True)), []
+        most = self.asked * (1.0 + 1e-6)
+        if out := [f"{name} {c.uncovered:.3g}" for name, c in named if c.uncovered > 0.0]:
+            told = ", ".join(out)
+            lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {told}")
+        if wide := [f"{name} {c.inflation:.3g}" for name, c in named if c.inflation > most]:
+            told = ", ".join(wide)
+            if self.assembly.frames is not None:  # out of a URDF
+                told += "; robot.decomposition or robot.spheres bring closer ones"
+            must = f"the {self.asked:g} {unit} asked for"
+            lines.append(f"covers that reach farther than {must}: {told}")
+        return lines
 
     @property
     def num_shapes(self) -> int:

@@ -89,7 +89,7 @@ class CoveredCollision(NamedTuple):
 
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""
-        lines = [self.bodies.described(unit)]
+        lines = [self.bodies.described(unit), *self.bodies.reach_notes(unit)]
         names, pairs = self.bodies.names, self.bodies.sorted_pairs
         for what, left in (
             ("touch in no posture sampled", pairs.unseen),

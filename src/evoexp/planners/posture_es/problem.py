@@ -147,13 +147,7 @@ def _bodies(
 def notes(problem: Problem) -> tuple[str, ...]:
     """Describe the collision model and list the body pairs that it skips."""
     bodies, names, unit = problem.bodies, problem.bodies.names, problem.task.length_unit
-    lines = [bodies.described(unit)]
-    if bodies.uncovered:
-        far = ", ".join(f"{name} {reach:.3g}" for name, reach in bodies.uncovered)
-        lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {far}")
-    if bodies.wider:
-        far = ", ".join(f"{name} {reach:.3g}" for name, reach in bodies.wider)
-        lines.append(f"covers that reach farther than the {bodies.asked:g} {unit} asked for: {far}")
+    lines = [bodies.described(unit), *bodies.reach_notes(unit)]
     found, only = bodies.sorted_pairs, "judged by the certifier only"
     for what, pairs in (
         ("neighbours or disabled, not tested", found.adjacent),

@@ -1,0 +1,212 @@
+"""The Pinocchio model and the coal bodies of a URDF, with its joints as settings take them.
+
+Joints and frames stand in the order in which Pinocchio's own reader puts them: depth first, the
+joints on a link by their names.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.errors import SettingError
+from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.ordered_sums import length
+from evoexp.records import FloatArray
+from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfFile, UrdfJoint
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+# the coordinates of planar and floating joints, and their axes in the joint's frame
+PLANAR = {"x": X, "y": Y, "yaw": Z}
+FLOATING = {"x": X, "y": Y, "z": Z, "yaw": Z, "pitch": Y, "roll": X}
+COORDINATES = {"planar": PLANAR, "floating": FLOATING}
+UNLIMITED = 1e6  # [rad, m] limits as large as this are none
+BASE = "base"  # what the coordinates of a base that moves are called: base_x, base_y, …
+# Pinocchio's joints of one coordinate by kind: along or about x, y, z, and any other axis
+JOINT_MODELS = {
+    "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
+    "prismatic": (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
+}
+UNALIGNED = {
+    "revolute": pin.JointModelRevoluteUnaligned,
+    "prismatic": pin.JointModelPrismaticUnaligned,
+}
+
+
+class JointRules(NamedTuple):
+    """How joints are taken that have no limits, or several coordinates."""
+
+    continuous_turns: float  # turns of a continuous joint to either side
+    turn_limit: float  # limit to either side of a turning joint that has none [deg]
+    slide_limit: float  # the same of a sliding joint [m]
+    # whether planar and floating joints stand still (fixed) or move (free), or the root moves
+    # besides (planar, floating)
+    base: str
+
+
+class PlacedBody(NamedTuple):
+    """A collision body in the frame of a joint."""
+
+    link: str
+    joint: int  # index in the model; 0: it stands still
+    placement: Any  # pin.SE3
+    shape: Any  # of coal
+
+
+def coordinate_names(name: str, kind: str) -> tuple[str, ...]:
+    """Name the coordinates of a joint: its own name, or several of a planar or floating one."""
+    return tuple(f"{name}_{part}" for part in COORDINATES[kind]) if kind in COORDINATES else (name,)
+
+
+def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
+    """Build the `pin.Model` of all joints of a URDF, one coordinate each, or none.
+
+    Raises:
+        SettingError: If the names of two joints or links are the same once joints are parted.
+    """
+    joints = [part for joint in file.joints.values() for part in _parts(joint, rules)]
+    root = file.root
+    if rules.base in COORDINATES:
+        root = f"{BASE}_ground"
+        base = UrdfJoint(BASE, rules.base, root, file.root, axis=Z)
+        joints += _parts(base, rules)
+    for what, names in (("joint", [j.name for j in joints]), ("link", [j.child for j in joints])):
+        if double := [name for name in names if names.count(name) > 1]:
+            must = f"a URDF whose {what}s have other names than those that robot.base adds"
+            raise SettingError("robot.path", must, double[0])
+    on_link: dict[str, list[UrdfJoint]] = {}
+    for joint in sorted(joints, key=lambda joint: joint.name, reverse=True):
+        on_link.setdefault(joint.parent, []).append(joint)
+    model = pin.Model()
+    at_rest = pin.SE3.Identity()
+    model.addFrame(pin.Frame(root, 0, 0, at_rest, pin.FrameType.BODY))
+    waiting = [(joint, 1) for joint in on_link.get(root, ())]
+    while waiting:
+        joint, before = waiting.pop()
+        carrier = model.frames[before]
+        index, kind = carrier.parentJoint, pin.FrameType.FIXED_JOINT
+        place = carrier.placement * joint.placement
+        if joint.kind != "fixed":
+            index = model.addJoint(index, _joint_model(joint), place, joint.name)
+            model.lowerPositionLimit[-1], model.upperPositionLimit[-1] = joint.limits
+            model.velocityLimit[-1] = joint.speed
+            place, kind = at_rest, pin.FrameType.JOINT
+        own = model.addFrame(pin.Frame(joint.name, index, before, place, kind))
+        link = model.addFrame(pin.Frame(joint.child, index, own, place, pin.FrameType.BODY))
+        waiting += [(above, link) for above in on_link.get(joint.child, ())]
+    return model
+
+
+def _parts(joint: UrdfJoint, rules: JointRules) -> list[UrdfJoint]:
+    """Return a joint with its limits, or joints of one coordinate each in its place."""
+    name, kind = joint.name, joint.kind
+    if kind == "fixed" or (kind in COORDINATES and rules.base == "fixed"):
+        return [joint._replace(kind="fixed")]
+    if kind not in COORDINATES:
+        return [_limited(joint, rules)]
+    axes = _across(joint.axis) if kind == "planar" else FLOATING
+    parts: list[UrdfJoint] = []
+    parent = joint.parent
+    for part, axis in axes.items():
+        link = joint.child if part == list(axes)[-1] else f"{name}_{part}_link"
+        own = "prismatic" if part in ("x", "y", "z") else "revolute"
+        place = joint.placement if not parts else pin.SE3.Identity()
+        added = UrdfJoint(f"{name}_{part}", own, parent, link, place, axis)
+        parts.append(_limited(added, rules))
+        parent = link
+    return parts
+
+
+def _limited(joint: UrdfJoint, rules: JointRules) -> UrdfJoint:
+    """Give a joint limits to either side, if it has none or is continuous."""
+    most = {
+        "continuous": 360.0 * DEGREE * rules.continuous_turns,
+        "revolute": rules.turn_limit * DEGREE,
+        "prismatic": rules.slide_limit,
+    }[joint.kind]
+    low, high = (0.0 if limit is None else limit for limit in joint.limits)
+    if joint.kind == "continuous" or joint.limits == (None, None):
+        low, high = -most, most
+    elif max(abs(low), abs(high)) >= UNLIMITED:
+        low, high = max(low, -most), min(high, most)
+    kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+    return joint._replace(kind=kind, limits=(low, high))
+
+
+def _across(normal: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+    """Choose the axes of a planar joint's coordinates: two across its normal, and the normal."""
+    z = np.array(normal)
+    z /= np.sqrt(np.sum(z * z))
+    x, y = np.eye(3)[0], np.eye(3)[1]
+    if z[2] != 1.0:
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.sqrt(np.sum(x * x))
+        y = np.cross(z, x)
+    return dict(zip(PLANAR, (tuple(axis.tolist()) for axis in (x, y, z)), strict=True))
+
+
+def _joint_model(joint: UrdfJoint) -> Any:
+    if joint.axis in (X, Y, Z):
+        return JOINT_MODELS[joint.kind][(X, Y, Z).index(joint.axis)]()
+    axis = np.array(joint.axis)
+    return UNALIGNED[joint.kind](axis / length(axis))
+
+
+def placed_bodies(
+    model: Any,
+    links: dict[str, tuple[UrdfBody, ...]],
+    shapes: Callable[[UrdfBody], list[Any]],
+    field: str,
+) -> Iterator[PlacedBody]:
+    """Yield the collision bodies in the order of the model's links.
+
+    Args:
+        model: Of `urdf_model`.
+        links: The bodies of each link.
+        shapes: Returns the coal shapes of a body, several where a mesh is cut into pieces.
+        field: That names the file, for errors.
+
+    Raises:
+        SettingError: If a body reaches too far.
+    """
+    for frame in model.frames:
+        if frame.type != pin.FrameType.BODY:
+            continue
+        for body in links.get(frame.name, ()):
+            for shape in shapes(body):
+                shape.computeLocalAABB()
+                reach = np.abs(body.placement.translation).max() + shape.aabb_radius
+                if not 0.0 <= reach <= LARGEST:
+                    must = f"a URDF whose bodies end within {LARGEST:g} m (link '{frame.name}')"
+                    raise SettingError(field, must, f"{body.kind} {body.mesh} to {reach:.3g}")
+                place = frame.placement * body.placement
+                yield PlacedBody(str(frame.name), int(frame.parentJoint), place, shape)
+
+
+def primitive_shape(body: UrdfBody) -> Any:
+    """Return a body that is no mesh as a coal shape."""
+    shapes = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
+    return shapes.get(body.kind, coal.Capsule)(*body.sizes)
+
+
+def spheres_of_bodies(bodies: list[PlacedBody], spheres: list[PlacedBody]) -> list[FloatArray]:
+    """Give the spheres of each link to the bodies of that link.
+
+    A sphere belongs to the body whose middle is nearest to its own; those of a link without bodies
+    to none.
+
+    Returns:
+        (spheres, 4) of each body: middles in the body's own frame, and radii.
+    """
+    found: list[list[list[float]]] = [[] for _ in bodies]
+    for sphere in spheres:
+        point = sphere.placement.translation
+        own = [k for k, body in enumerate(bodies) if body.link == sphere.link]
+        middles = [bodies[k].placement.act(bodies[k].shape.aabb_center) for k in own]
+        if own:
+            nearest = own[int(np.argmin([np.sum((middle - point) ** 2) for middle in middles]))]
+            x, y, z = bodies[nearest].placement.actInv(point)
+            found[nearest].append([x, y, z, float(sphere.shape.radius)])
+    return [np.array(each).reshape(-1, 4) for each in found]

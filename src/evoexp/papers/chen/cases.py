@@ -5,7 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, Proportion, Results, counted, grouped
+from evoexp.report.results.run_measures import counted, grouped
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import Proportion
 
 METHODS = {
     "Newton-type": "newton",

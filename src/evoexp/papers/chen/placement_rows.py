@@ -7,15 +7,17 @@ import numpy as np
 from evoexp.papers.chen.cases import CLOSE, Case
 from evoexp.papers.chen.cases import cases as case_list
 from evoexp.planners.placement_ga.planner import PlacementGa
-from evoexp.report import kit
-from evoexp.report.kit import markdown
+from evoexp.report.pages import markdown
+from evoexp.report.results.run_measures import planned_by
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import spread
 
-Conditions = tuple[kit.ConditionResults, ...]
+Conditions = tuple[ConditionResults, ...]
 
 
-def fits_placements(results: kit.Results) -> bool:
+def fits_placements(results: Results) -> bool:
     """Return whether there are results, all of docking postures."""
-    return kit.planned_by(results, PlacementGa)
+    return planned_by(results, PlacementGa)
 
 
 def exact_cases(cases: list[Case]) -> list[Case]:
@@ -28,7 +30,7 @@ def evolved_cases(exact_cases: list[Case]) -> list[Case]:
     return [case for case in exact_cases if case.evolved]
 
 
-def landscapes(results: kit.Results) -> list[Case]:
+def landscapes(results: Results) -> list[Case]:
     """Return the criteria whose landscape was computed."""
     found = case_list(results) if fits_placements(results) else []
     return [case for case in found if case.landscape is not None]
@@ -70,12 +72,12 @@ def _paper(case: Case) -> str:
     return "; ".join(told)
 
 
-def _run(case: Case, condition: kit.ConditionResults | None) -> str:
+def _run(case: Case, condition: ConditionResults | None) -> str:
     """Return the spread of the best E of a condition's runs, and shares near the optimum."""
     if condition is None:
         return "–"
     costs = condition.column("best_cost")
-    return f"{markdown.spread(kit.spread(costs))} {_shares(case, costs)}"
+    return f"{markdown.spread(spread(costs))} {_shares(case, costs)}"
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:

@@ -12,7 +12,9 @@ from matplotlib.patches import Rectangle
 from evoexp.papers.chen.path_claims import Group, boxes, gaps, median_path, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, groups, marks, spread, style
+from evoexp.report.figures import groups, marks, style
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.inference import spread
 
 OBSTACLE = "obstacle"
 FAINT, MEDIAN, EXACT = "all runs", "run of median cost", "best path known (reference)"

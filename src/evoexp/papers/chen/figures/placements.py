@@ -12,7 +12,8 @@ from matplotlib.ticker import MultipleLocator
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.records import FloatArray
-from evoexp.report.kit import groups, marks, quantiles, records, rounded, style
+from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.statistics.inference import quantiles
 
 RUNS = ("GA", "GA, elitism", "random search")
 ORDER = (*RUNS, *METHODS)  # the place of a method gives its colour

@@ -9,7 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.corsepius import measures
-from evoexp.report.kit import Results, counted, groups, marks, quantile, quantiles, records, style
+from evoexp.report.figures import groups, marks, records, style
+from evoexp.report.results.run_measures import counted
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.inference import quantile, quantiles
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels

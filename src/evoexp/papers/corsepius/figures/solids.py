@@ -12,8 +12,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from evoexp.papers.corsepius import measures
 from evoexp.records import FloatArray
-from evoexp.report.figures import surfaces
-from evoexp.report.kit import ConditionResults, groups, records, rounded, style
+from evoexp.report.figures import groups, records, rounded, style, surfaces
+from evoexp.report.results.stored_results import ConditionResults
 
 BALL, BRICK, ROD, DRUM = "sphere", "box", "capsule", "cylinder"
 SIZES = ["size_1", "size_2", "size_3"]  # box: half its edges; else radius and half the length

@@ -11,7 +11,8 @@ from evoexp.collision.planar.closed_form import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
-from evoexp.report.kit import ConditionResults, marks, records, rounded, style
+from evoexp.report.figures import marks, records, rounded, style
+from evoexp.report.results.stored_results import ConditionResults
 
 SAMPLES = 200  # configurations per segment of the straight line among which one is chosen
 TOP_LINKS = 3  # of the four pairs of links that `closed_form` tells apart

@@ -11,7 +11,9 @@ from matplotlib.lines import Line2D
 
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
-from evoexp.report.kit import Results, groups, marks, quantile, style
+from evoexp.report.figures import groups, marks, style
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.inference import quantile
 
 SPREAD = 0.2  # [rows] over which points are spread to either side
 CURVE, FINAL, BOUND, THRESHOLD = "best so far", "final", "lower bound", "threshold"

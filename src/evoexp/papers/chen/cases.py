@@ -118,9 +118,7 @@ class Case(NamedTuple):
 
 def cases(results: Results) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
-    groups = grouped(
-        results.with_data, lambda c: (c.condition.robot, c.condition.scenario, c.planner.objective)
-    )
+    groups = grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective))
     return [Case(_name(own[0]), **{_role(c): c for c in reversed(own)}) for own in groups]
 
 

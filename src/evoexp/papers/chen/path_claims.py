@@ -66,10 +66,7 @@ def fits_paths(results: Results) -> bool:
     """Whether there are planners' results, and all are of paths over a plane grid."""
     found = results.with_data
     evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
-    return evolved and all(
-        len(c.condition.scenario.size) == 2  # type: ignore[attr-defined]
-        for c in found
-    )
+    return evolved and all(len(c.scenario.size) == 2 for c in found)
 
 
 def groups(results: Results) -> tuple[Group, ...]:
@@ -109,7 +106,7 @@ def paths(condition: ConditionResults) -> dict[int, FloatArray]:
 
 def boxes(condition: ConditionResults) -> list[tuple[int, ...]]:
     """Return the obstacles as blocks of nodes (x0, y0, x1, y1)."""
-    return list(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    return list(condition.scenario.obstacles)
 
 
 def route_list(groups: tuple[Group, ...]) -> Routes:
@@ -207,26 +204,27 @@ def nearly_shortest(judge: Judge, condition: ConditionResults, shortest: float) 
     return hearing.majority(told | {"shortest": shortest, "near": near}, *near)
 
 
-def nearly_best(judge: Judge, condition: ConditionResults, known: float, bound: float) -> Claim:
+def nearly_best(
+    judge: Judge, condition: ConditionResults, cost_known: float, bound_known: float
+) -> Claim:
     """Judge that costs are near that of the best path known."""
-    hearing, above = judge.on("nearly_best", condition=condition.label), gaps(condition, known)
+    hearing, above = judge.on("nearly_best", condition=condition.label), gaps(condition, cost_known)
     near = counted(above <= hearing.rule.limits["near_percent"])
-    told = {"cost": np.median(condition.column(COST)), "above": np.median(above)}
-    return hearing.majority(told | {"known": known, "bound": bound, "near": near}, *near)
+    told = {"cost": float(np.median(condition.column(COST))), "above": float(np.median(above))}
+    told |= {"known": cost_known, "bound": bound_known}
+    return hearing.majority({**told, "near": near}, *near)
 
 
 def much_longer(
-    judge: Judge, condition: ConditionResults, shortest: float, truth: ConditionResults | None
+    judge: Judge, condition: ConditionResults, shortest_known: float, truth: ConditionResults | None
 ) -> Claim:
     """Judge that the safe path is much longer, and tell how long the best path known is."""
-    hearing, excess = (
-        judge.on("much_longer", condition=condition.label),
-        excess_of(condition, shortest),
-    )
+    hearing = judge.on("much_longer", condition=condition.label)
+    excess = excess_of(condition, shortest_known)
     longer = counted(excess > hearing.rule.limits["much_percent"])
     told = f"median {np.median(excess):.0f} % longer, {longer} runs"
     if truth is not None:
-        known = float(excess_of(truth, shortest)[0])
+        known = float(excess_of(truth, shortest_known)[0])
         told += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
     return hearing.majority(told, *longer)
 
@@ -276,11 +274,14 @@ def _evolution_of(judge: Judge, group: Group) -> Iterator[Claim]:
                 yield evolution(judge, own, controls)
 
 
-def evolution(judge: Judge, own: ConditionResults, controls: tuple[ConditionResults, ...]) -> Claim:
+def evolution(
+    judge: Judge, condition: ConditionResults, controls: tuple[ConditionResults, ...]
+) -> Claim:
     """Judge that evolution helps, and tell its gain over the best control."""
-    rows = compared([(own, c) for c in controls], by_column(COST), judge.settings)
+    rows = compared([(condition, c) for c in controls], by_column(COST), judge.settings)
     medians = {control_name(c): float(np.median(c.column(COST))) for c in controls}
-    best, median = min(medians, key=lambda name: medians[name]), float(np.median(own.column(COST)))
+    best = min(medians, key=lambda name: medians[name])
+    median = float(np.median(condition.column(COST)))
     gain = medians[best] - median
     told = "; ".join(
         f"against {control_name(c)} (median {markdown.number(medians[control_name(c)])}): "
@@ -294,7 +295,7 @@ def evolution(judge: Judge, own: ConditionResults, controls: tuple[ConditionResu
         "verb": "saves" if gain >= 0.0 else "loses",
         "share": 100.0 * abs(gain) / medians[best],
     }
-    hearing = judge.on("path_evolution", condition=own.label, controls=" and ".join(medians))
+    hearing = judge.on("path_evolution", condition=condition.label, controls=" and ".join(medians))
     return hearing.better_than_all(words, rows)
 
 

@@ -11,11 +11,10 @@ from evoexp.papers.chen.figures.grid_paths import FAINT, Line
 from evoexp.papers.chen.path_claims import Group, Routes
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Claim, PlayedRun
+from evoexp.report.pages.page_parts import PlayedRun
 from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Family
-from evoexp.report.statistics.judging import Judge
 
 Conditions = tuple[ConditionResults, ...]
 Panels = list[tuple[str, ConditionResults, list[Line]]]
@@ -40,21 +39,13 @@ def above_bound(condition: ConditionResults, groups: tuple[Group, ...]) -> Float
     return path_claims.gaps(condition, _group_of(condition, groups).bound)
 
 
-def truths(groups: tuple[Group, ...], confidence: float) -> Iterator[tuple[str, str]]:
-    """Yield a row on the gaps of every weighting whose best path is known."""
-    for g in groups:
-        if g.truth is not None:
-            told = "; ".join(_gap_text(c, g, confidence) for c in g.conditions)
-            yield f"{g.name}: {_truth_text(g)}", told
-
-
 def route_counts(group: Group, route_list: Routes) -> str:
     """Return how many runs of a weighting take each route, in words."""
     taken = path_claims.routes_of(group.main, route_list).items()
     return ", ".join(f"{name} {len(members)}" for name, members in taken)
 
 
-def _gap_text(condition: ConditionResults, group: Group, confidence: float) -> str:
+def gaps_of_runs(condition: ConditionResults, group: Group, confidence: float) -> str:
     """Describe the gaps of a condition's runs above the best path known."""
     gaps, shares = path_claims.gaps(condition, group.optimum), []
     for bound in (0, 1, 5):  # [%]
@@ -62,11 +53,10 @@ def _gap_text(condition: ConditionResults, group: Group, confidence: float) -> s
         interval = markdown.percent(found.interval(confidence))
         name = f"within {bound} %" if bound else "equal or better"
         shares.append(f"{name} {markdown.share(*found)} ({interval})")
-    median = float(np.median(gaps))
-    return f"{condition.label}: median {median:+.1f} %, {', '.join(shares)}".replace("-", "−")
+    return f"median {np.median(gaps):+.1f} %, {', '.join(shares)}".replace("-", "−")
 
 
-def _truth_text(group: Group) -> str:
+def best_path(group: Group) -> str:
     """Describe the best path that the reference knows."""
     assert group.truth is not None
     length, unsafeness, nodes, exact = (
@@ -204,8 +194,14 @@ def shortest_known(truth: ConditionResults) -> float:
     return float(truth.array("frontier")[:, 1].min())
 
 
-def _known(truth: ConditionResults, column: str = "best_cost") -> float:
-    return float(truth.column(column)[0])
+def cost_known(truth: ConditionResults) -> float:
+    """Return the cost of the best path known."""
+    return float(truth.column("best_cost")[0])
+
+
+def bound_known(truth: ConditionResults) -> float:
+    """Return the greatest known lower bound of the cost of any path."""
+    return float(truth.column("term_lower_bound")[0])
 
 
 def excess(condition: ConditionResults, shortest_known: float) -> FloatArray:
@@ -213,27 +209,9 @@ def excess(condition: ConditionResults, shortest_known: float) -> FloatArray:
     return path_claims.excess_of(condition, shortest_known)
 
 
-def above_known(condition: ConditionResults, truth: ConditionResults) -> FloatArray:
+def above_known(condition: ConditionResults, cost_known: float) -> FloatArray:
     """Return the gap of each run's cost above the best one known, (done,) [%]."""
-    return path_claims.gaps(condition, _known(truth))
-
-
-def assumed_longer(
-    judge: Judge, condition: ConditionResults, shortest_known: float, truth: ConditionResults
-) -> Claim:
-    """Judge that the safe path is much longer, under assumed numbers."""
-    return path_claims.much_longer(judge, condition, shortest_known, truth)
-
-
-def assumed_best(judge: Judge, condition: ConditionResults, truth: ConditionResults) -> Claim:
-    """Judge that costs are near the best one known, under assumed numbers."""
-    bound = _known(truth, "term_lower_bound")
-    return path_claims.nearly_best(judge, condition, _known(truth), bound)
-
-
-def assumed_evolution(judge: Judge, condition: ConditionResults, controls: Conditions) -> Claim:
-    """Judge what evolution adds to the controls, under assumed numbers."""
-    return path_claims.evolution(judge, condition, controls)
+    return path_claims.gaps(condition, cost_known)
 
 
 def _problem(condition: ConditionResults) -> tuple[object, ...]:

@@ -41,11 +41,6 @@ def case_conditions(cases: list[Case]) -> Conditions:
     return tuple(c for case in cases for c in case.conditions)
 
 
-def landscape_conditions(landscapes: list[Case]) -> Conditions:
-    """Return the conditions of the criteria whose landscape was computed."""
-    return case_conditions(landscapes)
-
-
 def landscape_row(case: Case) -> tuple[object, ...]:
     """Return a criterion's feasible share, its local minima and the best run."""
     assert case.landscape is not None
@@ -132,18 +127,3 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
             for name, c in case.evolved.items()
         ]
     return rows
-
-
-def result_rows(cases: list[Case]) -> list[tuple[str, ...]]:
-    """Return the rows of all criteria."""
-    return [result_row(case) for case in cases]
-
-
-def landscape_rows(landscapes: list[Case]) -> list[tuple[object, ...]]:
-    """Return the rows of all landscapes."""
-    return [landscape_row(case) for case in landscapes]
-
-
-def placement_checks(cases: list[Case]) -> list[tuple[str, str]]:
-    """Return the rows of checks of all criteria."""
-    return [row for case in cases for row in posture_checks(case)]

@@ -1,12 +1,12 @@
 """The claims of Corsépius 2001: on tasks, and on the size of the population, metric by metric."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.papers.corsepius import measures
-from evoexp.papers.corsepius.measures import Task
+from evoexp.papers.corsepius.measures import Tasks
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
@@ -29,7 +29,7 @@ METRICS: dict[str, Values] = {
 
 def judge_tasks(judge: Judge, results: Results) -> tuple[Claim, ...]:
     """Judge the claims that the conditions of an experiment allow to judge."""
-    found = measures.among_obstacles(results.main)
+    found = measures.obstructed(results.main)
     many = judge.rules["redundant_arms"].limits["joints"]
     arms = [c for c in found if run_measures.num_joints(c) > many]
     single = (
@@ -103,7 +103,7 @@ def _redundant(judge: Judge, arms: list[ConditionResults]) -> Claim:
 
 def _planning_time(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Set the planning time that the paper prints beside ours."""
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     goals = [phase.goal for phase in scenario.phases]
     if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
         return
@@ -162,7 +162,7 @@ class SizeComparison(NamedTuple):
 
 
 def judge_study(
-    judge: Judge, sizes: tuple[Task, ...], size_ratios: dict[str, list[SizeComparison]]
+    judge: Judge, sizes: Tasks, size_ratios: dict[str, list[SizeComparison]]
 ) -> tuple[Claim, ...]:
     """Judge the claims on the size."""
     larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in size_ratios.items()}
@@ -179,9 +179,7 @@ def judge_study(
     )
 
 
-def size_ratios(
-    sizes: tuple[Task, ...], settings: ReportSettings
-) -> dict[str, list[SizeComparison]]:
+def size_ratios(sizes: Tasks, settings: ReportSettings) -> dict[str, list[SizeComparison]]:
     """Return the comparisons of all sizes with the recommended one, metric by metric."""
     return {metric: compare_sizes(sizes, metric, settings) for metric in METRICS}
 
@@ -192,7 +190,7 @@ def are_compared(size_ratios: dict[str, list[SizeComparison]]) -> bool:
 
 
 def _beside_recommended(
-    found: tuple[Task, ...],
+    found: Tasks,
 ) -> Iterator[tuple[str, float, ConditionResults, ConditionResults]]:
     """Yield (task, size, its condition, that of the recommended size) where either solves it."""
     for task in found:
@@ -202,9 +200,7 @@ def _beside_recommended(
                 yield task.name, value, c, own
 
 
-def compare_sizes(
-    found: tuple[Task, ...], metric: str, settings: ReportSettings
-) -> list[SizeComparison]:
+def compare_sizes(found: Tasks, metric: str, settings: ReportSettings) -> list[SizeComparison]:
     """Compare every size with the recommended one, task by task.
 
     Intervals are of one family: their levels are Bonferroni's over all of them. Tasks that neither
@@ -277,7 +273,7 @@ def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) ->
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
 
-def _converges_less(judge: Judge, found: tuple[Task, ...]) -> Claim:
+def _converges_less(judge: Judge, found: Tasks) -> Claim:
     """Judge that smaller populations meet their goals less often."""
     pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
     adjusted = inference.holm(
@@ -305,7 +301,7 @@ def _converges_less(judge: Judge, found: tuple[Task, ...]) -> Claim:
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 
-def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Values) -> Claim:
+def _reasonable(judge: Judge, metric: str, found: Tasks, values: Values) -> Claim:
     """Judge that 100 is a reasonable size on every task that can be solved."""
     factors = {}
     for task in found:

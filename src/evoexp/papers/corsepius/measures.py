@@ -22,17 +22,39 @@ cycles = by_column("term_cycles")  # of each run, all phases together, (done,)
 evaluations = by_column("evaluations")  # of each run, (done,)
 
 
+Conditions = tuple[ConditionResults, ...]
+
+
 class Task(NamedTuple):
     """Conditions that differ in one setting of the planner."""
 
     name: str  # the common part of their labels
     values: tuple[float, ...]  # values of that setting, ascending
-    conditions: tuple[ConditionResults, ...]  # one per value
+    conditions: Conditions  # one per value
 
     @property
     def by_value(self) -> dict[float, ConditionResults]:
         """The condition of each value that has results."""
         return dict(zip(self.values, self.conditions, strict=True))
+
+
+class Tasks(tuple[Task, ...]):
+    """Several tasks."""
+
+    @property
+    def conditions(self) -> Conditions:
+        """All of their conditions."""
+        return tuple(c for task in self for c in task.conditions)
+
+    @property
+    def names(self) -> list[str]:
+        """Their names."""
+        return [task.name for task in self]
+
+    @property
+    def num_runs(self) -> int:
+        """Their finished runs."""
+        return sum(c.done for c in self.conditions)
 
 
 def problem(condition: ConditionResults) -> Problem:
@@ -42,10 +64,10 @@ def problem(condition: ConditionResults) -> Problem:
 
 def scene(condition: ConditionResults) -> tuple[Any, Any]:
     """Return the canonical forms of robot and scenario."""
-    return condition.condition.robot.canonical(), condition.condition.scenario.canonical()
+    return condition.robot.canonical(), condition.scenario.canonical()
 
 
-def tasks(results: Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
+def tasks(results: Results, setting: str, of: str = "ga") -> Tasks:
     """Return the tasks that have several values of a setting, without controls.
 
     It is a setting of a part of the planner, or, where `of` is empty, of the planner itself.
@@ -64,7 +86,7 @@ def tasks(results: Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
         return float(found[0] if isinstance(found, tuple) else found)  # one scope for all joints
 
     groups = (sorted(group, key=value) for group in run_measures.grouped(results.main, key))
-    return tuple(
+    return Tasks(
         Task(own[0].label.split(", ")[0], tuple(map(value, own)), tuple(own))
         for own in groups
         if len(own) > 1
@@ -129,19 +151,18 @@ def reasons(condition: ConditionResults) -> dict[str, Proportion]:
 
 def phase_names(condition: ConditionResults) -> tuple[str, ...]:
     """Return the names of the phases, sub-goals first."""
-    scenario: Any = condition.condition.scenario
-    return tuple(phase.name for phase in scenario.all_phases)
+    return tuple(phase.name for phase in condition.scenario.all_phases)
 
 
 def tolerances(condition: ConditionResults) -> tuple[float, ...]:
     """Return the distance at which the goal of each phase is met, sub-goals first [length unit]."""
-    task: Any = condition.condition.scenario
+    task = condition.scenario
     return tuple(phase.position_tolerance or task.position_tolerance for phase in task.all_phases)
 
 
 def subgoals(condition: ConditionResults) -> tuple[Any, ...]:
     """Return the points that the tool passes before the first phase."""
-    return tuple(condition.condition.scenario.subgoals)  # type: ignore[attr-defined]
+    return tuple(condition.scenario.subgoals)
 
 
 def only_subgoals_differ(without: ConditionResults, having: ConditionResults) -> bool:
@@ -154,16 +175,16 @@ def only_subgoals_differ(without: ConditionResults, having: ConditionResults) ->
 
 def empty(condition: ConditionResults) -> bool:
     """Whether the obstacles of a condition are taken away: a control."""
-    return bool(condition.condition.scenario.empty_scene)  # type: ignore[attr-defined]
+    return bool(condition.scenario.empty_scene)
 
 
-def among_obstacles(conditions: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ...]:
+def obstructed(main: Conditions) -> Conditions:
     """Return the conditions whose obstacles stand."""
-    return tuple(c for c in conditions if not empty(c))
+    return tuple(c for c in main if not empty(c))
 
 
 def with_empty_scenes(
-    conditions: tuple[ConditionResults, ...],
+    conditions: Conditions,
 ) -> list[tuple[ConditionResults, ConditionResults]]:
     """Return the conditions that have an empty scene as a control, each with its control."""
 
@@ -187,14 +208,14 @@ def allowed_contacts(condition: ConditionResults) -> AllowedContacts | None:
     """Return the pairs that the exact verdict lets touch; None if there is none."""
     told = condition.summaries.get("allowed_contacts", pd.Series(dtype=str)).fillna("")
     pairs = dict.fromkeys(pair for text in told for pair in text.split(", ") if pair)
-    limit = condition.condition.scenario.allowed_penetration  # type: ignore[attr-defined]
-    unit = condition.condition.length_unit
+    limit = condition.scenario.allowed_penetration
+    unit = condition.length_unit
     return AllowedContacts(", ".join(pairs), float(limit), unit) if pairs and limit else None
 
 
 def lets_go(condition: ConditionResults) -> bool:
     """Whether the task lets go of an object."""
-    phases = condition.condition.scenario.phases  # type: ignore[attr-defined]
+    phases = condition.scenario.phases
     return any(phase.then == "detach" for phase in phases)
 
 
@@ -223,10 +244,10 @@ def releases(condition: ConditionResults) -> tuple[Release, ...]:
     return tuple(found)
 
 
-def by_robot(conditions: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ...]:
+def by_robot(conditions: Conditions) -> Conditions:
     """Return the first condition of every robot and its collision model."""
     groups = run_measures.grouped(
-        conditions, lambda c: (c.condition.robot.canonical(), c.planner.collision.canonical())
+        conditions, lambda c: (c.robot.canonical(), c.planner.collision.canonical())
     )
     return tuple(group[0] for group in groups)
 

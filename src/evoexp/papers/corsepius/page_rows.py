@@ -7,9 +7,8 @@ import numpy as np
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.claims import METRICS
-from evoexp.papers.corsepius.figures import posture_trap
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
-from evoexp.papers.corsepius.measures import Task
+from evoexp.papers.corsepius.measures import Conditions, Tasks
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Quantity
@@ -22,7 +21,6 @@ from evoexp.report.statistics.comparisons import Family, Measure, by_column
 from evoexp.report.statistics.inference import Proportion
 
 SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
-Conditions = tuple[ConditionResults, ...]
 # evaluations and cycles to the goal, and steps of the path to it, (done,); inf without it
 effort = run_measures.where_solved(measures.evaluations)
 cycles_to_goal = run_measures.where_solved(measures.cycles)
@@ -37,11 +35,6 @@ def fits(results: Results) -> bool:
 def is_sweep(results: Results) -> bool:
     """Return whether there are several such conditions to compare."""
     return fits(results) and len(results.main) > 1
-
-
-def obstructed(main: Conditions) -> Conditions:
-    """Return the conditions whose obstacles stand."""
-    return measures.among_obstacles(main)
 
 
 def shown_task(obstructed: Conditions) -> Conditions:
@@ -90,7 +83,7 @@ def releases(obstructed: Conditions) -> list[tuple[str, ...]]:
 
 def _release_row(condition: ConditionResults) -> tuple[str, ...]:
     """Return gap and tilt of the objects of a condition: medians and the worst."""
-    found, unit = measures.releases(condition), condition.condition.length_unit
+    found, unit = measures.releases(condition), condition.length_unit
     gaps, tilts = (np.array([getattr(one, name) for one in found]) for name in ("gap", "tilt"))
     deepest, highest = max(0.0, -float(gaps.min())), max(0.0, float(gaps.max()))
     return (
@@ -105,8 +98,7 @@ def _release_row(condition: ConditionResults) -> tuple[str, ...]:
 
 def phased(main: Conditions) -> tuple[ConditionResults, ...]:
     """Return the conditions that have several phases."""
-    several = (c for c in main if len(measures.phase_names(c)) > 1)
-    return measures.among_obstacles(tuple(several))
+    return tuple(c for c in measures.obstructed(main) if len(measures.phase_names(c)) > 1)
 
 
 def phase_rows(phased: Conditions, confidence: float) -> Iterator[tuple[object, ...]]:
@@ -127,7 +119,7 @@ def collision_models(main: Conditions) -> Iterator[tuple[str, str]]:
         pairs = bodies.sorted_pairs
         text = (
             f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most "
-            f"{bodies.inflation:.3g} {c.condition.length_unit} beyond them; pairs of bodies: "
+            f"{bodies.inflation:.3g} {c.length_unit} beyond them; pairs of bodies: "
             f"{len(pairs.tested)} tested, {len(pairs.adjacent)} neighbours or disabled, "
             f"{len(pairs.always)} always touch, {len(pairs.never)} never do"
         )
@@ -170,11 +162,6 @@ def manoeuvres(results: Results, phased: Conditions) -> list[tuple[list[ShownPat
     return list(zip(shown, ends, strict=True))
 
 
-def stuck_pair(obstructed: Conditions) -> Conditions:
-    """Return a condition that gets stuck and the same with sub-goals; empty without both."""
-    return posture_trap.pair(obstructed) or ()
-
-
 def scenes(results: Results) -> tuple[Family, ...]:
     """Return the first condition of every task against its others."""
     return tuple(map(Family.of, run_measures.grouped(results.with_data, measures.scene)))
@@ -212,44 +199,25 @@ def share_rows(results: Results, confidence: float) -> Iterator[tuple[str, ...]]
             yield c.label, *told
 
 
-def scopes(results: Results) -> tuple[Task, ...]:
+def scopes(results: Results) -> Tasks:
     """Return the tasks whose scopes differ and that never end by reaching the goal."""
     if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
-        return ()
+        return Tasks()
     found = measures.tasks(results, "scope", "")
-    return tuple(task for task in found if not any(c.solved for c in task.conditions))
+    return Tasks(task for task in found if not any(c.solved for c in task.conditions))
 
 
-def parents(results: Results) -> tuple[Task, ...]:
+def parents(results: Results) -> Tasks:
     """Return the tasks whose numbers of parents differ."""
     return measures.tasks(results, "num_parents")
 
 
-def sizes(results: Results) -> tuple[Task, ...]:
+def sizes(results: Results) -> Tasks:
     """Return the tasks whose populations differ in size."""
-    return measures.tasks(results, "num_offspring") if fits(results) else ()
+    return measures.tasks(results, "num_offspring") if fits(results) else Tasks()
 
 
-def scope_conditions(scopes: tuple[Task, ...]) -> Conditions:
-    """Return the conditions of these tasks."""
-    return _conditions(scopes)
-
-
-def parent_conditions(parents: tuple[Task, ...]) -> Conditions:
-    """Return the conditions of these tasks."""
-    return _conditions(parents)
-
-
-def size_conditions(sizes: tuple[Task, ...]) -> Conditions:
-    """Return the conditions of these tasks."""
-    return _conditions(sizes)
-
-
-def _conditions(tasks: tuple[Task, ...]) -> Conditions:
-    return tuple(c for task in tasks for c in task.conditions)
-
-
-def floor_rows(main: Conditions, scopes: tuple[Task, ...]) -> list[tuple[str, ...]]:
+def floor_rows(main: Conditions, scopes: Tasks) -> list[tuple[str, ...]]:
     """Return the distances at which searches stagnate, if no goal can be met."""
     columns = (lambda c: 1e3 * measures.residuals(c)), measures.cycles
     return [
@@ -258,27 +226,17 @@ def floor_rows(main: Conditions, scopes: tuple[Task, ...]) -> list[tuple[str, ..
     ]
 
 
-def shares_are_shown(results: Results, parents: tuple[Task, ...]) -> bool:
+def shares_are_shown(results: Results, parents: Tasks) -> bool:
     """Return whether shares are drawn: some run meets its goal."""
     return not parents and any(c.solved for c in results.with_data)
 
 
-def values_are_shown(scopes: tuple[Task, ...], parents: tuple[Task, ...]) -> bool:
+def values_are_shown(scopes: Tasks, parents: Tasks) -> bool:
     """Return whether efforts are drawn condition by condition."""
     return not (scopes or parents)
 
 
-def size_names(sizes: tuple[Task, ...]) -> list[str]:
-    """Return the names of the tasks."""
-    return [task.name for task in sizes]
-
-
-def num_size_runs(size_conditions: Conditions) -> int:
-    """Count the finished runs."""
-    return sum(c.done for c in size_conditions)
-
-
-def size_rows(sizes: tuple[Task, ...], settings: ReportSettings) -> Iterator[tuple[str, ...]]:
+def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...]]:
     """Yield success and expected running times with their intervals, a row per task and size."""
     level = settings.confidence
     for task in sizes:

@@ -126,7 +126,7 @@ def tool_comparisons(compared_radii: Rows) -> list[tuple[str, Rows]]:
 def tools(results: Results, compared_radii: Rows) -> list[Quantity]:
     """Return the row of end-effectors' distances where radii differ."""
     name = f"{KEPT}, its centre line"
-    unit = results.with_data[0].condition.length_unit
+    unit = results.with_data[0].length_unit
     row = quantity(results, name, unit, link_motions.tool_distance) if compared_radii else None
     return [row] if row else []
 

@@ -205,11 +205,9 @@ def solved_within(own: ConditionResults, control: ConditionResults) -> Proportio
 
 def _controls(results: Results, own: ConditionResults) -> list[ConditionResults]:
     """Return the controls that stand beside this very planner in the same scene."""
-    same = own.condition.robot, own.condition.scenario, own.planner
+    same = own.robot, own.scenario, own.planner
     return [
-        c
-        for c in results.with_data
-        if c.is_control and (c.condition.robot, c.condition.scenario, c.planner) == same
+        c for c in results.with_data if c.is_control and (c.robot, c.scenario, c.planner) == same
     ]
 
 
@@ -224,7 +222,7 @@ def groups_but_for(results: Results, *path: str) -> list[Group]:
         for name in path[:-1]:
             part[name] = part = dict(part[name])
         part.pop(path[-1], None)
-        scene = condition.condition.robot, condition.condition.scenario
+        scene = condition.robot, condition.scenario
         return *(one.canonical() for one in scene), planner
 
     return [group for group in run_measures.grouped(results.main, key) if len(group) > 1]

@@ -1,7 +1,7 @@
 """Measures of Lavoie & Boudreau 2001 that several pages share: errors, effort, refuted motions."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def tests_per_second(condition: ConditionResults) -> FloatArray:
     They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
     Chords are not counted.
     """
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     pairs = run_measures.num_joints(condition) * len(scenario.obstacles)
     return np.asarray(
         pairs * condition.column("collision_queries") / run_measures.search_seconds(condition)
@@ -225,7 +225,7 @@ def literal_start(condition: ConditionResults) -> str:
     The words vertically and horizontally are not swapped then. Empty if nothing is shifted. The
     arm's collision model judges the start among the obstacles of the literal reading.
     """
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     problem = condition.problem(Problem)
     dx, dy = scenario.obstacle_shift
     if dx == dy:

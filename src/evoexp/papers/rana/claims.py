@@ -68,7 +68,7 @@ def _free(judge: Judge, c: ConditionResults, who: str, source: str) -> Claim:
 
 def safety(own_judge: Judge, condition: ConditionResults, who: str) -> Iterator[Claim]:
     """Judge the safety distance, where the paper looks and where it does not."""
-    c, unit, margin = condition, condition.condition.length_unit, measures.margin(condition)
+    c, unit, margin = condition, condition.length_unit, measures.margin(condition)
     source = "section 3.5, Fig. 7" if measures.planar(c) else "section 4.2, Fig. 13"
     kept = markdown.share(c.verdicts.with_margin, c.verdicts.judged)
     bodies = (
@@ -197,7 +197,7 @@ def _told(
 
 def extensions(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Judge section 5's claims of extension: static obstacles, more than two arms."""
-    problem, unit = condition.problem(Problem), condition.condition.length_unit
+    problem, unit = condition.problem(Problem), condition.length_unit
     arms, kinds = problem.assembly.num_arms, motions.kinds_of_pairs(condition)
     found = []
     if motions.OBSTACLES in kinds:

@@ -119,7 +119,7 @@ def spatial_scenes(results: Results) -> list[tuple[Results, str]]:
 
 def _scenes(results: Results) -> list[tuple[Results, str]]:
     suffixes = {c.label: suffix for c, suffix in results.suffixed}
-    scenes = grouped(results.conditions, lambda c: (c.condition.robot, c.condition.scenario))
+    scenes = grouped(results.conditions, lambda c: (c.robot, c.scenario))
     found = [
         (results._replace(conditions=own), [suffixes[c.label] for c in own if c.label in suffixes])
         for own in scenes

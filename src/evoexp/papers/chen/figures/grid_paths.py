@@ -50,7 +50,7 @@ def paths_table(panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]]) 
     """
     rows: list[tuple[object, ...]] = []
     for title, c, lines in panels:
-        head = title, c.condition.length_unit
+        head = title, c.length_unit
         for number, (x0, y0, x1, y1) in enumerate(boxes(c)):
             rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
         for number, line in enumerate(lines):
@@ -236,10 +236,3 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
 def _name(condition: ConditionResults, group: Group) -> str:
     """Return the part of a label that the condition adds to its group's: "elitism"."""
     return condition.label.removeprefix(group.name).strip(" ,·") or "genetic algorithm"
-
-
-COSTS = costs_table, draw_costs
-GAPS = gaps_table, draw_gaps
-PATHS = paths_table, draw_paths
-PLACES = places_table, draw_places
-ROUTES = paths_table, draw_routes

@@ -36,8 +36,8 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
         q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
         word = "certified" if verdict["certified"] else "not certified"
         told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
-        robot: Any = c.condition.robot
-        scenario: Any = c.condition.scenario
+        robot = c.robot
+        scenario = c.scenario
         arm = partial(_joints, c.problem(Problem).scene.model, robot.link_lengths[-1])
         reach, above = scenario.docking.target
         kinds = [
@@ -49,7 +49,7 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
             (TARGET, 0, [(scenario.task_origin[0] + reach, robot.body_height + above)]),
             (FORCE, 0, [scenario.docking.force]),
         ]
-        given = told, c.condition.length_unit
+        given = told, c.length_unit
         rows += [(*given, *kind, a, b) for *kind, points in kinds for a, b in points]
     return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
 
@@ -127,11 +127,11 @@ def mission_checks(
 ) -> Iterator[tuple[str, str]]:
     """Yield the rows on every condition's exact verdicts and on its docking places."""
     for condition in conditions:
-        label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
+        label, found, scenario = condition.label, condition.verdicts, condition.scenario
         free = Proportion(found.certified, found.judged)
         nearest = condition.summaries["clearance_pair"].value_counts()
         places = np.round(condition.column("term_platform_x"), 3)
-        near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]
+        near = np.count_nonzero(places < scenario.docking.target[0])
         verdicts = (
             f"{markdown.share(*free)} ({markdown.percent(free.interval(confidence))}) free "
             f"of contact over the whole motion; {found.refuted} touch, {found.undecided} "

@@ -179,7 +179,7 @@ def floor_table(found: Sequence[Task]) -> pd.DataFrame:
                 for value in measures.residuals(c)
             ]
     names = ["position", "task", "quantity", "scope", "median", "lower", "upper", "runs", "slope"]
-    unit = found[0].conditions[0].condition.length_unit
+    unit = found[0].conditions[0].length_unit
     return pd.DataFrame(rows, columns=names).assign(length_unit=unit)
 
 
@@ -235,6 +235,3 @@ def _draw_floor_of(left: Axes, right: Axes, table: pd.DataFrame, colour: str) ->
     # a proportional line through the middle
     x, middle = residuals["scope"], len(residuals) // 2
     left.plot(x, residuals["median"].iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)
-
-
-FLOOR = floor_table, draw_floor

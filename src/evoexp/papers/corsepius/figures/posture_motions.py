@@ -49,7 +49,7 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
     for one in shown:
         problem = measures.problem(one.condition)
         postures = measures.paths(one.condition)[one.replicate]
-        spans, unit = problem.spans(postures), one.condition.condition.length_unit
+        spans, unit = problem.spans(postures), one.condition.length_unit
         for number, span in enumerate(spans) if one.by_phase else [(0, spans[-1])]:
             first = span.first if one.by_phase else 0
             title = f"{number + 1}  {span.stage.phase.name}" if one.by_phase else one.title
@@ -195,7 +195,7 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
     table = rounded(
         pd.DataFrame(rows, columns=["element", "order", "x", "y", "half_x", "half_y", "factor"])
     )
-    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit)
+    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.length_unit)
 
 
 def draw_scope(table: pd.DataFrame) -> Figure:
@@ -229,6 +229,3 @@ def _draw_ends(axes: Axes, path: pd.DataFrame) -> None:
     look: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
     axes.plot(path["x"].iloc[:1], path["y"].iloc[:1], "s", markersize=6, label="start", **look)
     axes.plot(path["x"].iloc[-1:], path["y"].iloc[-1:], "*", markersize=9, label="end", **look)
-
-
-SCOPE = scope_table, draw_scope

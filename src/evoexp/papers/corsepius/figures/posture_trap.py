@@ -13,6 +13,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
+from evoexp.papers.corsepius.measures import Conditions
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
@@ -31,20 +32,18 @@ END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
 Rows = list[dict[str, object]]
 
 
-def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ConditionResults] | None:
-    """Return a task of one phase in which runs get stuck, and with sub-goals, solved."""
-    return next(
-        (
-            (stuck, helped)
-            for helped in shown
-            for stuck in shown
-            if stuck.solved < stuck.done
-            and helped.solved > 0
-            and len(measures.phase_names(stuck)) == 1
-            and measures.only_subgoals_differ(stuck, helped)
-        ),
-        None,
+def stuck_pair(obstructed: Conditions) -> Conditions:
+    """Return a task of one phase in which runs get stuck, and with sub-goals, solved; or none."""
+    pairs = (
+        (stuck, helped)
+        for helped in obstructed
+        for stuck in obstructed
+        if stuck.solved < stuck.done
+        and helped.solved > 0
+        and len(measures.phase_names(stuck)) == 1
+        and measures.only_subgoals_differ(stuck, helped)
     )
+    return next(pairs, ())
 
 
 def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
@@ -70,7 +69,7 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
     names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS]
     table = rounded(pd.DataFrame(rows).reindex(columns=[*names, "x_end", "y_end", "scope_deg"]))
-    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
+    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.length_unit)
 
 
 def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
@@ -190,6 +189,3 @@ def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
         title="d  random postures around it",
         ylim=(0.0, None),
     )
-
-
-TRAP = trap_table, draw_trap

@@ -113,7 +113,7 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
             capsules = zip(cover.start, cover.end, cover.radius, strict=True)
             own += [(COVER, name, *_capsule(joint, *capsule)) for capsule in capsules]
-        unit = c.condition.length_unit
+        unit = c.length_unit
         rows += [(position, title, *row, bodies.inflation, unit) for row in own]
     return rounded(
         pd.DataFrame(
@@ -156,6 +156,3 @@ def _capsule(joint: Any, start: FloatArray, stop: FloatArray, radius: float) -> 
         axis = np.array([0.0, 0.0, 1.0])
         shape, turn = ROD, pin.Quaternion.FromTwoVectors(axis, along).matrix()
     return (shape, *joint.act(middle), *(joint.rotation @ turn).ravel(), radius, half, 0.0)
-
-
-MODELS = models_table, draw_models

@@ -48,7 +48,7 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
         nu=round(float(nu[k]), 9),
         share=float(steps[k, 0, 0]),
         crossing=bool(found.crossing[TOP_LINKS, k]),
-        length_unit=condition.condition.length_unit,
+        length_unit=condition.length_unit,
     )
 
 
@@ -104,6 +104,3 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
 
 def _middle(row: Any) -> tuple[float, float]:
     return 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
-
-
-INTERSECTION = intersection_table, draw_intersection

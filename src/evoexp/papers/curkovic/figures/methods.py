@@ -229,7 +229,3 @@ def _lines(axes: Axes, table: pd.DataFrame) -> None:
     low, high = axes.get_ylim()
     bound = float(table.loc[table["series"] == BOUND, "value"].iloc[0])
     axes.set_ylim(min(low, bound - 0.04 * (high - bound)), high)
-
-
-COSTS = costs_table, draw_costs
-METHODS = methods_table, draw_methods

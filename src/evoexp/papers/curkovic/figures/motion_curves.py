@@ -109,7 +109,7 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
                 pd.DataFrame(columns | {"instant": instants, "distance": distances} | counts)
             )
     return rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=conditions[0].condition.length_unit
+        length_unit=conditions[0].length_unit
     )
 
 
@@ -171,6 +171,3 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     ]
     style.keys_below(figure, keys)
     return figure
-
-
-DISTANCES = distances_table, draw_distances

@@ -43,7 +43,7 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
             ]
     parts.append(_contacts(condition))
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
-        best=best, length_unit=condition.condition.length_unit
+        best=best, length_unit=condition.length_unit
     )
     return table[["element", "replicate", *LINK, "best", "length_unit"]]
 
@@ -94,7 +94,7 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
         )
         parts.append(given)
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=conditions[0].condition.length_unit
+        length_unit=conditions[0].length_unit
     )
     return table.drop(columns=["element", "link", "radius"])
 
@@ -169,7 +169,7 @@ def _contacts(condition: ConditionResults) -> pd.DataFrame:
 
 def _obstacles(condition: ConditionResults) -> pd.DataFrame:
     """Return the outlines of the obstacles."""
-    table = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    table = obstacle_table(condition.scenario.obstacles)
     rows = [
         (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
         for k, outline in enumerate(motion_geometry.obstacle_outlines(table))
@@ -239,6 +239,3 @@ def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
         *_end_keys(),
         *([contact] if contacts else []),
     ]
-
-
-TOOLS = tools_table, draw_tools

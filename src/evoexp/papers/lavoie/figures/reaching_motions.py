@@ -84,7 +84,7 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
     parts = []
     for panel, one in enumerate(shown):
         rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]
-        end = one.condition.condition.length_unit
+        end = one.condition.length_unit
         parts += [(panel, one.title, *row, end) for row in rows]
     return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
@@ -115,7 +115,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
 
 def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
     """Return the rows of ellipses, box and targets."""
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     table = scenario.obstacle_table()
     angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
     ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)

@@ -86,7 +86,7 @@ def distribution_table(
         for series, x, share in [*points, *((PRINTED, *point) for point in printed(c))]:
             given = series, results.position(c.label), c.label, x
             rows.append((*given, *share, share.share, *share.interval(confidence)))
-    unit = results.with_data[0].condition.length_unit
+    unit = results.with_data[0].length_unit
     return (
         pd.DataFrame(rows, columns=DISTRIBUTION_COLUMNS)
         .astype({"error": "float64"})
@@ -154,7 +154,7 @@ def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataF
         for name, values in ((ERROR, errors), (EFFORT, effort))
         for c in results.with_data
     ]
-    unit = results.with_data[0].condition.length_unit
+    unit = results.with_data[0].length_unit
     return pd.DataFrame(rows, columns=STOPPING_COLUMNS).assign(length_unit=unit)
 
 
@@ -191,8 +191,3 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
     panels[0].invert_xaxis()
     style.legend_below(figure, panels[0], 2)
     return figure
-
-
-ATTEMPTS = attempts_table, draw_attempts
-STOPPING = stopping_table, draw_stopping
-DISTRIBUTION = distribution_table, draw_distribution

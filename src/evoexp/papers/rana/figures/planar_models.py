@@ -37,9 +37,7 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
             direction = np.degrees(np.arctan2(y, x))
             rows.append((posture, arm, joint, *start[0, :2], *end[0, :2], direction - angle, angle))
     names = ["posture", "arm", "joint", "x", "y", "x_end", "y_end", "reference_deg", "angle_deg"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(
-        length_unit=condition.condition.length_unit
-    )
+    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.length_unit)
 
 
 def draw_arms(table: pd.DataFrame) -> Figure:
@@ -139,7 +137,7 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     return rounded(pd.DataFrame(rows, columns=names)).assign(
         safety_distance=problem.security_margin,
         instant=instant,
-        length_unit=condition.condition.length_unit,
+        length_unit=condition.length_unit,
     )
 
 

@@ -64,7 +64,7 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     table = motion_geometry.in_stages(links.sort_values("instant", kind="stable"), STAGES)
     spans = (links["x_end"] - links["x"]).abs() + (links["y_end"] - links["y"]).abs()
     spans += (links["z_end"] - links["z"]).abs()
-    obstacles = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    obstacles = obstacle_table(condition.scenario.obstacles)
     outlines = motion_geometry.obstacle_outlines(obstacles, 2.0 * float(spans.max()))
     last = int(links["instant"].max())
     rows = [
@@ -74,7 +74,7 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     ]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     found = pd.concat([table[names], pd.DataFrame(rows, columns=names)]) if rows else table[names]
-    return rounded(found.reset_index(drop=True)).assign(length_unit=condition.condition.length_unit)
+    return rounded(found.reset_index(drop=True)).assign(length_unit=condition.length_unit)
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
@@ -210,7 +210,7 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
                 rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
                 parts.append(rows.assign(kind=kind, safety_distance=margin))
     table = rounded(pd.concat(parts, ignore_index=True))
-    return table.assign(length_unit=condition.condition.length_unit)
+    return table.assign(length_unit=condition.length_unit)
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
@@ -276,6 +276,3 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
         )
         marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)
-
-
-DISTANCES = distances_table, draw_distances

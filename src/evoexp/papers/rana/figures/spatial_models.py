@@ -27,7 +27,7 @@ def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
         Columns of `motion_geometry.links_table`, length_unit.
     """
     table = motion_geometry.links_table(motions.problem(condition).assembly, q)
-    return rounded(table).assign(length_unit=condition.condition.length_unit)
+    return rounded(table).assign(length_unit=condition.length_unit)
 
 
 def arm_table(condition: ConditionResults) -> pd.DataFrame:
@@ -203,7 +203,7 @@ def _legend(figure: Figure, table: pd.DataFrame, more: Line2D) -> None:
 def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line in both spaces."""
     table = rounded(motions.paths_table(condition, _path, BEST))
-    return table.assign(length_unit=condition.condition.length_unit)
+    return table.assign(length_unit=condition.length_unit)
 
 
 def draw_configuration_space(table: pd.DataFrame) -> Figure:

@@ -196,34 +196,17 @@ def crossing(main: Conditions) -> Conditions:
     return (first,) if plain else ()
 
 
-def motion_figure(condition: ConditionResults, radius_conditions: Conditions) -> str:
-    """Return the number of the paper's figure that shows such a motion; empty: none does."""
+def motion_words(condition: ConditionResults, radius_conditions: Conditions) -> dict[str, str]:
+    """Return stems and titles of the figures of a motion, and the beginning of that of angles."""
     problem = condition.problem(Problem)
+    robots = len(problem.start)
+    angles = {"joints_stem": "joints", "joints": "Link"}
     if not problem.moving.all():
-        return "10"
-    return "" if len(problem.start) > 2 or radius_conditions else "8"
-
-
-def motion_stem(motion_figure: str) -> str:
-    """Return the stem of the figure of a motion."""
-    return f"fig_{motion_figure}_motion" if motion_figure else "motion"
-
-
-def motion_title(condition: ConditionResults, motion_figure: str) -> str:
-    """Return the title of the figure of a motion."""
-    titles = {"8": "Fig. 8: motion of the two robots", "10": "Fig. 10: one robot stands still"}
-    robots = len(condition.problem(Problem).start)
-    return titles.get(motion_figure, f"Motion of {robots} robots")
-
-
-def joints_stem(motion_figure: str) -> str:
-    """Return the stem of the figure of angles."""
-    return "fig_9_joints" if motion_figure == "8" else "joints"
-
-
-def joints_title(motion_figure: str) -> str:
-    """Return the beginning of the title of the figure of angles."""
-    return "Fig. 9: link" if motion_figure == "8" else "Link"
+        return {"stem": "fig_10_motion", "title": "Fig. 10: one robot stands still"} | angles
+    if robots > 2 or radius_conditions:
+        return {"stem": "motion", "title": f"Motion of {robots} robots"} | angles
+    angles = {"joints_stem": "fig_9_joints", "joints": "Fig. 9: link"}
+    return {"stem": "fig_8_motion", "title": "Fig. 8: motion of the two robots"} | angles
 
 
 def with_hall(results: Results) -> Results:

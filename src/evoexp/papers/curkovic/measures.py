@@ -94,11 +94,6 @@ def one_scene(results: Results) -> bool:
     return len({(c.robot, c.scenario) for c in results.with_data}) == 1
 
 
-def several_scenes(one_scene: bool) -> bool:
-    """Return whether conditions differ in robots or scene."""
-    return not one_scene
-
-
 def free_at_first(condition: ConditionResults) -> int:
     """Count the runs whose first generation holds a collision-free team."""
     return int((condition.column("first_feasible_generation") == 0).sum())

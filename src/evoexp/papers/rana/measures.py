@@ -92,11 +92,6 @@ def planar(condition: ConditionResults) -> bool:
     return bool(motions.problem(condition).assembly.table.planar)
 
 
-def spatial(condition: ConditionResults) -> bool:
-    """Return whether the arms move in space."""
-    return not planar(condition)
-
-
 def arms(main: tuple[ConditionResults, ...]) -> str:
     """Return which arms the conditions have, in words."""
     return " and ".join(ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True))
@@ -114,7 +109,7 @@ def planar_scenes(results: Results) -> list[tuple[Results, str]]:
 
 def spatial_scenes(results: Results) -> list[tuple[Results, str]]:
     """Return all conditions of each scene in space, and the end of its figure's stem."""
-    return [(scene, suffix) for scene, suffix in _scenes(results) if spatial(scene.with_data[0])]
+    return [(scene, suffix) for scene, suffix in _scenes(results) if not planar(scene.with_data[0])]
 
 
 def _scenes(results: Results) -> list[tuple[Results, str]]:
@@ -195,11 +190,6 @@ def length(condition: ConditionResults) -> FloatArray:
     """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
     return np.asarray(motions.straight_length(condition) * ratio)
-
-
-def median_length(condition: ConditionResults) -> float:
-    """Return the median length of all arms' paths [deg]."""
-    return float(np.median(length(condition)))
 
 
 def any_planar(results: Results) -> bool:

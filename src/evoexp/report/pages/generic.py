@@ -32,11 +32,6 @@ def are_few(results: Results) -> bool:
     return len(results.evolved) <= FEW
 
 
-def are_many(are_few: bool) -> bool:
-    """Return whether only best costs are drawn, as averages would hide them."""
-    return not are_few
-
-
 def differing_values(differing: list[Measure]) -> Mapping[str, Values]:
     """Return the values of the quantities that are not the same in every run, by name."""
     return {one.name: one.values for one in differing}

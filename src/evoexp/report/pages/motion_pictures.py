@@ -76,7 +76,7 @@ def best_motions(motion_results: Results) -> list[ShownMotion]:
 
 
 def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
-    """Return what figures of motions show, by name.
+    """Return the values that figures of motions show, by name.
 
     `best` is the motion of the least cost alone, `covered` are those with the covers of their
     bodies, one per robot that has any.

@@ -152,7 +152,7 @@ class PageBuilder:
         if "each" in entry:
             names, _, items = str(entry["each"]).rpartition(" in ")
             scopes = [_bound(own, names.split(", "), item) for item in own.value(items)]
-        return (each for each in scopes if "when" not in entry or each.value(entry["when"]))
+        return (each for each in scopes if "when" not in entry or _holds(each, entry["when"]))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""
@@ -223,6 +223,12 @@ class PageBuilder:
 
 
 PARTS = ("arguments", "words")  # of a figure, which one of its kind adds to
+
+
+def _holds(scope: Scope, condition: str) -> bool:
+    """Return whether the value of a name is true, or, behind "not", false."""
+    name = condition.removeprefix("not ")
+    return bool(scope.value(name)) == (name == condition)
 
 
 def _argument(scope: Scope, value: Any) -> Any:

@@ -52,9 +52,10 @@ Its entry points `evoexp.pages` name the file: `my_paper = "my_paper:page.yaml"`
 
 Words in braces are values and functions by name (`page_scope`), written as `markdown.filled`
 does. `each: x in xs` repeats an entry for all items, `when: name` leaves it out where the value is
-false. A figure's arguments and its `words`, texts by name, may be named by its other texts; without
-the values of the argument that it `needs` it is not drawn. `given` are the names of values that
-code brings along, of evoexp's own pages. The keys of each kind of entry stand in `KEYS`.
+false, `when: not name` where it is true. Texts of a figure may name its arguments and its `words`,
+which are texts by name; it is not drawn without values of the argument that it `needs`. `given` are
+the names of values that code brings along, on evoexp's own pages. The keys of each kind of entry
+stand in `KEYS`.
 """
 
 import functools
@@ -280,7 +281,7 @@ def _names(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for key in _NAMED:
         for path in entry[key] if isinstance(entry.get(key), list) else (entry.get(key),):
             if isinstance(path, str):
-                yield key, _FIRST.split(path)[0]
+                yield key, _FIRST.split(path.removeprefix("not "))[0]
     if "each" in entry:
         yield "each", str(entry["each"]).rpartition(" in ")[2].partition(".")[0]
     for key in _TEXTS:

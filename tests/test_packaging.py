@@ -84,7 +84,7 @@ def test_contents(wheel: Path) -> None:
         path.relative_to(SOURCE.parent).as_posix()
         for path in SOURCE.rglob("*")
         if path.suffix in (".py", ".typed")
-        or path.name in ("claims.yaml", "page.yaml", "words.yaml", "claim_kinds.yaml")
+        or path.name in ("claims.yaml", "page.yaml", "claim_kinds.yaml")
     }
     assets = {
         path.relative_to(SOURCE.parent).as_posix()

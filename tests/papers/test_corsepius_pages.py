@@ -176,8 +176,7 @@ def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
 
 @pytest.mark.matrix
 def test_the_trap_shows_both_kinds_of_runs(outputs: Path) -> None:
-    pair = posture_trap.pair(solved(outputs, "corsepius_wall").main)
-    assert pair is not None
+    pair = posture_trap.stuck_pair(solved(outputs, "corsepius_wall").main)
     assert [c.label for c in pair] == ["wall", "with a sub-goal"]
     table = posture_trap.trap_table(*pair)
     tools = table[table["element"] == posture_trap.TOOL]

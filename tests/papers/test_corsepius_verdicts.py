@@ -223,7 +223,7 @@ def test_empty_scenes_are_controls_and_make_no_claims_of_their_own() -> None:
     results = made_up("corsepius_gate_wide", task_rows({}))
     pairs = measures.with_empty_scenes(results.main)
     assert [(c.label, e.label) for c, e in pairs] == [
-        (c.label, f"{c.label}, empty scene") for c in measures.among_obstacles(results.main)
+        (c.label, f"{c.label}, empty scene") for c in measures.obstructed(results.main)
     ]
 
 

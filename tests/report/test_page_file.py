@@ -135,3 +135,13 @@ def test_a_value_is_computed_once_for_all_that_name_it() -> None:
     assert sorted(calls) == ["base", "item 4", "item 5"]
     with pytest.raises(KeyError):
         scope["nothing"]
+
+
+PAPERS = ("chen", "corsepius", "curkovic", "lavoie", "rana")
+
+
+@pytest.mark.parametrize("package", ["report.pages", *(f"papers.{name}" for name in PAPERS)])
+def test_every_figure_has_a_table_and_a_drawing(package: str) -> None:
+    file = read_page_file(f"evoexp.{package}")
+    for entry in file.words.words["figures"].values():
+        assert "kind" in entry or len(file.table_and_drawing(entry["functions"])) == 2

@@ -32,7 +32,7 @@ def test_every_pair_is_compared_and_of_many_conditions_the_first_with_each(
     results: Results, settings: ReportSettings, count: int, rows: int
 ) -> None:
     found = copies(results, count)
-    (_, costs), *_ = pairwise.comparisons(found, settings)
+    (_, costs), *_ = pairwise.pairs_of_conditions(found, settings, pairwise.differing(found))
     assert len(costs) == rows
     assert len({row.quantity for row in costs}) == rows
     assert [row.p_adjusted for row in costs] == holm([row.better.p_value for row in costs])
@@ -46,28 +46,27 @@ def test_a_quantity_that_never_differs_is_left_out(results: Results) -> None:
     assert "best cost" in names  # of two seeds
 
 
-def test_shares_that_differ_are_tested_pair_by_pair(
-    results: Results, settings: ReportSettings
-) -> None:
+def test_shares_that_differ_are_tested_pair_by_pair(results: Results) -> None:
     first = results.conditions[0]
     some = dataclasses.replace(first, label="all", summaries=first.summaries.assign(solved=True))
     none = dataclasses.replace(first, label="none", summaries=first.summaries.assign(solved=False))
-    own, between = pairwise.share_tables(results._replace(conditions=(some, none)), settings)
-    assert [row[:2] for row in own.rows] == [
+    both = results._replace(conditions=(some, none))
+    assert [row[:2] for row in pairwise.share_rows_of_all(both, 0.95)] == [
         ("all", "2 of 2 = 100 % [34, 100]"),
         ("none", "0 of 2 = 0 % [0, 66]"),
     ]
-    (row,) = (row for row in between.rows if row[0] == "solved")
+    (row,) = (row for row in pairwise.difference_rows(both, 0.95) if row[0] == "solved")
     assert row[1:3] == ("all against none", "100 [7, 100]")
     assert float(str(row[3])) == pytest.approx(1.0 / 3.0, abs=0.01)  # 2 of 6 tables
-    (alone,) = pairwise.share_tables(results._replace(conditions=(some,)), settings)
-    assert len(alone.rows) == 1
+    assert not pairwise.difference_rows(results._replace(conditions=(some,)), 0.95)
 
 
 def test_the_matrix_shows_each_pair_from_both_sides(
     results: Results, settings: ReportSettings
 ) -> None:
-    (drawing,) = pairwise.matrix_drawing(copies(results, 3), settings)
+    (drawing,) = (
+        d for d in generic.page(copies(results, 3), settings).drawings if d.stem == "matrix"
+    )
     table = drawing.table().set_index(["condition", "other"])
     assert len(table) == 6
     for (a, b), row in table.iterrows():
@@ -76,7 +75,7 @@ def test_the_matrix_shows_each_pair_from_both_sides(
     assert table.loc[("+0", "+2"), "a12"] > 0.5
     words = [text.get_text() for text in matrix.draw_matrix(table.reset_index()).axes[0].texts]
     assert len(words) == 6
-    assert not pairwise.matrix_drawing(copies(results, 2), settings)
+    assert "matrix" not in {d.stem for d in generic.page(copies(results, 2), settings).drawings}
 
 
 def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSettings) -> None:

@@ -9,18 +9,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from evoexp.report.figures.rank_diagrams import draw_critical_difference, draw_profiles
-from evoexp.report.pages import ranking
+from evoexp.report.figures.rank_diagrams import (
+    critical_difference_table,
+    draw_critical_difference,
+    draw_profiles,
+    profiles_table,
+)
+from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
+from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.problem_ranks import (
     Standing,
     alike,
     critical_difference,
     effort_ratios,
     friedman,
-    profile_table,
-    rank_table,
     standing,
 )
 
@@ -96,7 +100,7 @@ def test_profiles_count_problems(efforts: np.ndarray) -> None:
     for row, got in zip(efforts, ratios, strict=True):
         for effort, ratio in zip(row, got, strict=True):
             assert ratio == (np.inf if np.isinf(effort) else effort / min(row))
-    table = profile_table(stands(efforts))
+    table = profiles_table(stands(efforts))
     for row in table.itertuples():
         own = ratios[:, int(str(row.planner).removeprefix("planner "))]
         assert row.share == sum(ratio <= row.ratio for ratio in own) / len(own)
@@ -158,21 +162,24 @@ def test_a_planner_of_few_problems_is_not_ranked_and_costs_no_problem() -> None:
     assert half.left_out == ("r", "s") and not half.outsiders
 
 
+RANKED = ("performance_profiles", "critical_difference")
+
+
 def test_the_page_says_why_there_is_no_test_or_no_ranking(settings: ReportSettings) -> None:
     def page_parts(problems: str, planners: str) -> tuple[str, str, list[str]]:
         runs = [runs_of(a, p, [float(k + 1)]) for p in problems for k, a in enumerate(planners)]
-        found = standing(runs)
-        notes = " ".join(table.note for table in ranking.tables(found, settings))
-        stems = [drawing.stem for drawing in ranking.drawings(found, runs, settings)]
-        return ranking.too_few(found), notes, stems
+        page = comparison.page_of_runs(runs, Results("", "", ()), settings)
+        notes = {table.heading: table.note for table in page.tables}
+        stems = [drawing.stem for drawing in page.drawings if drawing.stem in RANKED]
+        return notes["Problems"], notes.get("Ranks over problems", ""), stems
 
     remark, notes, stems = page_parts("p", "ABC")
     assert "not ranked" in remark and (notes, stems) == ("", [])
     remark, notes, stems = page_parts("pqrs", "ABC")
-    assert not remark and stems == ["performance_profiles"]
+    assert "not ranked" not in remark and stems == ["performance_profiles"]
     assert "5 problems that all of them were run on; here are 3 planners and 4" in notes
     remark, notes, stems = page_parts("pqrst", "ABC")
-    assert not remark and stems == ["performance_profiles", "critical_difference"]
+    assert "not ranked" not in remark and stems == ["performance_profiles", "critical_difference"]
     assert "the planners rank differently" in notes and "unit of a ranking" in notes
 
 
@@ -180,11 +187,11 @@ def test_figures_name_every_planner() -> None:
     rng = np.random.default_rng(3)
     found = stands(rng.random((8, 7)), rng.random((8, 7)))
     assert found.can_be_tested
-    table = rank_table(found, 0.05)
+    table = critical_difference_table(found, 0.05)
     assert table["mean_rank"].is_monotonic_increasing
     (axes,) = draw_critical_difference(table).axes
     texts = " ".join(text.get_text() for text in axes.texts)
     assert all(name in texts for name in found.planners)
-    (axes,) = draw_profiles(profile_table(found)).axes
+    (axes,) = draw_profiles(profiles_table(found)).axes
     labels = [str(line.get_label()) for line in axes.get_lines()]  # of the ways to names: "_…"
     assert [label for label in labels if not label.startswith("_")] == list(found.planners)

@@ -5,7 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, Proportion, Results, counted, grouped
+from evoexp.report.results.run_measures import counted, grouped
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import Proportion
 
 METHODS = {
     "Newton-type": "newton",
@@ -116,9 +118,7 @@ class Case(NamedTuple):
 
 def cases(results: Results) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
-    groups = grouped(
-        results.with_data, lambda c: (c.condition.robot, c.condition.scenario, c.planner.objective)
-    )
+    groups = grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective))
     return [Case(_name(own[0]), **{_role(c): c for c in reversed(own)}) for own in groups]
 
 

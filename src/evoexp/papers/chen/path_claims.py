@@ -8,8 +8,13 @@ import numpy as np
 
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import ConditionResults, Results, markdown, planned_by, run_measures
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results import run_measures
+from evoexp.report.results.run_measures import counted, planned_by
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import adjusted, by_column, compared
+from evoexp.report.statistics.judging import Judge, evidence
 
 # name of a route (A, B, …; A is the most frequent) → keys of its paths
 Routes = dict[str, tuple[Any, ...]]
@@ -61,10 +66,7 @@ def fits_paths(results: Results) -> bool:
     """Whether there are planners' results, and all are of paths over a plane grid."""
     found = results.with_data
     evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
-    return evolved and all(
-        len(c.condition.scenario.size) == 2  # type: ignore[attr-defined]
-        for c in found
-    )
+    return evolved and all(len(c.scenario.size) == 2 for c in found)
 
 
 def groups(results: Results) -> tuple[Group, ...]:
@@ -104,7 +106,7 @@ def paths(condition: ConditionResults) -> dict[int, FloatArray]:
 
 def boxes(condition: ConditionResults) -> list[tuple[int, ...]]:
     """Return the obstacles as blocks of nodes (x0, y0, x1, y1)."""
-    return list(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    return list(condition.scenario.obstacles)
 
 
 def route_list(groups: tuple[Group, ...]) -> Routes:
@@ -171,7 +173,7 @@ def _name(number: int) -> str:
     return (_name(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def judge_paths(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim, ...]:
+def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> tuple[Claim, ...]:
     """Judge the claims of Fig. 2: they need its three weightings, in their order."""
     return (
         nearly_shortest(judge, groups[0].main, shortest(groups)),
@@ -186,65 +188,59 @@ def judge_paths(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim,
     )
 
 
-def excess_of(condition: kit.ConditionResults, shortest: float) -> FloatArray:
+def excess_of(condition: ConditionResults, shortest: float) -> FloatArray:
     """Return the excess of each run's length over the shortest one, (done,) [%]."""
     return np.asarray(100.0 * (condition.column(DISTANCE) / shortest - 1.0))
 
 
-def nearly_shortest(
-    judge: kit.Judge, condition: kit.ConditionResults, shortest: float
-) -> kit.Claim:
+def nearly_shortest(judge: Judge, condition: ConditionResults, shortest: float) -> Claim:
     """Judge that paths are nearly shortest without safety."""
     hearing, excess = (
         judge.on("nearly_shortest", condition=condition.label),
         excess_of(condition, shortest),
     )
-    near = kit.counted(excess <= hearing.rule.limits["near_percent"])
+    near = counted(excess <= hearing.rule.limits["near_percent"])
     told = {"length": np.median(condition.column(DISTANCE)), "excess": np.median(excess)}
     return hearing.majority(told | {"shortest": shortest, "near": near}, *near)
 
 
 def nearly_best(
-    judge: kit.Judge, condition: kit.ConditionResults, known: float, bound: float
-) -> kit.Claim:
+    judge: Judge, condition: ConditionResults, cost_known: float, bound_known: float
+) -> Claim:
     """Judge that costs are near that of the best path known."""
-    hearing, above = judge.on("nearly_best", condition=condition.label), gaps(condition, known)
-    near = kit.counted(above <= hearing.rule.limits["near_percent"])
-    told = {"cost": np.median(condition.column(COST)), "above": np.median(above)}
-    return hearing.majority(told | {"known": known, "bound": bound, "near": near}, *near)
+    hearing, above = judge.on("nearly_best", condition=condition.label), gaps(condition, cost_known)
+    near = counted(above <= hearing.rule.limits["near_percent"])
+    told = {"cost": float(np.median(condition.column(COST))), "above": float(np.median(above))}
+    told |= {"known": cost_known, "bound": bound_known}
+    return hearing.majority({**told, "near": near}, *near)
 
 
 def much_longer(
-    judge: kit.Judge,
-    condition: kit.ConditionResults,
-    shortest: float,
-    truth: kit.ConditionResults | None,
-) -> kit.Claim:
+    judge: Judge, condition: ConditionResults, shortest_known: float, truth: ConditionResults | None
+) -> Claim:
     """Judge that the safe path is much longer, and tell how long the best path known is."""
-    hearing, excess = (
-        judge.on("much_longer", condition=condition.label),
-        excess_of(condition, shortest),
-    )
-    longer = kit.counted(excess > hearing.rule.limits["much_percent"])
+    hearing = judge.on("much_longer", condition=condition.label)
+    excess = excess_of(condition, shortest_known)
+    longer = counted(excess > hearing.rule.limits["much_percent"])
     told = f"median {np.median(excess):.0f} % longer, {longer} runs"
     if truth is not None:
-        known = float(excess_of(truth, shortest)[0])
+        known = float(excess_of(truth, shortest_known)[0])
         told += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
     return hearing.majority(told, *longer)
 
 
-def _compromise(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim, ...]:
+def _compromise(judge: Judge, groups: tuple[Group, ...]) -> tuple[Claim, ...]:
     """Judge the claims that compare the three weightings."""
     a, b, c = (group.main for group in groups)
-    unsafeness, distance = kit.by_column(UNSAFENESS), kit.by_column(DISTANCE)
-    safer = kit.compared([(b, a)], unsafeness, judge.settings)
-    shorter = kit.compared([(b, c)], distance, judge.settings)
+    unsafeness, distance = by_column(UNSAFENESS), by_column(DISTANCE)
+    safer = compared([(b, a)], unsafeness, judge.settings)
+    shorter = compared([(b, c)], distance, judge.settings)
     told = "; ".join(
-        f"against {other.label}: {kit.evidence(row, word)}"
+        f"against {other.label}: {evidence(row, word)}"
         for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
         for row in rows
     )
-    rows = kit.adjusted([*safer, *shorter])
+    rows = adjusted([*safer, *shorter])
     return (
         judge.on("compromise", condition=b.label, first=a.label, last=c.label).better_than_all(
             told, rows
@@ -256,20 +252,20 @@ def _compromise(judge: kit.Judge, groups: tuple[Group, ...]) -> tuple[kit.Claim,
     )
 
 
-def _converges(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def _converges(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that the best cost decreases, and that the average cost converges toward it."""
     rows = condition.generations.sort_values("index").groupby("replicate")
     first, last = rows.first(), rows.last()
     lower = last["best_cost"] < first["best_cost"]
     hearing = judge.on("converges", condition=condition.label)
     most = 1.0 + hearing.rule.limits["spread_percent"] / 100.0
-    runs = kit.counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
+    runs = counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
     complete = 0 < condition.planned <= condition.done
     holds = False if runs.having < condition.done else True if complete else None
     return hearing.own({"runs": runs}, condition.done, holds)
 
 
-def _evolution_of(judge: kit.Judge, group: Group) -> Iterator[kit.Claim]:
+def _evolution_of(judge: Judge, group: Group) -> Iterator[Claim]:
     """Judge the genetic algorithm, without and with elitism, against all controls."""
     controls = tuple(c for c in group.conditions if c.is_control)
     if controls:
@@ -279,16 +275,17 @@ def _evolution_of(judge: kit.Judge, group: Group) -> Iterator[kit.Claim]:
 
 
 def evolution(
-    judge: kit.Judge, own: kit.ConditionResults, controls: tuple[kit.ConditionResults, ...]
-) -> kit.Claim:
+    judge: Judge, condition: ConditionResults, controls: tuple[ConditionResults, ...]
+) -> Claim:
     """Judge that evolution helps, and tell its gain over the best control."""
-    rows = kit.compared([(own, c) for c in controls], kit.by_column(COST), judge.settings)
+    rows = compared([(condition, c) for c in controls], by_column(COST), judge.settings)
     medians = {control_name(c): float(np.median(c.column(COST))) for c in controls}
-    best, median = min(medians, key=lambda name: medians[name]), float(np.median(own.column(COST)))
+    best = min(medians, key=lambda name: medians[name])
+    median = float(np.median(condition.column(COST)))
     gain = medians[best] - median
     told = "; ".join(
         f"against {control_name(c)} (median {markdown.number(medians[control_name(c)])}): "
-        f"{kit.evidence(row, 'lower cost')}"
+        f"{evidence(row, 'lower cost')}"
         for c in controls
         for row in rows
         if row.quantity == c.label
@@ -298,11 +295,11 @@ def evolution(
         "verb": "saves" if gain >= 0.0 else "loses",
         "share": 100.0 * abs(gain) / medians[best],
     }
-    hearing = judge.on("path_evolution", condition=own.label, controls=" and ".join(medians))
+    hearing = judge.on("path_evolution", condition=condition.label, controls=" and ".join(medians))
     return hearing.better_than_all(words, rows)
 
 
-def control_name(condition: kit.ConditionResults) -> str:
+def control_name(condition: ConditionResults) -> str:
     """Return the name of a control in sentences."""
     component = str(condition.condition.planner.component)
     return {"random_search": "random walks"}.get(component, component.replace("_", " "))

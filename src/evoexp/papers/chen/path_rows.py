@@ -10,38 +10,33 @@ from evoexp.papers.chen.figures import grid_paths
 from evoexp.papers.chen.figures.grid_paths import FAINT, Line
 from evoexp.papers.chen.path_claims import Group, Routes
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import markdown
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import PlayedRun
+from evoexp.report.results.run_measures import counted
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Family
 
-Conditions = tuple[kit.ConditionResults, ...]
-Panels = list[tuple[str, kit.ConditionResults, list[Line]]]
+Conditions = tuple[ConditionResults, ...]
+Panels = list[tuple[str, ConditionResults, list[Line]]]
 
 
-def group_families(groups: tuple[Group, ...]) -> list[kit.Family]:
+def group_families(groups: tuple[Group, ...]) -> list[Family]:
     """Return the first condition of each weighting against its others."""
-    return [kit.Family.of(group.conditions) for group in groups]
+    return [Family.of(group.conditions) for group in groups]
 
 
-def _group_of(condition: kit.ConditionResults, groups: tuple[Group, ...]) -> Group:
+def _group_of(condition: ConditionResults, groups: tuple[Group, ...]) -> Group:
     return next(group for group in groups if condition in group.all)
 
 
-def above_optimum(condition: kit.ConditionResults, groups: tuple[Group, ...]) -> FloatArray:
+def above_optimum(condition: ConditionResults, groups: tuple[Group, ...]) -> FloatArray:
     """Return the gap of each run's cost above the best path known, (done,) [%]."""
     return path_claims.gaps(condition, _group_of(condition, groups).optimum)
 
 
-def above_bound(condition: kit.ConditionResults, groups: tuple[Group, ...]) -> FloatArray:
+def above_bound(condition: ConditionResults, groups: tuple[Group, ...]) -> FloatArray:
     """Return the gap of each run's cost above the bound of any path, (done,) [%]."""
     return path_claims.gaps(condition, _group_of(condition, groups).bound)
-
-
-def truths(groups: tuple[Group, ...], confidence: float) -> Iterator[tuple[str, str]]:
-    """Yield a row on the gaps of every weighting whose best path is known."""
-    for g in groups:
-        if g.truth is not None:
-            told = "; ".join(_gap_text(c, g, confidence) for c in g.conditions)
-            yield f"{g.name}: {_truth_text(g)}", told
 
 
 def route_counts(group: Group, route_list: Routes) -> str:
@@ -50,19 +45,18 @@ def route_counts(group: Group, route_list: Routes) -> str:
     return ", ".join(f"{name} {len(members)}" for name, members in taken)
 
 
-def _gap_text(condition: kit.ConditionResults, group: Group, confidence: float) -> str:
+def gaps_of_runs(condition: ConditionResults, group: Group, confidence: float) -> str:
     """Describe the gaps of a condition's runs above the best path known."""
     gaps, shares = path_claims.gaps(condition, group.optimum), []
     for bound in (0, 1, 5):  # [%]
-        found = kit.counted(gaps <= bound + 1e-9)
+        found = counted(gaps <= bound + 1e-9)
         interval = markdown.percent(found.interval(confidence))
         name = f"within {bound} %" if bound else "equal or better"
         shares.append(f"{name} {markdown.share(*found)} ({interval})")
-    median = float(np.median(gaps))
-    return f"{condition.label}: median {median:+.1f} %, {', '.join(shares)}".replace("-", "−")
+    return f"median {np.median(gaps):+.1f} %, {', '.join(shares)}".replace("-", "−")
 
 
-def _truth_text(group: Group) -> str:
+def best_path(group: Group) -> str:
     """Describe the best path that the reference knows."""
     assert group.truth is not None
     length, unsafeness, nodes, exact = (
@@ -105,9 +99,9 @@ def main_conditions(groups: tuple[Group, ...]) -> Conditions:
     return tuple(group.main for group in groups)
 
 
-def median_runs(main_conditions: Conditions) -> list[kit.PlayedRun]:
+def median_runs(main_conditions: Conditions) -> list[PlayedRun]:
     """Return the run of median cost of every weighting."""
-    return [kit.PlayedRun(c, path_claims.median_replicate(c)) for c in main_conditions]
+    return [PlayedRun(c, path_claims.median_replicate(c)) for c in main_conditions]
 
 
 def truths_are_known(groups: tuple[Group, ...]) -> bool:
@@ -190,55 +184,36 @@ def _repeated(path: np.ndarray) -> int:
     return len(path) - len(np.unique(path, axis=0))
 
 
-def truth(results: kit.Results, condition: kit.ConditionResults) -> kit.ConditionResults:
+def truth(results: Results, condition: ConditionResults) -> ConditionResults:
     """Return the reference of the same map, potentials and weights, of any algorithm."""
     return next(c for c in results.references if _problem(c) == _problem(condition))
 
 
-def shortest_known(truth: kit.ConditionResults) -> float:
+def shortest_known(truth: ConditionResults) -> float:
     """Return the length of the shortest path [cell]."""
     return float(truth.array("frontier")[:, 1].min())
 
 
-def _known(truth: kit.ConditionResults, column: str = "best_cost") -> float:
-    return float(truth.column(column)[0])
+def cost_known(truth: ConditionResults) -> float:
+    """Return the cost of the best path known."""
+    return float(truth.column("best_cost")[0])
 
 
-def excess(condition: kit.ConditionResults, shortest_known: float) -> FloatArray:
+def bound_known(truth: ConditionResults) -> float:
+    """Return the greatest known lower bound of the cost of any path."""
+    return float(truth.column("term_lower_bound")[0])
+
+
+def excess(condition: ConditionResults, shortest_known: float) -> FloatArray:
     """Return the excess of each run's length over the shortest one, (done,) [%]."""
     return path_claims.excess_of(condition, shortest_known)
 
 
-def above_known(condition: kit.ConditionResults, truth: kit.ConditionResults) -> FloatArray:
+def above_known(condition: ConditionResults, cost_known: float) -> FloatArray:
     """Return the gap of each run's cost above the best one known, (done,) [%]."""
-    return path_claims.gaps(condition, _known(truth))
+    return path_claims.gaps(condition, cost_known)
 
 
-def assumed_longer(
-    judge: kit.Judge,
-    condition: kit.ConditionResults,
-    shortest_known: float,
-    truth: kit.ConditionResults,
-) -> kit.Claim:
-    """Judge that the safe path is much longer, under assumed numbers."""
-    return path_claims.much_longer(judge, condition, shortest_known, truth)
-
-
-def assumed_best(
-    judge: kit.Judge, condition: kit.ConditionResults, truth: kit.ConditionResults
-) -> kit.Claim:
-    """Judge that costs are near the best one known, under assumed numbers."""
-    bound = _known(truth, "term_lower_bound")
-    return path_claims.nearly_best(judge, condition, _known(truth), bound)
-
-
-def assumed_evolution(
-    judge: kit.Judge, condition: kit.ConditionResults, controls: Conditions
-) -> kit.Claim:
-    """Judge what evolution adds to the controls, under assumed numbers."""
-    return path_claims.evolution(judge, condition, controls)
-
-
-def _problem(condition: kit.ConditionResults) -> tuple[object, ...]:
+def _problem(condition: ConditionResults) -> tuple[object, ...]:
     planner, own = condition.planner, condition.condition
     return own.robot, own.scenario, planner.objective, planner.collision, planner.revisits

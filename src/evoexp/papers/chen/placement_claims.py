@@ -6,8 +6,12 @@ import numpy as np
 
 from evoexp.papers.chen.cases import METHODS, Case
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import Claim, Judge, markdown
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.comparisons import by_column, compared
+from evoexp.report.statistics.inference import Proportion, fisher_exact
+from evoexp.report.statistics.judging import Judge
 
 
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
@@ -132,9 +136,9 @@ def _against_search(judge: Judge, cases: list[Case]) -> list[Claim]:
         for name, own in (("without elitism", case.plain), ("with elitism", case.elitist))
         if own is not None and case.search is not None
     }
-    rows = kit.compared(
+    rows = compared(
         [(own, search) for _, _, own, search in pairs.values()],
-        kit.by_column("best_cost"),
+        by_column("best_cost"),
         judge.settings,
         named=lambda own, _: own.label,
     )
@@ -153,7 +157,7 @@ def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
     for method, ends in case.ends().items():
         hearing = judge.on("gets_stuck", case=case.name, method=method)
         at_best = case.within(ends[:, 2], hearing.rule.limits["near_percent"] / 100.0)
-        stuck = kit.Proportion(at_best.total - at_best.having, at_best.total)
+        stuck = Proportion(at_best.total - at_best.having, at_best.total)
         told = {"stuck": stuck, "interval": markdown.percent(stuck.interval(judge.level))}
         yield hearing.own(told, stuck.total, stuck.having > 0)
         if case.elitist is not None:
@@ -161,11 +165,7 @@ def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
 
 
 def _better(
-    judge: Judge,
-    case: Case,
-    elitist: kit.ConditionResults,
-    method: str,
-    at_best: kit.Proportion,
+    judge: Judge, case: Case, elitist: ConditionResults, method: str, at_best: Proportion
 ) -> Iterator[Claim]:
     """Judge a run of the genetic algorithm against one start of a method, and their efforts."""
     assert case.conventional is not None
@@ -175,7 +175,7 @@ def _better(
     of_start = float(case.conventional.column(f"term_{METHODS[method]}_evaluations")[0])
     of_run = float(elitist.column("evaluations").mean())
     told = {"close": close, "runs": 100 * own.share, "starts": 100 * at_best.share}
-    told |= {"p": kit.fisher_exact(own, at_best), "of_run": of_run, "of_start": of_start}
+    told |= {"p": fisher_exact(own, at_best), "of_run": of_run, "of_start": of_start}
     runs = judge.on("better_than_a_start", case=case.name, method=method)
     yield runs.greater(told, own, at_best)
     run, start = (
@@ -187,7 +187,7 @@ def _better(
     yield efforts.own(text, f"{own.total} and {at_best.total}", holds)
 
 
-def _seconds(judge: Judge, name: str, condition: kit.ConditionResults) -> Claim:
+def _seconds(judge: Judge, name: str, condition: ConditionResults) -> Claim:
     """Judge that the minimax problem takes seconds."""
     seconds, hearing = float(np.median(condition.column("cpu_s"))), judge.on("seconds", case=name)
     told = {"milliseconds": 1000 * seconds}

@@ -7,15 +7,17 @@ import numpy as np
 from evoexp.papers.chen.cases import CLOSE, Case
 from evoexp.papers.chen.cases import cases as case_list
 from evoexp.planners.placement_ga.planner import PlacementGa
-from evoexp.report import kit
-from evoexp.report.kit import markdown
+from evoexp.report.pages import markdown
+from evoexp.report.results.run_measures import planned_by
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import spread
 
-Conditions = tuple[kit.ConditionResults, ...]
+Conditions = tuple[ConditionResults, ...]
 
 
-def fits_placements(results: kit.Results) -> bool:
+def fits_placements(results: Results) -> bool:
     """Return whether there are results, all of docking postures."""
-    return kit.planned_by(results, PlacementGa)
+    return planned_by(results, PlacementGa)
 
 
 def exact_cases(cases: list[Case]) -> list[Case]:
@@ -28,7 +30,7 @@ def evolved_cases(exact_cases: list[Case]) -> list[Case]:
     return [case for case in exact_cases if case.evolved]
 
 
-def landscapes(results: kit.Results) -> list[Case]:
+def landscapes(results: Results) -> list[Case]:
     """Return the criteria whose landscape was computed."""
     found = case_list(results) if fits_placements(results) else []
     return [case for case in found if case.landscape is not None]
@@ -37,11 +39,6 @@ def landscapes(results: kit.Results) -> list[Case]:
 def case_conditions(cases: list[Case]) -> Conditions:
     """Return the conditions of all criteria."""
     return tuple(c for case in cases for c in case.conditions)
-
-
-def landscape_conditions(landscapes: list[Case]) -> Conditions:
-    """Return the conditions of the criteria whose landscape was computed."""
-    return case_conditions(landscapes)
 
 
 def landscape_row(case: Case) -> tuple[object, ...]:
@@ -70,12 +67,12 @@ def _paper(case: Case) -> str:
     return "; ".join(told)
 
 
-def _run(case: Case, condition: kit.ConditionResults | None) -> str:
+def _run(case: Case, condition: ConditionResults | None) -> str:
     """Return the spread of the best E of a condition's runs, and shares near the optimum."""
     if condition is None:
         return "–"
     costs = condition.column("best_cost")
-    return f"{markdown.spread(kit.spread(costs))} {_shares(case, costs)}"
+    return f"{markdown.spread(spread(costs))} {_shares(case, costs)}"
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:
@@ -130,18 +127,3 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
             for name, c in case.evolved.items()
         ]
     return rows
-
-
-def result_rows(cases: list[Case]) -> list[tuple[str, ...]]:
-    """Return the rows of all criteria."""
-    return [result_row(case) for case in cases]
-
-
-def landscape_rows(landscapes: list[Case]) -> list[tuple[object, ...]]:
-    """Return the rows of all landscapes."""
-    return [landscape_row(case) for case in landscapes]
-
-
-def placement_checks(cases: list[Case]) -> list[tuple[str, str]]:
-    """Return the rows of checks of all criteria."""
-    return [row for case in cases for row in posture_checks(case)]

@@ -1,30 +1,37 @@
 """The claims of Corsépius 2001: on tasks, and on the size of the population, metric by metric."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.papers.corsepius import measures
-from evoexp.papers.corsepius.measures import Task
-from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.papers.corsepius.measures import Tasks
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import inference, judging
+from evoexp.report.statistics.comparisons import Values
+from evoexp.report.statistics.inference import Interval
+from evoexp.report.statistics.judging import Judge, fisher_evidence
 
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 RECOMMENDED = 100.0  # individuals (section 5)
-METRICS: dict[str, kit.Values] = {
+METRICS: dict[str, Values] = {
     "cycles": measures.cycles,
     "evaluations": measures.evaluations,
     "CPU time": measures.usual_seconds,
 }
 
 
-def judge_tasks(judge: kit.Judge, results: kit.Results) -> tuple[kit.Claim, ...]:
+def judge_tasks(judge: Judge, results: Results) -> tuple[Claim, ...]:
     """Judge the claims that the conditions of an experiment allow to judge."""
-    found = measures.among_obstacles(results.main)
+    found = measures.obstructed(results.main)
     many = judge.rules["redundant_arms"].limits["joints"]
-    arms = [c for c in found if kit.num_joints(c) > many]
+    arms = [c for c in found if run_measures.num_joints(c) > many]
     single = (
         (judge_met(judge, c), judge_free(judge, c), *_tilt(judge, c), *_planning_time(judge, c))
         for c in found
@@ -41,16 +48,16 @@ def judge_tasks(judge: kit.Judge, results: kit.Results) -> tuple[kit.Claim, ...]
     return (*(one for own in single for one in own), *redundant, *stuck, *at_obstacles)
 
 
-def judge_met(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def judge_met(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that goals given in work space are met by a search in configuration space."""
-    met = kit.success(condition)
+    met = run_measures.success(condition)
     hearing = judge.on("goals_met", who=condition.label)
     return hearing.majority(f"goal met {judge.share(met)}", *met)
 
 
-def judge_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def judge_free(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that binary ratings of distances keep the whole motion free."""
-    refuted, free = measures.refuted(condition), kit.certified(condition).having
+    refuted, free = measures.refuted(condition), run_measures.certified(condition).having
     planned = refuted.total if condition.done == condition.planned else 0
     told = (
         f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
@@ -63,16 +70,16 @@ def judge_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
     return hearing.every(told, free, refuted.total, planned)
 
 
-def _tilt(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Claim]:
+def _tilt(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Judge that a grasped object is not tilted."""
     limits = {term: getattr(condition.planner.objective, term) for term in TILTS}
     for term, limit in limits.items():
         if limit is not None and condition.solved:
             at, between = (
-                condition.column(f"term_greatest_{term}{part}_deg")[kit.solved(condition)]
+                condition.column(f"term_greatest_{term}{part}_deg")[run_measures.solved(condition)]
                 for part in ("", "_between")
             )
-            kept = kit.counted(between <= limit.limit)
+            kept = run_measures.counted(between <= limit.limit)
             told = (
                 f"greatest tilt at postures {markdown.number(float(at.max()))}°, between them "
                 f"{markdown.number(float(between.max()))}°, limit {limit.limit:g}°; within it all "
@@ -82,21 +89,21 @@ def _tilt(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Cla
             yield judge.on("not_tilted", who=condition.label).every(told, *kept, planned)
 
 
-def _redundant(judge: kit.Judge, arms: list[kit.ConditionResults]) -> kit.Claim:
+def _redundant(judge: Judge, arms: list[ConditionResults]) -> Claim:
     """Judge that the approach works for highly redundant arms: it finds a certified path."""
-    free = {c.label: kit.certified(c).having for c in arms}
+    free = {c.label: run_measures.certified(c).having for c in arms}
     texts = [
-        f"{c.label}, {kit.num_joints(c)} joints: goal met "
-        f"{judge.share(kit.success(c))}, {free[c.label]} of them certified"
+        f"{c.label}, {run_measures.num_joints(c)} joints: goal met "
+        f"{judge.share(run_measures.success(c))}, {free[c.label]} of them certified"
         for c in arms
     ]
     runs = sum(c.done for c in arms)
     return judge.on("redundant_arms").own("; ".join(texts), runs, any(free.values()))
 
 
-def _planning_time(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Claim]:
+def _planning_time(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Set the planning time that the paper prints beside ours."""
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     goals = [phase.goal for phase in scenario.phases]
     if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
         return
@@ -111,25 +118,21 @@ def _planning_time(judge: kit.Judge, condition: kit.ConditionResults) -> Iterato
     yield judge.on("planning_time", who=condition.label).made(told, condition.done, verdict)
 
 
-def _stuck(
-    judge: kit.Judge, stuck: kit.ConditionResults, helped: kit.ConditionResults
-) -> kit.Claim:
+def _stuck(judge: Judge, stuck: ConditionResults, helped: ConditionResults) -> Claim:
     """Judge that the search gets stuck where the same task with a sub-goal finds a way."""
-    one, two = kit.success(helped), kit.success(stuck)
+    one, two = run_measures.success(helped), run_measures.success(stuck)
     told = (
         f"goal met {judge.share(two)}; {helped.label}: {judge.share(one)}; "
-        f"{kit.fisher_evidence(one, two)}; ended by stagnation: "
+        f"{fisher_evidence(one, two)}; ended by stagnation: "
         f"{judge.share(measures.reasons(stuck)['stagnation'])}"
     )
     return judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
 
 
-def _at_obstacles(
-    judge: kit.Judge, pairs: list[tuple[kit.ConditionResults, kit.ConditionResults]]
-) -> kit.Claim:
+def _at_obstacles(judge: Judge, pairs: list[tuple[ConditionResults, ConditionResults]]) -> Claim:
     """Judge that obstacles, and nothing else, keep the search from its goals."""
-    shares = [(c.label, kit.success(c), kit.success(empty)) for c, empty in pairs]
-    adjusted = kit.holm([kit.fisher_exact(own, empty) for _, own, empty in shares])
+    shares = [(c.label, run_measures.success(c), run_measures.success(empty)) for c, empty in pairs]
+    adjusted = inference.holm([inference.fisher_exact(own, empty) for _, own, empty in shares])
     texts = [
         f"{label} {markdown.share(*own)}, empty scene {markdown.share(*empty)}, p = "
         f"{markdown.p_value(p)}"
@@ -149,7 +152,7 @@ class SizeComparison(NamedTuple):
     task: str  # name of the task
     value: float  # the size
     ratio: float  # ratio of the expected efforts
-    interval: kit.Interval  # its interval
+    interval: Interval  # its interval
     bound: float  # the ratio that it is compared with: 1, or a proportional increase
 
     @property
@@ -159,8 +162,8 @@ class SizeComparison(NamedTuple):
 
 
 def judge_study(
-    judge: kit.Judge, sizes: tuple[Task, ...], size_ratios: dict[str, list[SizeComparison]]
-) -> tuple[kit.Claim, ...]:
+    judge: Judge, sizes: Tasks, size_ratios: dict[str, list[SizeComparison]]
+) -> tuple[Claim, ...]:
     """Judge the claims on the size."""
     larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in size_ratios.items()}
     smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in size_ratios.items()}
@@ -176,9 +179,7 @@ def judge_study(
     )
 
 
-def size_ratios(
-    sizes: tuple[Task, ...], settings: kit.ReportSettings
-) -> dict[str, list[SizeComparison]]:
+def size_ratios(sizes: Tasks, settings: ReportSettings) -> dict[str, list[SizeComparison]]:
     """Return the comparisons of all sizes with the recommended one, metric by metric."""
     return {metric: compare_sizes(sizes, metric, settings) for metric in METRICS}
 
@@ -189,8 +190,8 @@ def are_compared(size_ratios: dict[str, list[SizeComparison]]) -> bool:
 
 
 def _beside_recommended(
-    found: tuple[Task, ...],
-) -> Iterator[tuple[str, float, kit.ConditionResults, kit.ConditionResults]]:
+    found: Tasks,
+) -> Iterator[tuple[str, float, ConditionResults, ConditionResults]]:
     """Yield (task, size, its condition, that of the recommended size) where either solves it."""
     for task in found:
         own = task.by_value.get(RECOMMENDED)
@@ -199,9 +200,7 @@ def _beside_recommended(
                 yield task.name, value, c, own
 
 
-def compare_sizes(
-    found: tuple[Task, ...], metric: str, settings: kit.ReportSettings
-) -> list[SizeComparison]:
+def compare_sizes(found: Tasks, metric: str, settings: ReportSettings) -> list[SizeComparison]:
     """Compare every size with the recommended one, task by task.
 
     Intervals are of one family: their levels are Bonferroni's over all of them. Tasks that neither
@@ -211,11 +210,11 @@ def compare_sizes(
     level = 1.0 - (1.0 - settings.confidence) / max(1, len(pairs))
     rows = []
     for name, value, c, own in pairs:
-        one, two = kit.on_common_seeds(c, own, METRICS[metric])
-        above, below = kit.expected_effort(*one), kit.expected_effort(*two)
+        one, two = run_measures.on_common_seeds(c, own, METRICS[metric])
+        above, below = inference.expected_effort(*one), inference.expected_effort(*two)
         ratio = above / below if np.isfinite(below) else 0.0
         proportional = RECOMMENDED / value if metric == "cycles" and value < RECOMMENDED else 1.0
-        interval = kit.effort_ratio(one, two, level, settings.num_resamples)
+        interval = inference.effort_ratio(one, two, level, settings.num_resamples)
         rows.append(SizeComparison(name, value, ratio, interval, proportional))
     return rows
 
@@ -238,7 +237,7 @@ def _unless(against: object, favour: object) -> bool | None:
     return False if against else True if favour else None
 
 
-def _no_faster(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
+def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge that nothing larger is faster, on any task."""
     says = [row.says for row in rows]
     told = (
@@ -249,7 +248,7 @@ def _no_faster(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, 1 in says))
 
 
-def _not_necessarily(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
+def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge the weaker reading: there are tasks on which nothing larger is faster."""
     says = {name: [row.says for row in rows if row.task == name] for name in (r.task for r in rows)}
     never = [name for name, own in says.items() if min(own) >= 0]
@@ -262,7 +261,7 @@ def _not_necessarily(judge: kit.Judge, metric: str, rows: list[SizeComparison]) 
     return hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
 
 
-def _over_proportional(judge: kit.Judge, metric: str, rows: list[SizeComparison]) -> kit.Claim:
+def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
@@ -274,21 +273,24 @@ def _over_proportional(judge: kit.Judge, metric: str, rows: list[SizeComparison]
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
 
-def _converges_less(judge: kit.Judge, found: tuple[Task, ...]) -> kit.Claim:
+def _converges_less(judge: Judge, found: Tasks) -> Claim:
     """Judge that smaller populations meet their goals less often."""
     pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
-    adjusted = kit.holm(
-        [kit.fisher_exact(kit.success(c), kit.success(own)) for _, _, c, own in pairs]
+    adjusted = inference.holm(
+        [
+            inference.fisher_exact(run_measures.success(c), run_measures.success(own))
+            for _, _, c, own in pairs
+        ]
     )
     says = [
-        judging.greater(kit.success(own), kit.success(c), p, judge.significance)
+        judging.greater(run_measures.success(own), run_measures.success(c), p, judge.significance)
         for (_, _, c, own), p in zip(pairs, adjusted, strict=True)
     ]
     clear = [pair for pair, said in zip(pairs, says, strict=True) if said]
     less, more = says.count(1), says.count(-1)
     texts = (
-        f"{name} {value:g}: {markdown.share(*kit.success(c))} for "
-        f"{markdown.share(*kit.success(own))}"
+        f"{name} {value:g}: {markdown.share(*run_measures.success(c))} for "
+        f"{markdown.share(*run_measures.success(own))}"
         for name, value, c, own in clear
     )
     told = (
@@ -299,14 +301,13 @@ def _converges_less(judge: kit.Judge, found: tuple[Task, ...]) -> kit.Claim:
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 
-def _reasonable(
-    judge: kit.Judge, metric: str, found: tuple[Task, ...], values: kit.Values
-) -> kit.Claim:
+def _reasonable(judge: Judge, metric: str, found: Tasks, values: Values) -> Claim:
     """Judge that 100 is a reasonable size on every task that can be solved."""
     factors = {}
     for task in found:
         efforts = {
-            v: kit.expected_effort(values(c), kit.solved(c)) for v, c in task.by_value.items()
+            v: inference.expected_effort(values(c), run_measures.solved(c))
+            for v, c in task.by_value.items()
         }
         best = min(efforts, key=lambda value: efforts[value])
         if RECOMMENDED in efforts and np.isfinite(efforts[best]):

@@ -10,13 +10,19 @@ from evoexp.objectives.posture_cost import UPRIGHT
 from evoexp.paths.motion import Motion
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
-from evoexp.report import kit
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import by_column
+from evoexp.report.statistics.inference import Proportion, quantile
 
 MANY_QUERIES = 1000  # of coal: more than the pairs that may touch when an object is released
 REASONS = ("goal", "stagnation", "cap")  # why a search ends
 
-cycles = kit.by_column("term_cycles")  # of each run, all phases together, (done,)
-evaluations = kit.by_column("evaluations")  # of each run, (done,)
+cycles = by_column("term_cycles")  # of each run, all phases together, (done,)
+evaluations = by_column("evaluations")  # of each run, (done,)
+
+
+Conditions = tuple[ConditionResults, ...]
 
 
 class Task(NamedTuple):
@@ -24,31 +30,50 @@ class Task(NamedTuple):
 
     name: str  # the common part of their labels
     values: tuple[float, ...]  # values of that setting, ascending
-    conditions: tuple[kit.ConditionResults, ...]  # one per value
+    conditions: Conditions  # one per value
 
     @property
-    def by_value(self) -> dict[float, kit.ConditionResults]:
+    def by_value(self) -> dict[float, ConditionResults]:
         """The condition of each value that has results."""
         return dict(zip(self.values, self.conditions, strict=True))
 
 
-def problem(condition: kit.ConditionResults) -> Problem:
+class Tasks(tuple[Task, ...]):
+    """Several tasks."""
+
+    @property
+    def conditions(self) -> Conditions:
+        """All of their conditions."""
+        return tuple(c for task in self for c in task.conditions)
+
+    @property
+    def names(self) -> list[str]:
+        """Their names."""
+        return [task.name for task in self]
+
+    @property
+    def num_runs(self) -> int:
+        """Their finished runs."""
+        return sum(c.done for c in self.conditions)
+
+
+def problem(condition: ConditionResults) -> Problem:
     """Return the prepared task."""
     return condition.problem(Problem)
 
 
-def scene(condition: kit.ConditionResults) -> tuple[Any, Any]:
+def scene(condition: ConditionResults) -> tuple[Any, Any]:
     """Return the canonical forms of robot and scenario."""
-    return condition.condition.robot.canonical(), condition.condition.scenario.canonical()
+    return condition.robot.canonical(), condition.scenario.canonical()
 
 
-def tasks(results: kit.Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
+def tasks(results: Results, setting: str, of: str = "ga") -> Tasks:
     """Return the tasks that have several values of a setting, without controls.
 
     It is a setting of a part of the planner, or, where `of` is empty, of the planner itself.
     """
 
-    def key(condition: kit.ConditionResults) -> tuple[Any, ...]:
+    def key(condition: ConditionResults) -> tuple[Any, ...]:
         planner: dict[str, Any] = condition.planner.canonical()
         part = planner[of] if of else planner
         part.pop(setting)
@@ -56,57 +81,57 @@ def tasks(results: kit.Results, setting: str, of: str = "ga") -> tuple[Task, ...
             part.pop("initial_size")
         return *scene(condition), planner
 
-    def value(condition: kit.ConditionResults) -> float:
+    def value(condition: ConditionResults) -> float:
         found = getattr(getattr(condition.planner, of) if of else condition.planner, setting)
         return float(found[0] if isinstance(found, tuple) else found)  # one scope for all joints
 
-    groups = (sorted(group, key=value) for group in kit.grouped(results.main, key))
-    return tuple(
+    groups = (sorted(group, key=value) for group in run_measures.grouped(results.main, key))
+    return Tasks(
         Task(own[0].label.split(", ")[0], tuple(map(value, own)), tuple(own))
         for own in groups
         if len(own) > 1
     )
 
 
-def refuted(condition: kit.ConditionResults) -> kit.Proportion:
+def refuted(condition: ConditionResults) -> Proportion:
     """Count the solved runs whose paths the exact verdict refutes."""
-    return kit.Proportion(condition.verdicts.solved_refuted, condition.solved)
+    return Proportion(condition.verdicts.solved_refuted, condition.solved)
 
 
-def usual_seconds(condition: kit.ConditionResults) -> FloatArray:
+def usual_seconds(condition: ConditionResults) -> FloatArray:
     """Return the CPU time of each run's evaluations at the median run's price, (done,) [s].
 
     The first run of a worker process also loads the kernels; one price for all keeps that out of
     sums.
     """
-    price = kit.quantile(kit.search_seconds(condition) / evaluations(condition), 0.5)
+    price = quantile(run_measures.search_seconds(condition) / evaluations(condition), 0.5)
     return evaluations(condition) * price
 
 
-def residuals(condition: kit.ConditionResults) -> FloatArray:
+def residuals(condition: ConditionResults) -> FloatArray:
     """Return each run's distance to the goal of its last phase, (done,) [length unit]."""
     return np.abs(condition.column("term_goal_distance"))
 
 
-def num_steps(condition: kit.ConditionResults) -> FloatArray:
+def num_steps(condition: ConditionResults) -> FloatArray:
     """Return the steps of each run's path, (done,)."""
     return condition.column("term_postures") - 1.0
 
 
-def paths(condition: kit.ConditionResults) -> dict[int, FloatArray]:
+def paths(condition: ConditionResults) -> dict[int, FloatArray]:
     """Return replicate → the postures of its path, (postures, nq) [rad]."""
-    nq = kit.num_joints(condition)
+    nq = run_measures.num_joints(condition)
     return {k: flat.reshape(-1, nq) for k, flat in condition.solutions.items()}
 
 
-def path_lengths(condition: kit.ConditionResults) -> FloatArray:
+def path_lengths(condition: ConditionResults) -> FloatArray:
     """Return the length of each run's path through joint space, (done,) [rad]."""
     return np.array(
         [np.sqrt((np.diff(q, axis=0) ** 2).sum(axis=1)).sum() for q in paths(condition).values()]
     )
 
 
-def detours(condition: kit.ConditionResults) -> FloatArray:
+def detours(condition: ConditionResults) -> FloatArray:
     """Return each path's length over the straight distance of its ends, (done,).
 
     It is NaN if the path ends where it began.
@@ -115,32 +140,32 @@ def detours(condition: kit.ConditionResults) -> FloatArray:
     return path_lengths(condition) / np.where(straight > 0.0, straight, np.nan)
 
 
-def reasons(condition: kit.ConditionResults) -> dict[str, kit.Proportion]:
+def reasons(condition: ConditionResults) -> dict[str, Proportion]:
     """Count the runs that ended for each reason."""
     given = condition.summaries["stop_reason"]
     return {
-        name: kit.counted(given == name) for name in dict.fromkeys([*REASONS, *sorted(set(given))])
+        name: run_measures.counted(given == name)
+        for name in dict.fromkeys([*REASONS, *sorted(set(given))])
     }
 
 
-def phase_names(condition: kit.ConditionResults) -> tuple[str, ...]:
+def phase_names(condition: ConditionResults) -> tuple[str, ...]:
     """Return the names of the phases, sub-goals first."""
-    scenario: Any = condition.condition.scenario
-    return tuple(phase.name for phase in scenario.all_phases)
+    return tuple(phase.name for phase in condition.scenario.all_phases)
 
 
-def tolerances(condition: kit.ConditionResults) -> tuple[float, ...]:
+def tolerances(condition: ConditionResults) -> tuple[float, ...]:
     """Return the distance at which the goal of each phase is met, sub-goals first [length unit]."""
-    task: Any = condition.condition.scenario
+    task = condition.scenario
     return tuple(phase.position_tolerance or task.position_tolerance for phase in task.all_phases)
 
 
-def subgoals(condition: kit.ConditionResults) -> tuple[Any, ...]:
+def subgoals(condition: ConditionResults) -> tuple[Any, ...]:
     """Return the points that the tool passes before the first phase."""
-    return tuple(condition.condition.scenario.subgoals)  # type: ignore[attr-defined]
+    return tuple(condition.scenario.subgoals)
 
 
-def only_subgoals_differ(without: kit.ConditionResults, having: kit.ConditionResults) -> bool:
+def only_subgoals_differ(without: ConditionResults, having: ConditionResults) -> bool:
     """Whether the second condition is the first one with sub-goals."""
     (robot, one), (same_robot, two) = scene(without), scene(having)
     one, two = ({**task, "subgoals": None} for task in (one, two))
@@ -148,24 +173,22 @@ def only_subgoals_differ(without: kit.ConditionResults, having: kit.ConditionRes
     return added and (robot, one, without.planner) == (same_robot, two, having.planner)
 
 
-def empty(condition: kit.ConditionResults) -> bool:
+def empty(condition: ConditionResults) -> bool:
     """Whether the obstacles of a condition are taken away: a control."""
-    return bool(condition.condition.scenario.empty_scene)  # type: ignore[attr-defined]
+    return bool(condition.scenario.empty_scene)
 
 
-def among_obstacles(
-    conditions: tuple[kit.ConditionResults, ...],
-) -> tuple[kit.ConditionResults, ...]:
+def obstructed(main: Conditions) -> Conditions:
     """Return the conditions whose obstacles stand."""
-    return tuple(c for c in conditions if not empty(c))
+    return tuple(c for c in main if not empty(c))
 
 
 def with_empty_scenes(
-    conditions: tuple[kit.ConditionResults, ...],
-) -> list[tuple[kit.ConditionResults, kit.ConditionResults]]:
+    conditions: Conditions,
+) -> list[tuple[ConditionResults, ConditionResults]]:
     """Return the conditions that have an empty scene as a control, each with its control."""
 
-    def key(condition: kit.ConditionResults) -> tuple[Any, ...]:
+    def key(condition: ConditionResults) -> tuple[Any, ...]:
         robot, task = scene(condition)
         return robot, {**task, "empty_scene": None}, condition.planner
 
@@ -181,18 +204,18 @@ class AllowedContacts(NamedTuple):
     unit: str  # length unit of the scene
 
 
-def allowed_contacts(condition: kit.ConditionResults) -> AllowedContacts | None:
+def allowed_contacts(condition: ConditionResults) -> AllowedContacts | None:
     """Return the pairs that the exact verdict lets touch; None if there is none."""
     told = condition.summaries.get("allowed_contacts", pd.Series(dtype=str)).fillna("")
     pairs = dict.fromkeys(pair for text in told for pair in text.split(", ") if pair)
-    limit = condition.condition.scenario.allowed_penetration  # type: ignore[attr-defined]
-    unit = condition.condition.length_unit
+    limit = condition.scenario.allowed_penetration
+    unit = condition.length_unit
     return AllowedContacts(", ".join(pairs), float(limit), unit) if pairs and limit else None
 
 
-def lets_go(condition: kit.ConditionResults) -> bool:
+def lets_go(condition: ConditionResults) -> bool:
     """Whether the task lets go of an object."""
-    phases = condition.condition.scenario.phases  # type: ignore[attr-defined]
+    phases = condition.scenario.phases
     return any(phase.then == "detach" for phase in phases)
 
 
@@ -206,7 +229,7 @@ class Release(NamedTuple):
     tilt: float  # between its axis and the direction up [rad]
 
 
-def releases(condition: kit.ConditionResults) -> tuple[Release, ...]:
+def releases(condition: ConditionResults) -> tuple[Release, ...]:
     """Return the state of the object in every run that lets go of it, by coal's distances."""
     own, found = problem(condition), []
     for replicate, q in paths(condition).items():
@@ -221,15 +244,15 @@ def releases(condition: kit.ConditionResults) -> tuple[Release, ...]:
     return tuple(found)
 
 
-def by_robot(conditions: tuple[kit.ConditionResults, ...]) -> tuple[kit.ConditionResults, ...]:
+def by_robot(conditions: Conditions) -> Conditions:
     """Return the first condition of every robot and its collision model."""
-    groups = kit.grouped(
-        conditions, lambda c: (c.condition.robot.canonical(), c.planner.collision.canonical())
+    groups = run_measures.grouped(
+        conditions, lambda c: (c.robot.canonical(), c.planner.collision.canonical())
     )
     return tuple(group[0] for group in groups)
 
 
-def phase_cycles(condition: kit.ConditionResults) -> pd.DataFrame:
+def phase_cycles(condition: ConditionResults) -> pd.DataFrame:
     """Count the cycles of every run in every phase (from 0) that it began."""
     rows = condition.generations
     begun = rows.assign(phase=rows["term_phase"].astype(int) - 1)
@@ -241,7 +264,7 @@ def phase_cycles(condition: kit.ConditionResults) -> pd.DataFrame:
     return table.assign(reached=(table["phase"] < last) | whole)
 
 
-def shown_replicate(condition: kit.ConditionResults) -> int:
+def shown_replicate(condition: ConditionResults) -> int:
     """Return the run that figures show: of median evaluations among the solved ones, if any."""
-    among = kit.solved(condition) if condition.solved else None
-    return kit.median_replicate(condition, evaluations(condition), among)
+    among = run_measures.solved(condition) if condition.solved else None
+    return run_measures.median_replicate(condition, evaluations(condition), among)

@@ -9,11 +9,18 @@ import numpy as np
 from evoexp.papers.curkovic import link_motions, measures
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim, Quantity
+from evoexp.report.pages.page_words import quantity
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.comparisons import Comparison, Values, by_column, compared
+from evoexp.report.statistics.judging import Judge
 
-Rows = tuple[kit.Comparison, ...]
-Conditions = Sequence[kit.ConditionResults]
+Rows = tuple[Comparison, ...]
+Conditions = Sequence[ConditionResults]
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 EFFORT = "evaluations to a team whose cost is the threshold"
 METHOD, PLAIN, ELITES = "V", "I", "15 elites"
@@ -33,17 +40,15 @@ class MatchedPairs(NamedTuple):
     certified: Rows  # best costs, a refuted motion counting as worse than any
 
 
-def matched_pairs(
-    results: kit.Results, settings: kit.ReportSettings, threshold: float
-) -> MatchedPairs:
+def matched_pairs(results: Results, settings: ReportSettings, threshold: float) -> MatchedPairs:
     """Compare the methods that have a twin."""
     by_label = {c.label: c for c in results.with_data}
     pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
     matched = partial(
-        kit.compared, pairs, settings=settings, named=lambda a, b: f"{a.label} against {b.label}"
+        compared, pairs, settings=settings, named=lambda a, b: f"{a.label} against {b.label}"
     )
     generations = partial(measures.generations_to, threshold=threshold)
-    values = kit.by_column("best_cost"), generations, measures.certified_cost
+    values = by_column("best_cost"), generations, measures.certified_cost
     return MatchedPairs(*map(matched, values))
 
 
@@ -59,8 +64,8 @@ def method_comparisons(matched_pairs: MatchedPairs, threshold: float) -> list[tu
 
 
 def judge_methods(
-    judge: kit.Judge, results: kit.Results, matched_pairs: MatchedPairs, threshold: float
-) -> list[kit.Claim]:
+    judge: Judge, results: Results, matched_pairs: MatchedPairs, threshold: float
+) -> list[Claim]:
     """Judge the claims on methods of co-evolution."""
     judged = {  # measure → the word of the better one, comparisons
         f"a team of cost ≤ {markdown.number(threshold)}": ("earlier", matched_pairs.generations),
@@ -83,9 +88,9 @@ def judge_methods(
     return [*found, judge.on("in_time").every(told, in_time, done, planned)]
 
 
-def conditions_by_radius(results: kit.Results) -> dict[int, list[kit.ConditionResults]]:
+def conditions_by_radius(results: Results) -> dict[int, list[ConditionResults]]:
     """Return collision substeps → conditions by growing radius; nothing if no radius differs."""
-    found: dict[int, list[kit.ConditionResults]] = {}
+    found: dict[int, list[ConditionResults]] = {}
     for c in sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius)):
         found.setdefault(c.planner.collision.collision_substeps, []).append(c)
     several = len({c.planner.collision.tcp_radius for c in results.main}) > 1
@@ -93,26 +98,24 @@ def conditions_by_radius(results: kit.Results) -> dict[int, list[kit.ConditionRe
 
 
 def radius_conditions(
-    conditions_by_radius: dict[int, list[kit.ConditionResults]],
-) -> tuple[kit.ConditionResults, ...]:
+    conditions_by_radius: dict[int, list[ConditionResults]],
+) -> tuple[ConditionResults, ...]:
     """Return these conditions in one row; empty if no radius differs."""
     return tuple(c for conditions in conditions_by_radius.values() for c in conditions)
 
 
 def compared_radii(
-    conditions_by_radius: dict[int, list[kit.ConditionResults]], settings: kit.ReportSettings
+    conditions_by_radius: dict[int, list[ConditionResults]], settings: ReportSettings
 ) -> Rows:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
 
-    def named(largest: kit.ConditionResults, smallest: kit.ConditionResults) -> str:
+    def named(largest: ConditionResults, smallest: ConditionResults) -> str:
         substeps = largest.planner.collision.collision_substeps
         tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
         return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
 
     pairs = [(own[-1], own[0]) for own in conditions_by_radius.values() if len(own) > 1]
-    return kit.compared(
-        pairs, link_motions.tool_distance, settings, lower_is_better=False, named=named
-    )
+    return compared(pairs, link_motions.tool_distance, settings, lower_is_better=False, named=named)
 
 
 def tool_comparisons(compared_radii: Rows) -> list[tuple[str, Rows]]:
@@ -120,20 +123,20 @@ def tool_comparisons(compared_radii: Rows) -> list[tuple[str, Rows]]:
     return [("Largest against smallest radius", compared_radii)] if compared_radii else []
 
 
-def tools(results: kit.Results, compared_radii: Rows) -> list[kit.Quantity]:
+def tools(results: Results, compared_radii: Rows) -> list[Quantity]:
     """Return the row of end-effectors' distances where radii differ."""
     name = f"{KEPT}, its centre line"
-    unit = results.with_data[0].condition.length_unit
-    row = kit.quantity(results, name, unit, link_motions.tool_distance) if compared_radii else None
+    unit = results.with_data[0].length_unit
+    row = quantity(results, name, unit, link_motions.tool_distance) if compared_radii else None
     return [row] if row else []
 
 
-def judge_motions(judge: kit.Judge, results: kit.Results, compared_radii: Rows) -> list[kit.Claim]:
+def judge_motions(judge: Judge, results: Results, compared_radii: Rows) -> list[Claim]:
     """Judge the claims on motions and radii."""
-    found = list[kit.Claim]()
+    found = list[Claim]()
     for c in results.main:
         scene, where = _scene_claim(c)
-        certified = kit.certified(c).having
+        certified = run_measures.certified(c).having
         for who, holds, judged in (
             ("the paper's model", c.solved, c.done),
             ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
@@ -149,7 +152,7 @@ def judge_motions(judge: kit.Judge, results: kit.Results, compared_radii: Rows) 
     return found
 
 
-def _scene_claim(condition: kit.ConditionResults) -> tuple[str, str]:
+def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
     """Return the claim that the paper makes of a scene, and its source."""
     problem = condition.problem(Problem)
     if len(problem.start) > 2:
@@ -163,13 +166,13 @@ def _scene_claim(condition: kit.ConditionResults) -> tuple[str, str]:
     return "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
 
 
-def enveloped(condition: kit.ConditionResults) -> bool:
+def enveloped(condition: ConditionResults) -> bool:
     """Return whether the search tests more of the robots than their lines."""
     collision = condition.planner.collision
     return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
 
 
-def motion_checks(results: kit.Results) -> tuple[tuple[str, str], ...]:
+def motion_checks(results: Results) -> tuple[tuple[str, str], ...]:
     """Return the rows on defects, bodies that stick out, and the length of the chromosome."""
     first = results.with_data[0]
     checks = [measures.rates_check(results, defect) for defect in measures.DEFECTS]
@@ -193,74 +196,49 @@ def crossing(main: Conditions) -> Conditions:
     return (first,) if plain else ()
 
 
-def motion_figure(condition: kit.ConditionResults, radius_conditions: Conditions) -> str:
-    """Return the number of the paper's figure that shows such a motion; empty: none does."""
+def motion_words(condition: ConditionResults, radius_conditions: Conditions) -> dict[str, str]:
+    """Return stems and titles of the figures of a motion, and the beginning of that of angles."""
     problem = condition.problem(Problem)
+    robots = len(problem.start)
+    angles = {"joints_stem": "joints", "joints": "Link"}
     if not problem.moving.all():
-        return "10"
-    return "" if len(problem.start) > 2 or radius_conditions else "8"
+        return {"stem": "fig_10_motion", "title": "Fig. 10: one robot stands still"} | angles
+    if robots > 2 or radius_conditions:
+        return {"stem": "motion", "title": f"Motion of {robots} robots"} | angles
+    angles = {"joints_stem": "fig_9_joints", "joints": "Fig. 9: link"}
+    return {"stem": "fig_8_motion", "title": "Fig. 8: motion of the two robots"} | angles
 
 
-def motion_stem(motion_figure: str) -> str:
-    """Return the stem of the figure of a motion."""
-    return f"fig_{motion_figure}_motion" if motion_figure else "motion"
-
-
-def motion_title(condition: kit.ConditionResults, motion_figure: str) -> str:
-    """Return the title of the figure of a motion."""
-    titles = {"8": "Fig. 8: motion of the two robots", "10": "Fig. 10: one robot stands still"}
-    robots = len(condition.problem(Problem).start)
-    return titles.get(motion_figure, f"Motion of {robots} robots")
-
-
-def joints_stem(motion_figure: str) -> str:
-    """Return the stem of the figure of angles."""
-    return "fig_9_joints" if motion_figure == "8" else "joints"
-
-
-def joints_title(motion_figure: str) -> str:
-    """Return the beginning of the title of the figure of angles."""
-    return "Fig. 9: link" if motion_figure == "8" else "Link"
-
-
-def with_hall(results: kit.Results) -> kit.Results:
+def with_hall(results: Results) -> Results:
     """Return the results of method V under all numbers."""
     treated = (c for c in results.conditions if c.label.partition(", ")[0] == METHOD)
     return results._replace(conditions=tuple(treated))
 
 
-def effort(condition: kit.ConditionResults, settings: kit.ReportSettings) -> FloatArray:
+def effort(condition: ConditionResults, settings: ReportSettings) -> FloatArray:
     """Return the evaluations to a team of the threshold's cost in its own scene, (done,)."""
     threshold = settings.threshold_ratio * measures.lower_bound(condition)
     return measures.evaluations_to(condition, threshold)
 
 
-def assumed_faster(
-    judge: kit.Judge, condition: kit.ConditionResults, results: kit.Results
-) -> kit.Claim:
+def assumed_faster(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
     """Judge method V against method I under the same numbers."""
     hearing = judge.on("faster", who="", measure=EFFORT, pair=f": {METHOD} against {PLAIN}")
     values = partial(effort, settings=judge.settings)
     return hearing.better(_against(judge, results, condition, PLAIN, values), "lower")
 
 
-def assumed_elites(
-    judge: kit.Judge, condition: kit.ConditionResults, results: kit.Results
-) -> kit.Claim:
+def assumed_elites(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
     """Judge method V against elites under the same numbers."""
-    row = _against(judge, results, condition, ELITES, kit.by_column("best_cost"))
+    row = _against(judge, results, condition, ELITES, by_column("best_cost"))
     told = judging.evidence(row, "lower") if row else "nothing to compare"
     hearing = judge.on("hall_beyond_elites", who="", elites=ELITES, measure="best cost")
     return hearing.better_than_all(told, [row] if row else [])
 
 
 def _against(
-    judge: kit.Judge,
-    results: kit.Results,
-    condition: kit.ConditionResults,
-    other: str,
-    values: kit.Values,
-) -> kit.Comparison | None:
+    judge: Judge, results: Results, condition: ConditionResults, other: str, values: Values
+) -> Comparison | None:
     """Compare method V with another treatment under the same numbers.
 
     Numbers of the hall are no numbers of a treatment without one: that is as assumed then.
@@ -271,9 +249,9 @@ def _against(
     return None if twin is None else judge.compared(condition, twin, values)
 
 
-def assumed_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def assumed_free(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that the whole motion is free, under assumed numbers."""
-    certified = kit.certified(condition).having
+    certified = run_measures.certified(condition).having
     judged = condition.done - condition.verdicts.undecided
     hearing = judge.on(
         "free_motion",

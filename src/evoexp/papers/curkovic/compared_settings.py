@@ -9,8 +9,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import measures
-from evoexp.report import kit
-from evoexp.report.kit import markdown, shares
+from evoexp.report.figures import shares
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import comparisons
+from evoexp.report.statistics.comparisons import Comparison, Family, FamilyComparison, Measure
+from evoexp.report.statistics.inference import spread
+from evoexp.report.statistics.judging import Judge
 
 COLLIDES = f"solved motion {measures.REFUTED}"  # says nothing about convergence
 MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
@@ -23,7 +29,7 @@ SHORT = {
 }
 
 
-def families(results: kit.Results) -> tuple[kit.Family, ...]:
+def families(results: Results) -> tuple[Family, ...]:
     """Return the families of a sweep.
 
     Conditions that differ in collision substeps are compared with their twins; if there are none,
@@ -36,50 +42,50 @@ def families(results: kit.Results) -> tuple[kit.Family, ...]:
         firsts = {_without_substeps(c): c for c in reversed(conditions) if _substeps(c) == fewest}
         pairs = ((firsts.get(_without_substeps(c)), c) for c in finer)
         twins = tuple((first, c) for first, c in pairs if first is not None)
-        return (kit.Family("each method, tested at its configurations only,", twins),)
+        return (Family("each method, tested at its configurations only,", twins),)
     found = []
     for reading in dict.fromkeys(c.planner.ga.mutation_direction for c in conditions):
         same = [c for c in conditions if c.planner.ga.mutation_direction == reading]
-        found.append(kit.Family.of(same))
+        found.append(Family.of(same))
     return tuple(found)
 
 
-def curved(results: kit.Results) -> bool:
+def curved(results: Results) -> bool:
     """Return whether any motion is executed as a curve."""
     return any(c.planner.interpolation == "cubic" for c in results.with_data)
 
 
-def sweep_measures(results: kit.Results, threshold: float) -> list[kit.Measure]:
+def sweep_measures(results: Results, threshold: float) -> list[Measure]:
     """Return the quantities that conditions are compared in."""
     to = f"to a team of cost ≤ {markdown.number(threshold)}"
     found = [
-        kit.Measure("best cost", kit.by_column("best_cost")),
-        kit.Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
-        kit.Measure(measures.CERTIFIED, measures.certified_cost),
+        Measure("best cost", comparisons.by_column("best_cost")),
+        Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
+        Measure(measures.CERTIFIED, measures.certified_cost),
     ]
     pairs = [pair for family in families(results) for pair in family.pairs]
     if any(len({c.planner.ga.population_size for c in pair}) > 1 for pair in pairs):
         effort = partial(measures.evaluations_to, threshold=threshold)
-        found.append(kit.Measure(f"evaluations {to}", effort))
+        found.append(Measure(f"evaluations {to}", effort))
     if len({_substeps(c) for c in results.with_data}) > 1 or curved(results):
-        found.append(kit.Measure(COLLIDES, measures.refuted))
+        found.append(Measure(COLLIDES, measures.refuted))
     return found
 
 
-def _substeps(condition: kit.ConditionResults) -> int:
+def _substeps(condition: ConditionResults) -> int:
     return int(condition.planner.collision.collision_substeps)
 
 
-def _without_substeps(condition: kit.ConditionResults) -> str:
+def _without_substeps(condition: ConditionResults) -> str:
     planner: dict[str, Any] = condition.planner.canonical()
     return repr(planner | {"collision": planner["collision"] | {"collision_substeps": None}})
 
 
 def of_sweep(
-    judge: kit.Judge, results: kit.Results, compared: Sequence[kit.FamilyComparison]
-) -> tuple[kit.Claim, ...]:
+    judge: Judge, results: Results, compared: Sequence[FamilyComparison]
+) -> tuple[Claim, ...]:
     """Return the claims that a sweep can judge, chosen by the settings that differ."""
-    claims_of: Callable[[kit.Judge, kit.Results, Sequence[kit.FamilyComparison]], list[kit.Claim]]
+    claims_of: Callable[[Judge, Results, Sequence[FamilyComparison]], list[Claim]]
     varied = _varied(results)
     if varied == {"ga.hall_depth"}:
         claims_of = _depth
@@ -90,12 +96,12 @@ def of_sweep(
     return tuple(claims_of(judge, results, _converging(compared)))
 
 
-def _converging(found: Sequence[kit.FamilyComparison]) -> list[kit.FamilyComparison]:
+def _converging(found: Sequence[FamilyComparison]) -> list[FamilyComparison]:
     """Return the comparisons in quantities that say how fast or how far a method converges."""
     return [one for one in found if one.measure.name != COLLIDES]
 
 
-def _varied(results: kit.Results) -> set[str]:
+def _varied(results: Results) -> set[str]:
     """Return the settings of the planner in which conditions differ, `ga.…` among them."""
     given = [c.planner.canonical() for c in results.with_data]
     flat = [
@@ -104,13 +110,11 @@ def _varied(results: kit.Results) -> set[str]:
     return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
 
 
-def _depth(
-    judge: kit.Judge, results: kit.Results, found: Sequence[kit.FamilyComparison]
-) -> list[kit.Claim]:
+def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
     first, *others = results.with_data
     judged = []
     for one in found:
-        own, *medians = (kit.spread(one.measure.values(c)).median for c in (first, *others))
+        own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
         best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
         evidence = (
             f"median {markdown.number(own)}; best of the others {best.label}: "
@@ -121,9 +125,7 @@ def _depth(
     return judged
 
 
-def _mutation(
-    judge: kit.Judge, results: kit.Results, found: Sequence[kit.FamilyComparison]
-) -> list[kit.Claim]:
+def _mutation(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
     judged = []
     for one in (one for one in found if one.rows):
         first = one.family.pairs[0][0]
@@ -138,9 +140,7 @@ def _mutation(
     return judged
 
 
-def _outcomes(
-    first: kit.ConditionResults, rows: Sequence[kit.Comparison], significance: float
-) -> str:
+def _outcomes(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
     """List the conditions that the first is better than, worse than, or not told from."""
     words = {
         1: "is significantly better than",
@@ -158,19 +158,17 @@ def _outcomes(
     return f"{first.label} {'; '.join(parts)}"
 
 
-def converging_rows(
-    compared: Sequence[kit.FamilyComparison],
-) -> dict[str, tuple[kit.Comparison, ...]]:
+def converging_rows(compared: Sequence[FamilyComparison]) -> dict[str, tuple[Comparison, ...]]:
     """Return the comparisons in how fast or how far a method converges, by quantity."""
-    return kit.rows_by_name(_converging(compared))
+    return comparisons.rows_by_name(_converging(compared))
 
 
-def slowest(condition: kit.ConditionResults) -> float:
+def slowest(condition: ConditionResults) -> float:
     """Return the CPU time of the slowest run [s]."""
     return float(condition.column("cpu_s").max())
 
 
-def rates_table(results: kit.Results, confidence: float) -> pd.DataFrame:
+def rates_table(results: Results, confidence: float) -> pd.DataFrame:
     """Return the shares of solved motions that have a defect; without curves only one varies."""
     shown = list(SHORT)[: None if curved(results) else 1]
     found = [(position, c, measures.rates(c)) for position, c in enumerate(results.with_data)]

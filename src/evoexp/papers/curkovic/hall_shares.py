@@ -9,25 +9,32 @@ import numpy as np
 
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.run_measures import grouped
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import judging
+from evoexp.report.statistics.comparisons import Family, Measure, by_column, compared
+from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, quantile
+from evoexp.report.statistics.judging import Judge
 
 EFFORT = "effort (logarithm)"
-Statistic = Callable[[kit.ConditionResults, np.ndarray], FloatArray]
+Statistic = Callable[[ConditionResults, np.ndarray], FloatArray]
 
 
 class Corner(NamedTuple):
     """A reading of Eq. 9 with a mutation rate, and what may keep good individuals."""
 
     name: str  # "one-sided, Eq. 10"
-    nothing: kit.ConditionResults  # neither hall nor elites
-    elites: tuple[kit.ConditionResults, ...]  # with elites instead of a hall, by growing number
-    hall: kit.ConditionResults  # with a hall of distinct genomes
-    by_index: kit.ConditionResults | None  # with a hall of distinct indices; None: not run
-    others: tuple[kit.ConditionResults, ...]  # other halls: those that forget, or never change
+    nothing: ConditionResults  # neither hall nor elites
+    elites: tuple[ConditionResults, ...]  # with elites instead of a hall, by growing number
+    hall: ConditionResults  # with a hall of distinct genomes
+    by_index: ConditionResults | None  # with a hall of distinct indices; None: not run
+    others: tuple[ConditionResults, ...]  # other halls: those that forget, or never change
 
     @property
-    def halls(self) -> tuple[kit.ConditionResults, ...]:
+    def halls(self) -> tuple[ConditionResults, ...]:
         """The halls that never forget: of distinct genomes, then of distinct indices."""
         return (self.hall,) if self.by_index is None else (self.hall, self.by_index)
 
@@ -38,23 +45,21 @@ class Gain(NamedTuple):
     name: str  # with unit where it has one
     short: str  # the same in a few words
     statistic: Statistic  # (condition, (resamples, runs) numbers of runs) → its value, (resamples,)
-    runs: Callable[[kit.ConditionResults], int]  # the number of runs that count
-    judged: kit.Measure | None = None  # the quantity by which claims are judged; None: by none
+    runs: Callable[[ConditionResults], int]  # the number of runs that count
+    judged: Measure | None = None  # the quantity by which claims are judged; None: by none
 
 
 class Share(NamedTuple):
     """The share of a hall's gain that elites have, too."""
 
     value: float  # (nothing − elites) / (nothing − hall); NaN where the hall gains nothing
-    interval: (
-        kit.Interval
-    )  # over resampled seeds; NaN where the hall's gain cannot be told from none
+    interval: Interval  # over resampled seeds; NaN where the hall's gain cannot be told from none
     n: tuple[int, int, int]  # runs of nothing, elites and hall that count
 
 
-def corners(conditions: Sequence[kit.ConditionResults]) -> tuple[Corner, ...]:
+def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
     """Group conditions that differ in hall and elites only; groups that lack one are left out."""
-    found = kit.grouped(
+    found = grouped(
         conditions,
         lambda c: [
             getattr(c.planner.ga, name)
@@ -67,9 +72,9 @@ def corners(conditions: Sequence[kit.ConditionResults]) -> tuple[Corner, ...]:
 def share(
     corner: Corner,
     measure: Gain,
-    elites: kit.ConditionResults,
-    hall: kit.ConditionResults,
-    settings: kit.ReportSettings,
+    elites: ConditionResults,
+    hall: ConditionResults,
+    settings: ReportSettings,
 ) -> Share:
     """Return the share of a hall's gain that elites have, too.
 
@@ -79,25 +84,25 @@ def share(
     three = (corner.nothing, elites, hall)
     values = [of_all_runs(measure, c) for c in three]
     n = tuple(measure.runs(c) for c in three)
-    rng = np.random.Generator(np.random.PCG64(kit.BOOTSTRAP_SEED))
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     count = min(c.done for c in three)
     draws = rng.integers(0, count, (settings.num_resamples, count))
     nothing, some, full = (measure.statistic(c, draws) for c in three)
     gains = full < nothing
     tail = 0.5 * (1.0 - settings.confidence)
-    interval = kit.Interval(np.nan, np.nan)
+    interval = Interval(np.nan, np.nan)
     if np.mean(~gains) <= tail:
         shares = _shares(nothing[gains], some[gains], full[gains])
-        interval = kit.Interval(kit.quantile(shares, tail), kit.quantile(shares, 1.0 - tail))
+        interval = Interval(quantile(shares, tail), quantile(shares, 1.0 - tail))
     one = np.array(values)[:, None]
     value = float(_shares(*one)[0]) if values[2] < values[0] else np.nan
     return Share(value, interval, (n[0], n[1], n[2]))
 
 
-def medians(column: Callable[[kit.ConditionResults], FloatArray]) -> Statistic:
+def medians(column: Callable[[ConditionResults], FloatArray]) -> Statistic:
     """Return the statistic "median of a column"; NaN is left out, inf is a value."""
 
-    def statistic(condition: kit.ConditionResults, draws: np.ndarray) -> FloatArray:
+    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
         drawn = column(condition)[draws]
         found, known = np.full(len(drawn), np.nan), ~np.isnan(drawn).all(axis=1)
         found[known] = np.nanmedian(drawn[known], axis=1)
@@ -109,7 +114,7 @@ def medians(column: Callable[[kit.ConditionResults], FloatArray]) -> Statistic:
 def log_effort(threshold: float) -> Statistic:
     """Return the statistic "logarithm of the expected running time to a team of that cost"."""
 
-    def statistic(condition: kit.ConditionResults, draws: np.ndarray) -> FloatArray:
+    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
         first = measures.evaluations_to(condition, threshold)
         reached = np.isfinite(first)
         spent = np.where(reached, first, condition.column("evaluations"))
@@ -123,23 +128,23 @@ def log_effort(threshold: float) -> Statistic:
 
 def gain_measures(threshold: float, told: str) -> tuple[Gain, ...]:
     """Return the quantities in which gains are shared out."""
-    best, to = kit.by_column("best_cost"), f"evaluations to a team of cost ≤ {told}"
+    best, to = by_column("best_cost"), f"evaluations to a team of cost ≤ {told}"
     effort = partial(measures.evaluations_to, threshold=threshold)
     return (
-        Gain("best cost", "best cost", medians(best), _done, kit.Measure("best cost", best)),
+        Gain("best cost", "best cost", medians(best), _done, Measure("best cost", best)),
         Gain(
             f"{to} (expected running time)",
             EFFORT,
             log_effort(threshold),
             lambda c: int(np.isfinite(effort(c)).sum()),
-            kit.Measure(to, effort),
+            Measure(to, effort),
         ),
         Gain(
             measures.CERTIFIED,
             "cost, refuted as worst",
             medians(measures.certified_cost),
             _done,
-            kit.Measure(measures.CERTIFIED, measures.certified_cost),
+            Measure(measures.CERTIFIED, measures.certified_cost),
         ),
         Gain(
             "best cost among motions that are not refuted",
@@ -150,17 +155,17 @@ def gain_measures(threshold: float, told: str) -> tuple[Gain, ...]:
     )
 
 
-def _done(condition: kit.ConditionResults) -> int:
+def _done(condition: ConditionResults) -> int:
     return condition.done
 
 
-def not_refuted(condition: kit.ConditionResults) -> FloatArray:
+def not_refuted(condition: ConditionResults) -> FloatArray:
     """Return each run's best cost, (done,); NaN where its motion is refuted."""
     found = measures.certified_cost(condition)
     return np.where(np.isfinite(found), found, np.nan)
 
 
-def _corner(own: Sequence[kit.ConditionResults]) -> Corner | None:
+def _corner(own: Sequence[ConditionResults]) -> Corner | None:
     plain = [c for c in own if not c.planner.ga.hall_depth]
     halls = [c for c in own if c.planner.ga.hall_depth]
     nothing = [c for c in plain if not c.planner.ga.num_elites]
@@ -178,7 +183,7 @@ def _corner(own: Sequence[kit.ConditionResults]) -> Corner | None:
     return Corner(name, nothing[0], tuple(elites), genomes[0], by_index, others)
 
 
-def of_all_runs(measure: Gain, condition: kit.ConditionResults) -> float:
+def of_all_runs(measure: Gain, condition: ConditionResults) -> float:
     """Return a quantity over all runs of a condition."""
     return float(measure.statistic(condition, np.arange(condition.done)[None, :])[0])
 
@@ -195,10 +200,10 @@ def _shares(nothing: FloatArray, some: FloatArray, full: FloatArray) -> FloatArr
 
 
 # (reading and rate, quantity, elites, hall) → how much of the hall's gain elites have, too
-Shares = Callable[[Corner, Gain, kit.ConditionResults, kit.ConditionResults], Share]
+Shares = Callable[[Corner, Gain, ConditionResults, ConditionResults], Share]
 
 
-def has_corners(results: kit.Results) -> bool:
+def has_corners(results: Results) -> bool:
     """Return whether there are all conditions that the question needs."""
     return measures.fits(results) and bool(corners(results.with_data))
 
@@ -208,22 +213,22 @@ def gains(threshold: float) -> tuple[Gain, ...]:
     return gain_measures(threshold, markdown.number(threshold))
 
 
-def judged_gains(gains: tuple[Gain, ...]) -> list[kit.Measure]:
+def judged_gains(gains: tuple[Gain, ...]) -> list[Measure]:
     """Return the quantities by which claims are judged."""
     return [gain.judged for gain in gains if gain.judged is not None]
 
 
-def hall_shares(settings: kit.ReportSettings) -> Shares:
+def hall_shares(settings: ReportSettings) -> Shares:
     """Return the function that gives shares, each computed once."""
     return cache(partial(share, settings=settings))
 
 
-def corner_families(corners: Sequence[Corner]) -> list[kit.Family]:
+def corner_families(corners: Sequence[Corner]) -> list[Family]:
     """Return the hall of distinct genomes against all else of a reading and rate."""
-    return [kit.Family.of((c.hall, c.nothing, *c.elites, *c.halls[1:], *c.others)) for c in corners]
+    return [Family.of((c.hall, c.nothing, *c.elites, *c.halls[1:], *c.others)) for c in corners]
 
 
-def _value(gain: Gain, condition: kit.ConditionResults) -> str:
+def _value(gain: Gain, condition: ConditionResults) -> str:
     found = of_all_runs(gain, condition)
     return markdown.number(float(np.rint(np.exp(found))) if gain.short == EFFORT else found)
 
@@ -259,17 +264,17 @@ def elitism_rows(
             yield corner.name, gain.name, kept, *values, *map(told_share, found), counts
 
 
-def short_label(elites: kit.ConditionResults) -> str:
+def short_label(elites: ConditionResults) -> str:
     """Return the part of a label that names the elites."""
     return elites.label.rpartition(", ")[2]
 
 
-def _of_corner(judge: kit.Judge, corner: Corner, gain: Gain, shares: Shares) -> list[kit.Claim]:
+def _of_corner(judge: Judge, corner: Corner, gain: Gain, shares: Shares) -> list[Claim]:
     """Return the claims on one reading of Eq. 9 and one rate, judged by one quantity."""
     assert gain.judged is not None
     name, values, *_ = gain.judged
     who, hall = f"{corner.name}: ", corner.hall
-    over_elites = kit.compared([(hall, c) for c in corner.elites], values, judge.settings)
+    over_elites = compared([(hall, c) for c in corner.elites], values, judge.settings)
     told = "; ".join(
         f"against {row.quantity} {judging.evidence(row, 'lower')}" for row in over_elites
     )
@@ -290,8 +295,8 @@ def _of_corner(judge: kit.Judge, corner: Corner, gain: Gain, shares: Shares) -> 
 
 
 def hall_claims(
-    judge: kit.Judge, corners: Sequence[Corner], gains: Sequence[Gain], hall_shares: Shares
-) -> list[kit.Claim]:
+    judge: Judge, corners: Sequence[Corner], gains: Sequence[Gain], hall_shares: Shares
+) -> list[Claim]:
     """Judge the claims on the hall, quantity by quantity."""
     return [
         claim

@@ -10,7 +10,8 @@ from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, motion_geometry, wrapped
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults, wrapped
 
 TOOL_SAMPLES = 20  # per segment, where end-effectors' distances from other robots are measured
 

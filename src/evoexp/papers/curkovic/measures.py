@@ -5,8 +5,12 @@ import numpy as np
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import markdown
+from evoexp.report.pages import markdown
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.run_measures import counted, search_seconds, solved
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import inference
+from evoexp.report.statistics.inference import Proportion, quantile
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 REFUTED = "collides between its configurations (exact verdict)"
@@ -17,13 +21,13 @@ CERTIFIED = "best cost, a refuted motion counting as worse than any"
 BOUND = "Lower bound of a team's cost: straight end-effector paths, least turns of the links"
 
 
-def fits(results: kit.Results) -> bool:
+def fits(results: Results) -> bool:
     """Return whether there are results, and all of co-evolving robots."""
     problems = [c.prepared.problem for c in results.with_data]
     return bool(problems) and all(isinstance(problem, Problem) for problem in problems)
 
 
-def lower_bound(condition: kit.ConditionResults) -> float:
+def lower_bound(condition: ConditionResults) -> float:
     """Return a lower bound of a team's cost: straight paths, least turns, no unevenness."""
     problem, objective = condition.problem(Problem), condition.planner.objective
     arms, total = link_motions.arms(condition.prepared), 0.0
@@ -35,94 +39,91 @@ def lower_bound(condition: kit.ConditionResults) -> float:
     return total
 
 
-def generations_to(condition: kit.ConditionResults, threshold: float) -> FloatArray:
+def generations_to(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return each run's first generation with a team at or below a cost, (done,); inf: none."""
     return _first(condition, threshold, "index")
 
 
-def evaluations_to(condition: kit.ConditionResults, threshold: float) -> FloatArray:
+def evaluations_to(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return each run's evaluations to a team at or below a cost, (done,); inf: none."""
     return _first(condition, threshold, "evaluations")
 
 
-def expected_evaluations(condition: kit.ConditionResults, threshold: float) -> float:
+def expected_evaluations(condition: ConditionResults, threshold: float) -> float:
     """Return the expected running time to a team at or below a cost, in evaluations."""
     first = evaluations_to(condition, threshold)
     reached = np.isfinite(first)
-    return kit.expected_effort(np.where(reached, first, condition.column("evaluations")), reached)
+    return inference.expected_effort(
+        np.where(reached, first, condition.column("evaluations")), reached
+    )
 
 
-def expected_seconds(condition: kit.ConditionResults, threshold: float) -> float:
+def expected_seconds(condition: ConditionResults, threshold: float) -> float:
     """Return the expected running time in seconds, at the median run's price of an evaluation."""
-    price = kit.quantile(kit.search_seconds(condition) / condition.column("evaluations"), 0.5)
+    price = quantile(search_seconds(condition) / condition.column("evaluations"), 0.5)
     return expected_evaluations(condition, threshold) * price
 
 
-def expected_effort(condition: kit.ConditionResults, threshold: float) -> FloatArray:
+def expected_effort(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return the expected running time to a cost in whole evaluations, (1,)."""
     return np.rint([expected_evaluations(condition, threshold)])
 
 
-def expected_time(condition: kit.ConditionResults, threshold: float) -> FloatArray:
+def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return the expected running time to a cost, (1,) [s]."""
     return np.array([expected_seconds(condition, threshold)])
 
 
-def bound(first: kit.ConditionResults) -> float:
+def bound(first: ConditionResults) -> float:
     """Return the lower bound of a team's cost in the first condition's scene."""
     return lower_bound(first)
 
 
-def threshold(bound: float, settings: kit.ReportSettings) -> float:
+def threshold(bound: float, settings: ReportSettings) -> float:
     """Return the cost that effort is measured to."""
     return settings.threshold_ratio * bound
 
 
-def several(results: kit.Results) -> bool:
+def several(results: Results) -> bool:
     """Return whether there are several conditions of co-evolving robots to compare."""
     return fits(results) and len(results.with_data) > 1
 
 
-def one_scene(results: kit.Results) -> bool:
+def one_scene(results: Results) -> bool:
     """Return whether all conditions share robots and scene."""
-    return len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
+    return len({(c.robot, c.scenario) for c in results.with_data}) == 1
 
 
-def several_scenes(one_scene: bool) -> bool:
-    """Return whether conditions differ in robots or scene."""
-    return not one_scene
-
-
-def free_at_first(condition: kit.ConditionResults) -> int:
+def free_at_first(condition: ConditionResults) -> int:
     """Count the runs whose first generation holds a collision-free team."""
     return int((condition.column("first_feasible_generation") == 0).sum())
 
 
-def method_defects(results: kit.Results) -> list[tuple[str, str]]:
+def method_defects(results: Results) -> list[tuple[str, str]]:
     """Return the rows on the defects that straight motions can have."""
     return [rates_check(results, defect) for defect in (REFUTED, TOO_FAST)]
 
 
-def all_defects(results: kit.Results) -> list[tuple[str, str]]:
+def all_defects(results: Results) -> list[tuple[str, str]]:
     """Return the rows on all known defects."""
     return [rates_check(results, defect) for defect in DEFECTS]
 
 
-def refuted(condition: kit.ConditionResults) -> FloatArray:
+def refuted(condition: ConditionResults) -> FloatArray:
     """Return 1 for each run whose solved motion the exact verdict refutes, else 0, (done,).
 
     NaN where nothing is solved.
     """
     found = condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=np.float64)
-    return np.where(kit.solved(condition), found, np.nan)
+    return np.where(solved(condition), found, np.nan)
 
 
-def certified_cost(condition: kit.ConditionResults) -> FloatArray:
+def certified_cost(condition: ConditionResults) -> FloatArray:
     """Return each run's best cost, (done,); inf where the exact verdict refutes its motion."""
     return np.where(refuted(condition) == 1.0, np.inf, condition.column("best_cost"))
 
 
-def exemplar(condition: kit.ConditionResults) -> int:
+def exemplar(condition: ConditionResults) -> int:
     """Return the replicate of lowest cost that is not refuted; if all are, of lowest cost."""
     costs = certified_cost(condition)
     if not np.isfinite(costs).any():
@@ -130,7 +131,7 @@ def exemplar(condition: kit.ConditionResults) -> int:
     return int(condition.summaries.index[int(np.argmin(costs))])
 
 
-def rates(condition: kit.ConditionResults) -> dict[str, kit.Proportion]:
+def rates(condition: ConditionResults) -> dict[str, Proportion]:
     """Count the solved motions that have each of the known defects."""
     columns = [str(name) for name in condition.summaries if "term_out_of_range" in str(name)]
     beyond = [np.zeros(condition.done), *(condition.column(name) for name in columns)]
@@ -139,24 +140,24 @@ def rates(condition: kit.ConditionResults) -> dict[str, kit.Proportion]:
         LEAVES: np.max(beyond, axis=0) > ROUNDING,
         TOO_FAST: times_over_limit(condition) > 1.0,
     }
-    return {name: kit.counted(has[kit.solved(condition)]) for name, has in found.items()}
+    return {name: counted(has[solved(condition)]) for name, has in found.items()}
 
 
-def times_over_limit(condition: kit.ConditionResults) -> FloatArray:
+def times_over_limit(condition: ConditionResults) -> FloatArray:
     """Return each run's greatest speed of a link over its limit by Eq. 2, (done,) [-]."""
     prepared = condition.prepared
     solutions = [condition.solutions[int(k)] for k in condition.summaries.index]
     return np.array([link_motions.times_over_limit(prepared, solution) for solution in solutions])
 
 
-def rates_check(results: kit.Results, defect: str) -> tuple[str, str]:
+def rates_check(results: Results, defect: str) -> tuple[str, str]:
     """Return a check of one defect in all conditions: "I: 9 of 20; II: …"."""
     found = ((c.label, rates(c)[defect]) for c in results.with_data)
     told = "; ".join(f"{label}: {markdown.share(*rate)}" for label, rate in found)
     return f"Solved motions that fail: {defect}", told
 
 
-def _first(condition: kit.ConditionResults, threshold: float, column: str) -> FloatArray:
+def _first(condition: ConditionResults, threshold: float, column: str) -> FloatArray:
     rows = condition.generations
     first = rows[rows["best_cost"] <= threshold].groupby("replicate")[column].min()
     return first.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)

@@ -8,11 +8,17 @@ import numpy as np
 
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.report import kit
-from evoexp.report.kit import markdown
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results import run_measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import inference, judging
+from evoexp.report.statistics.comparisons import Values, by_column, compared
+from evoexp.report.statistics.inference import Proportion
+from evoexp.report.statistics.judging import Judge, fisher_evidence
 
-Group = tuple[kit.ConditionResults, ...]
-Counts = Callable[[kit.ConditionResults], RefutedMotions]
+Group = tuple[ConditionResults, ...]
+Counts = Callable[[ConditionResults], RefutedMotions]
 ELSEWHERE = (
     ("more_solutions", {"who": "", "control": ""}),
     ("precision", {"where": ", with more generations"}),
@@ -20,7 +26,7 @@ ELSEWHERE = (
 )
 
 
-def percentages(judge: kit.Judge, conditions: Sequence[kit.ConditionResults]) -> list[kit.Claim]:
+def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Claim]:
     """Judge the percentages printed for arms of so many joints, as one family of tests.
 
     Both percentages are samples: a printed one is contradicted where Fisher's exact test, adjusted
@@ -28,7 +34,7 @@ def percentages(judge: kit.Judge, conditions: Sequence[kit.ConditionResults]) ->
     """
     pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
     shares = [(measures.below(c, printed.bound), printed.proportion) for c, printed in pairs]
-    p_values = kit.holm([kit.fisher_exact(own, theirs) for own, theirs in shares])
+    p_values = inference.holm([inference.fisher_exact(own, theirs) for own, theirs in shares])
     # Bonferroni: all intervals together have the level
     level, each = judge.level, 1.0 - (1.0 - judge.level) / max(1, len(pairs))
     claims = []
@@ -47,21 +53,21 @@ def percentages(judge: kit.Judge, conditions: Sequence[kit.ConditionResults]) ->
     return claims
 
 
-def first_percentage(judge: kit.Judge, condition: kit.ConditionResults, main: Group) -> kit.Claim:
+def first_percentage(judge: Judge, condition: ConditionResults, main: Group) -> Claim:
     """Judge the percentage that is printed for errors below 1, the least bound.
 
     The percentages of the other arm, as assumed, belong to the same family of tests, so that the
     verdict as assumed is that of the experiment itself.
     """
     # number of joints → the condition as assumed, which is the first one of the arm
-    assumed = {kit.num_joints(c): c for c in reversed(main)}
-    others = [c for joints, c in assumed.items() if joints != kit.num_joints(condition)]
+    assumed = {run_measures.num_joints(c): c for c in reversed(main)}
+    others = [c for joints, c in assumed.items() if joints != run_measures.num_joints(condition)]
     return percentages(judge, [condition, *others])[0]
 
 
-def _difference(own: kit.Proportion, theirs: kit.Proportion, level: float) -> str:
+def _difference(own: Proportion, theirs: Proportion, level: float) -> str:
     """Return how many points more our share has than the paper's, with its interval."""
-    low, high = kit.newcombe(own, theirs, level)
+    low, high = inference.newcombe(own, theirs, level)
     points = (
         f"ours − printed {100 * (own.share - theirs.share):+.1f} "
         f"[{100 * low:+.1f}, {100 * high:+.1f}] points"
@@ -69,19 +75,17 @@ def _difference(own: kit.Proportion, theirs: kit.Proportion, level: float) -> st
     return f"{points} (Newcombe's {100 * level:g} % interval)"
 
 
-def more_joints_are_better(
-    judge: kit.Judge, conditions: Sequence[kit.ConditionResults]
-) -> Iterator[kit.Claim]:
+def more_joints_are_better(judge: Judge, conditions: Sequence[ConditionResults]) -> Iterator[Claim]:
     """Judge that the arm of ten joints does better than that of seven, where both were run."""
-    by_joints = {kit.num_joints(c): c for c in conditions}
+    by_joints = {run_measures.num_joints(c): c for c in conditions}
     for bound in measures.BOUNDS if {7, 10} <= set(by_joints) else ():
         ten, seven = (measures.below(by_joints[joints], bound) for joints in (10, 7))
         told = " against ".join(judge.share(share, 1) for share in (ten, seven))
-        evidence = f"{told}; {kit.fisher_evidence(ten, seven)}, two-sided"
+        evidence = f"{told}; {fisher_evidence(ten, seven)}, two-sided"
         yield judge.on("longer_arm", bound=f"{bound:g}").greater(evidence, ten, seven)
 
 
-def no_start_needed(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim | None:
+def no_start_needed(judge: Judge, condition: ConditionResults) -> Claim | None:
     """Judge that random populations are a good enough start; None where the paper prints no share.
 
     The paper's own runs do not all end with a solution. An error of 2 or more is none (the
@@ -91,9 +95,9 @@ def no_start_needed(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Cl
     printed = [one for one in measures.printed(condition) if one.bound == max(measures.BOUNDS)]
     if not printed:
         return None
-    own, theirs = kit.success(condition), printed[0].proportion
+    own, theirs = run_measures.success(condition), printed[0].proportion
     hearing = judge.on("no_start", who=condition.label)
-    low, high = kit.newcombe(own, theirs, judge.level)
+    low, high = inference.newcombe(own, theirs, judge.level)
     margin = -0.01 * hearing.rule.limits["margin"]
     holds = None if low <= margin <= high else low > margin
     evidence = (
@@ -103,17 +107,17 @@ def no_start_needed(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Cl
     return hearing.own(evidence, f"{own.total} and {theirs.total}", holds)
 
 
-def free_of_collision(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def free_of_collision(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that accepted motions touch nothing."""
-    refuted = kit.counted(measures.touches(condition)[kit.solved(condition)])
-    free = kit.certified(condition).having
+    refuted = run_measures.counted(measures.touches(condition)[run_measures.solved(condition)])
+    free = run_measures.certified(condition).having
     planned = condition.planned if condition.solved == condition.done else 0
     evidence = f"{markdown.share(free, refuted.total)} certified; refuted {judge.share(refuted, 1)}"
     hearing = judge.on("free_of_collision", who=condition.label)
     return hearing.every(evidence, free, refuted.total, planned)
 
 
-def judged_elsewhere(judge: kit.Judge) -> list[kit.Claim]:
+def judged_elsewhere(judge: Judge) -> list[Claim]:
     """Return the claims that need controls or a sweep, not judged."""
     told = "judged by `evoexp run experiment={}`"
     return [
@@ -122,7 +126,7 @@ def judged_elsewhere(judge: kit.Judge) -> list[kit.Claim]:
     ]
 
 
-def judge_controls(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge every condition against the best of its controls, in solutions and in effort.
 
     Controls draw uniformly where the algorithm evolves: sub-path by sub-path under the same loop,
@@ -133,30 +137,35 @@ def judge_controls(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim
         for own in results.with_data
         if not own.is_control and (controls := _controls(results, own))
     ]
-    p_values = kit.holm(
-        [kit.fisher_exact(kit.success(own), kit.success(control)) for own, control in pairs]
+    p_values = inference.holm(
+        [
+            inference.fisher_exact(run_measures.success(own), run_measures.success(control))
+            for own, control in pairs
+        ]
     )
     for (own, control), p_adjusted in zip(pairs, p_values, strict=True):
         yield more_solutions(judge, own, control, p_adjusted)
         yield _less_effort(judge, own, control)
 
 
-def best_control(controls: Sequence[kit.ConditionResults]) -> kit.ConditionResults:
+def best_control(controls: Sequence[ConditionResults]) -> ConditionResults:
     """Return the control that solves most; of equal ones that of the least expected effort."""
 
-    def order(control: kit.ConditionResults) -> tuple[float, float]:
-        expected = kit.expected_effort(control.column("evaluations"), kit.solved(control))
-        return -kit.success(control).share, expected
+    def order(control: ConditionResults) -> tuple[float, float]:
+        expected = inference.expected_effort(
+            control.column("evaluations"), run_measures.solved(control)
+        )
+        return -run_measures.success(control).share, expected
 
     return min(controls, key=order)
 
 
 def more_solutions(
-    judge: kit.Judge, own: kit.ConditionResults, control: kit.ConditionResults, p_adjusted: float
-) -> kit.Claim:
+    judge: Judge, own: ConditionResults, control: ConditionResults, p_adjusted: float
+) -> Claim:
     """Judge that the algorithm finds more solutions than a control."""
-    one, two = kit.success(own), kit.success(control)
-    low, high = kit.newcombe(one, two, judge.level)
+    one, two = run_measures.success(own), run_measures.success(control)
+    low, high = inference.newcombe(one, two, judge.level)
     within = judge.share(solved_within(own, control), 1)
     evidence = (
         f"runs with a solution: {judge.share(one, 1)} against {judge.share(two, 1)} "
@@ -169,13 +178,11 @@ def more_solutions(
     return hearing.greater(evidence, one, two, p_adjusted)
 
 
-def _less_effort(
-    judge: kit.Judge, own: kit.ConditionResults, control: kit.ConditionResults
-) -> kit.Claim:
+def _less_effort(judge: Judge, own: ConditionResults, control: ConditionResults) -> Claim:
     """Judge that the algorithm takes fewer evaluations per solution than a control."""
-    first, second = kit.on_common_seeds(own, control, kit.by_column("evaluations"))
-    expected = [kit.expected_effort(*each) for each in (first, second)]
-    low, high = kit.effort_ratio(first, second, judge.level, judge.settings.num_resamples)
+    first, second = run_measures.on_common_seeds(own, control, by_column("evaluations"))
+    expected = [inference.expected_effort(*each) for each in (first, second)]
+    low, high = inference.effort_ratio(first, second, judge.level, judge.settings.num_resamples)
     ratio = expected[0] / expected[1] if np.isfinite(expected[0]) else np.inf
     told = " against ".join(f"{value:.0f}" for value in expected).replace("inf", "∞")
     evidence = (
@@ -187,65 +194,63 @@ def _less_effort(
     return hearing.own(evidence, f"{len(first[0])} pairs", holds)
 
 
-def solved_within(own: kit.ConditionResults, control: kit.ConditionResults) -> kit.Proportion:
+def solved_within(own: ConditionResults, control: ConditionResults) -> Proportion:
     """Count the control's runs that are solved within the algorithm's median effort.
 
     The effort of a run of the algorithm without a solution is infinite.
     """
     most = np.median(measures.effort(own))
-    return kit.counted(kit.solved(control) & (measures.effort(control) <= most))
+    return run_measures.counted(run_measures.solved(control) & (measures.effort(control) <= most))
 
 
-def _controls(results: kit.Results, own: kit.ConditionResults) -> list[kit.ConditionResults]:
+def _controls(results: Results, own: ConditionResults) -> list[ConditionResults]:
     """Return the controls that stand beside this very planner in the same scene."""
-    same = own.condition.robot, own.condition.scenario, own.planner
+    same = own.robot, own.scenario, own.planner
     return [
-        c
-        for c in results.with_data
-        if c.is_control and (c.condition.robot, c.condition.scenario, c.planner) == same
+        c for c in results.with_data if c.is_control and (c.robot, c.scenario, c.planner) == same
     ]
 
 
-def groups_but_for(results: kit.Results, *path: str) -> list[Group]:
+def groups_but_for(results: Results, *path: str) -> list[Group]:
     """Return groups of conditions, without controls, that agree in all settings but one.
 
     The names of the path lead to it: "ga", "num_generations".
     """
 
-    def key(condition: kit.ConditionResults) -> tuple[Any, ...]:
+    def key(condition: ConditionResults) -> tuple[Any, ...]:
         part = planner = condition.planner.canonical()
         for name in path[:-1]:
             part[name] = part = dict(part[name])
         part.pop(path[-1], None)
-        scene = condition.condition.robot, condition.condition.scenario
+        scene = condition.robot, condition.scenario
         return *(one.canonical() for one in scene), planner
 
-    return [group for group in kit.grouped(results.main, key) if len(group) > 1]
+    return [group for group in run_measures.grouped(results.main, key) if len(group) > 1]
 
 
-def either_success(judge: kit.Judge, results: kit.Results) -> list[kit.Claim]:
+def either_success(judge: Judge, results: Results) -> list[Claim]:
     """Judge the printed percentages by either reading of a success, each a family of tests."""
-    by_reading: dict[str, list[kit.ConditionResults]] = {}
+    by_reading: dict[str, list[ConditionResults]] = {}
     for condition in itertools.chain(*groups_but_for(results, "success")):
         by_reading.setdefault(condition.planner.success, []).append(condition)
     families = (percentages(judge, own) for own in by_reading.values())
     return list(itertools.chain(*families))
 
 
-def precision(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+def precision(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge that smaller stopping values give smaller errors, step by step."""
     for group in groups_but_for(results, "stop_cost_sp2"):
         own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
         steps = [(small, large) for large, small in itertools.pairwise(own)]
-        rows = kit.compared(steps, measures.errors, judge.settings, named=_against)
+        rows = compared(steps, measures.errors, judge.settings, named=_against)
         medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)
-        told = "; ".join(f"{row.quantity}: {kit.evidence(row, 'smaller')}" for row in rows)
+        told = "; ".join(f"{row.quantity}: {judging.evidence(row, 'smaller')}" for row in rows)
         where = f": at most {own[0].planner.ga.num_generations} generations"
         told = f"median errors: {', '.join(medians)}; step by step: {told}"
         yield judge.on("precision", where=where).better_than_all(told, rows)
 
 
-def generations(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+def generations(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge that more generations are needed at the smallest stopping value."""
     least = min(c.planner.stop_cost_sp2 for c in results.main)
     for group in groups_but_for(results, "ga", "num_generations"):
@@ -254,17 +259,17 @@ def generations(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
             continue
         attempts = (f"{c.column('term_attempts').mean():.2f}" for c in (many, few))
         spent = (_median(c, measures.effort) for c in (many, few))
-        one, two = kit.success(many), kit.success(few)
+        one, two = run_measures.success(many), run_measures.success(few)
         told = (
             f"runs with a solution: {judge.share(one, 1)} with at most "
             f"{many.planner.ga.num_generations} generations, {judge.share(two, 1)} "
-            f"with {few.planner.ga.num_generations}; {kit.fisher_evidence(one, two)}; mean "
+            f"with {few.planner.ga.num_generations}; {fisher_evidence(one, two)}; mean "
             f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
         )
         yield judge.on("generations", least=f"{least:g}").greater(told, one, two)
 
 
-def coding(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
+def coding(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge real against binary coding."""
     for group in groups_but_for(results, "ga"):
         coded = {c.planner.ga.component: c for c in group}
@@ -281,7 +286,7 @@ def coding(judge: kit.Judge, results: kit.Results) -> Iterator[kit.Claim]:
             yield judge.on("coding", where=where).better(row, word, told)
 
 
-def blindness(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterator[kit.Claim]:
+def blindness(judge: Judge, results: Results, refuted: Counts) -> Iterator[Claim]:
     """Judge that the scene is not trivial: an arm that ignores obstacles meets them."""
     for group in groups_but_for(results, "collision", "blind"):
         seeing, blind = sorted(group, key=lambda c: bool(c.planner.collision.blind))
@@ -290,7 +295,7 @@ def blindness(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterat
         yield hearing.greater(_shares(judge, one, two), one, two)
 
 
-def positions(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterator[kit.Claim]:
+def positions(judge: Judge, results: Results, refuted: Counts) -> Iterator[Claim]:
     """Judge that chords, and more positions with chords, leave fewer contacts between positions."""
     pairs: list[Group] = []  # (coarse, fine)
     least = min(int(c.planner.collision.num_positions) for c in results.main)
@@ -304,7 +309,7 @@ def positions(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterat
             pairs += [(coarse, fine) for fine in finer]
     # contacts of either condition, and the tests of all pairs as one family
     counts = [tuple(refuted(c).anywhere for c in pair) for pair in pairs]
-    p_values = kit.holm([kit.fisher_exact(one, two) for one, two in counts])
+    p_values = inference.holm([inference.fisher_exact(one, two) for one, two in counts])
     for (coarse, fine), (one, two), p in zip(pairs, counts, p_values, strict=True):
         told = f"{_shares(judge, two, one)}; adjusted (Holm) {markdown.p_value(p)}"
         yield judge.on("fewer_contacts", who=_against(fine, coarse)).greater(told, one, two, p)
@@ -317,15 +322,15 @@ def positions(judge: kit.Judge, results: kit.Results, refuted: Counts) -> Iterat
             yield hearing.every(told, *runs)
 
 
-def _against(one: kit.ConditionResults, two: kit.ConditionResults) -> str:
+def _against(one: ConditionResults, two: ConditionResults) -> str:
     return f"{one.label} against {two.label}"
 
 
-def _median(condition: kit.ConditionResults, values: kit.Values) -> str:
+def _median(condition: ConditionResults, values: Values) -> str:
     value = float(np.median(values(condition)))
     return markdown.number(float(round(value)) if 1e3 < value < np.inf else value)
 
 
-def _shares(judge: kit.Judge, one: kit.Proportion, two: kit.Proportion) -> str:
+def _shares(judge: Judge, one: Proportion, two: Proportion) -> str:
     shares = " against ".join(judge.share(proportion, 1) for proportion in (one, two))
-    return f"{shares}; {kit.fisher_evidence(one, two)}"
+    return f"{shares}; {fisher_evidence(one, two)}"

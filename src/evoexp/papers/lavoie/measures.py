@@ -1,7 +1,7 @@
 """Measures of Lavoie & Boudreau 2001 that several pages share: errors, effort, refuted motions."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import motion_geometry
+from evoexp.report.results import motion_geometry, run_measures
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Family, by_column
+from evoexp.report.statistics.inference import Proportion, newcombe
 
 PRINTED_RUNS = 1000  # section 5: "a thousand experiments were conducted for each simulation"
 Contact = tuple[float, str]
@@ -19,8 +21,8 @@ Contact = tuple[float, str]
 
 
 # position error at the end of SP2, (done,) [length unit], and evaluations; inf: no solution
-errors = kit.where_solved(kit.by_column("term_position_error_sp2"))
-effort = kit.where_solved(kit.by_column("evaluations"))
+errors = run_measures.where_solved(by_column("term_position_error_sp2"))
+effort = run_measures.where_solved(by_column("evaluations"))
 BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
@@ -32,9 +34,9 @@ class Percentage(NamedTuple):
     having: int  # number of the thousand runs with a smaller error
 
     @property
-    def proportion(self) -> kit.Proportion:
+    def proportion(self) -> Proportion:
         """Proportion of the paper's own runs, which are a sample, too."""
-        return kit.Proportion(self.having, PRINTED_RUNS)
+        return Proportion(self.having, PRINTED_RUNS)
 
 
 PRINTED = (
@@ -45,48 +47,50 @@ PRINTED = (
 )
 
 
-def fits(results: kit.Results) -> bool:
+def fits(results: Results) -> bool:
     """Return whether there are results, all of arms that go by a via point into a box."""
-    return kit.planned_by(results, RedundantGa)
+    return run_measures.planned_by(results, RedundantGa)
 
 
-def is_sweep(results: kit.Results) -> bool:
+def is_sweep(results: Results) -> bool:
     """Return whether there are several such conditions to compare."""
     return fits(results) and len(results.with_data) > 1
 
 
-def arms(results: kit.Results) -> tuple[kit.Family, ...]:
+def arms(results: Results) -> tuple[Family, ...]:
     """Return the first condition of each arm against its others; arms differ in joints."""
-    return tuple(map(kit.Family.of, kit.grouped(results.with_data, kit.num_joints)))
+    return tuple(map(Family.of, run_measures.grouped(results.with_data, run_measures.num_joints)))
 
 
-def printed(condition: kit.ConditionResults) -> list[Percentage]:
+def printed(condition: ConditionResults) -> list[Percentage]:
     """Return the percentages that the paper prints for an arm of so many joints."""
-    return [one for one in PRINTED if one.joints == kit.num_joints(condition)]
+    return [one for one in PRINTED if one.joints == run_measures.num_joints(condition)]
 
 
-def printed_points(condition: kit.ConditionResults) -> list[tuple[float, kit.Proportion]]:
+def printed_points(condition: ConditionResults) -> list[tuple[float, Proportion]]:
     """Return (bound, share) of the percentages that the paper prints for the arm."""
     return [(one.bound, one.proportion) for one in printed(condition)]
 
 
-def below(condition: kit.ConditionResults, bound: float) -> kit.Proportion:
+def below(condition: ConditionResults, bound: float) -> Proportion:
     """Count the runs that have a solution with a position error below a bound."""
-    return kit.counted(errors(condition) < bound)
+    return run_measures.counted(errors(condition) < bound)
 
 
-def tests_per_second(condition: kit.ConditionResults) -> FloatArray:
+def tests_per_second(condition: ConditionResults) -> FloatArray:
     """Return the tests of a link against an ellipse per second of each search, (done,) [1/s].
 
     They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
     Chords are not counted.
     """
-    scenario: Any = condition.condition.scenario
-    pairs = kit.num_joints(condition) * len(scenario.obstacles)
-    return np.asarray(pairs * condition.column("collision_queries") / kit.search_seconds(condition))
+    scenario = condition.scenario
+    pairs = run_measures.num_joints(condition) * len(scenario.obstacles)
+    return np.asarray(
+        pairs * condition.column("collision_queries") / run_measures.search_seconds(condition)
+    )
 
 
-def contacts(condition: kit.ConditionResults, replicate: int, verdict: Contact) -> list[Contact]:
+def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> list[Contact]:
     """Return the first contacts on both sub-paths, as far as there are any.
 
     A verdict names the first contact of the whole motion only; if that is on SP1, the planner's
@@ -101,12 +105,12 @@ def contacts(condition: kit.ConditionResults, replicate: int, verdict: Contact) 
     return [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
 
 
-def touches(condition: kit.ConditionResults) -> np.ndarray:
+def touches(condition: ConditionResults) -> np.ndarray:
     """Return whether the exact verdict refutes each run's motion, (done,)."""
     return condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=bool)
 
 
-def refuted_paths(condition: kit.ConditionResults) -> np.ndarray:
+def refuted_paths(condition: ConditionResults) -> np.ndarray:
     """Return which sub-paths of each run's motion the exact verdict refutes, (done, 2)."""
     refuted = np.zeros((condition.done, 2), dtype=bool)
     for replicate, verdict in motion_geometry.refuted(condition).items():
@@ -119,25 +123,27 @@ def refuted_paths(condition: kit.ConditionResults) -> np.ndarray:
 class RefutedMotions(NamedTuple):
     """Counts of a condition's accepted motions that touch an obstacle."""
 
-    anywhere: kit.Proportion  # motions that touch on either sub-path, of all solved runs
-    sp1: kit.Proportion  # motions that touch on the first sub-path
-    sp2: kit.Proportion  # motions that touch on the second one
+    anywhere: Proportion  # motions that touch on either sub-path, of all solved runs
+    sp1: Proportion  # motions that touch on the first sub-path
+    sp2: Proportion  # motions that touch on the second one
 
 
-def refuted(condition: kit.ConditionResults) -> RefutedMotions:
+def refuted(condition: ConditionResults) -> RefutedMotions:
     """Count the solved runs whose motion the exact verdict refutes, by sub-path."""
-    paths = refuted_paths(condition)[kit.solved(condition)]
-    return RefutedMotions(kit.counted(paths.any(axis=1)), *map(kit.counted, paths.T))
+    paths = refuted_paths(condition)[run_measures.solved(condition)]
+    return RefutedMotions(
+        run_measures.counted(paths.any(axis=1)), *map(run_measures.counted, paths.T)
+    )
 
 
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
 
 
-def told_shares(condition: kit.ConditionResults, confidence: float) -> str:
+def told_shares(condition: ConditionResults, confidence: float) -> str:
     """Return the shares of a condition's runs in words, and its mean attempts."""
     own = refuted(condition)
     shares = {
-        "with a solution": kit.success(condition),
+        "with a solution": run_measures.success(condition),
         f"error below {BOUND:g}": below(condition, BOUND),
         "accepted and in contact": own.anywhere,
         "on SP1": own.sp1,
@@ -149,7 +155,7 @@ def told_shares(condition: kit.ConditionResults, confidence: float) -> str:
     return "; ".join(texts)
 
 
-def weak_evidence(results: kit.Results, confidence: float) -> Iterator[tuple[str, str]]:
+def weak_evidence(results: Results, confidence: float) -> Iterator[tuple[str, str]]:
     """Count the settings of each arm that agree with a printed percentage.
 
     The more settings agree, the less agreement says about any of them. Nothing is counted where
@@ -159,10 +165,10 @@ def weak_evidence(results: kit.Results, confidence: float) -> Iterator[tuple[str
         return
     if paths_differ(results):
         return
-    for own in kit.grouped(results.with_data, kit.num_joints):
+    for own in run_measures.grouped(results.with_data, run_measures.num_joints):
         for one in (one for one in printed(own[0]) if one.bound == BOUND):
             theirs = one.proportion
-            intervals = {c.label: kit.newcombe(below(c, BOUND), theirs, confidence) for c in own}
+            intervals = {c.label: newcombe(below(c, BOUND), theirs, confidence) for c in own}
             same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
             what = (
                 f"{own[0].label} and others: whose errors below {BOUND:g} cannot be told from the "
@@ -177,27 +183,27 @@ def weak_evidence(results: kit.Results, confidence: float) -> Iterator[tuple[str
             yield (what, text)
 
 
-def paths_differ(results: kit.Results) -> bool:
+def paths_differ(results: Results) -> bool:
     """Return whether conditions differ in the places at which they test paths for collision."""
     collisions = (c.planner.collision for c in results.with_data)
     return len({(model.num_positions, model.swept) for model in collisions}) > 1
 
 
-def printed_shares(results: kit.Results) -> dict[str, float]:
+def printed_shares(results: Results) -> dict[str, float]:
     """Return the shares that the paper prints, by the names of `share_rows`, of a single arm."""
     one_arm = len(arms(results)) == 1
     points = printed(results.with_data[0]) if one_arm else []
     return {f"error below {p.bound:g}": p.proportion.share for p in points}
 
 
-def stopping_values_differ(conditions: tuple[kit.ConditionResults, ...]) -> bool:
+def stopping_values_differ(conditions: tuple[ConditionResults, ...]) -> bool:
     """Return whether searches stop at different values."""
     return len({c.planner.stop_cost_sp2 for c in conditions}) > 1
 
 
 def share_rows(
-    results: kit.Results, refuted: Callable[[kit.ConditionResults], RefutedMotions]
-) -> list[tuple[str, int, str, kit.Proportion]]:
+    results: Results, refuted: Callable[[ConditionResults], RefutedMotions]
+) -> list[tuple[str, int, str, Proportion]]:
     """Return the counts that are drawn, by sub-path if the tests of paths differ."""
     rows = []
     for position, c in enumerate(results.with_data):
@@ -206,20 +212,20 @@ def share_rows(
         if not paths_differ(results):
             told = {
                 f"error below {BOUND:g}": below(c, BOUND),
-                "with a solution": kit.success(c),
+                "with a solution": run_measures.success(c),
                 "touch an obstacle": found.anywhere,
             }
         rows += [(name, position, c.label, proportion) for name, proportion in told.items()]
     return rows
 
 
-def literal_start(condition: kit.ConditionResults) -> str:
+def literal_start(condition: ConditionResults) -> str:
     """Say whether the start is free if the printed shift of obstacles is read literally.
 
     The words vertically and horizontally are not swapped then. Empty if nothing is shifted. The
     arm's collision model judges the start among the obstacles of the literal reading.
     """
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     problem = condition.problem(Problem)
     dx, dy = scenario.obstacle_shift
     if dx == dy:

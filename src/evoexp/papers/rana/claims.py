@@ -7,65 +7,68 @@ import numpy as np
 from evoexp.papers.rana import measures, motions
 from evoexp.papers.rana.measures import AT, BETWEEN, EVENNESS
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report import kit
-from evoexp.report.kit import judging, markdown
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.parameters import overridden, parameters, planned_replicates
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import comparisons, judging
+from evoexp.report.statistics.claim_rules import Rules
+from evoexp.report.statistics.comparisons import Comparison, Family, Measure
+from evoexp.report.statistics.inference import fisher_exact, holm, spread
+from evoexp.report.statistics.judging import Judge
 
 PRINTED = "as printed"  # label of the printed setting among the ablations
 PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
 ASSUMED = "sections 3.5 and 4.2"  # where the paper makes claims that assumed numbers touch
 COST = "best cost"
 COMPARED = (
-    kit.Measure(COST, kit.by_column("best_cost")),
-    kit.Measure(EVENNESS, measures.unevenness, "deg"),
+    Measure(COST, comparisons.by_column("best_cost")),
+    Measure(EVENNESS, measures.unevenness, "deg"),
 )
-Controls = Sequence[kit.ConditionResults]
+Controls = Sequence[ConditionResults]
 
 
-def not_judged(results: kit.Results, condition: kit.ConditionResults) -> str:
+def not_judged(results: Results, condition: ConditionResults) -> str:
     """Return why claims are not judged on a condition; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
     if condition.is_control:
         return judging.ONLY_CONTROLS
-    planned = kit.planned_replicates(results)
+    planned = planned_replicates(results)
     if condition.planned < planned:
         return f"{condition.planned} of {planned} replicates planned"
-    changed = kit.overridden(kit.parameters(results, condition))
+    changed = overridden(parameters(results, condition))
     return f"overridden: {', '.join(changed)}" if changed else ""
 
 
 def own_judge(
-    results: kit.Results,
-    settings: kit.ReportSettings,
-    rules: kit.Rules,
-    condition: kit.ConditionResults,
-) -> kit.Judge:
+    results: Results, settings: ReportSettings, rules: Rules, condition: ConditionResults
+) -> Judge:
     """Return the judge of a condition's claims."""
-    return kit.Judge(not_judged(results, condition), settings, rules)
+    return Judge(not_judged(results, condition), settings, rules)
 
 
-def free_at_via_points(
-    own_judge: kit.Judge, condition: kit.ConditionResults, who: str
-) -> kit.Claim:
+def free_at_via_points(own_judge: Judge, condition: ConditionResults, who: str) -> Claim:
     """Judge that the motion is free of collision at the via-points."""
     source = "section 3.5, Fig. 4" if measures.planar(condition) else "section 4.2, Fig. 11"
     return _free(own_judge, condition, who, source)
 
 
-def assumed_free(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def assumed_free(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that the motion is free at the via-points, under assumed numbers."""
     return _free(judge, condition, "", ASSUMED)
 
 
-def _free(judge: kit.Judge, c: kit.ConditionResults, who: str, source: str) -> kit.Claim:
+def _free(judge: Judge, c: ConditionResults, who: str, source: str) -> Claim:
     told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
     hearing = judge.on("free_at_via_points", who=who, source=source)
     return hearing.every(told, c.solved, c.done, c.planned)
 
 
-def safety(own_judge: kit.Judge, condition: kit.ConditionResults, who: str) -> Iterator[kit.Claim]:
+def safety(own_judge: Judge, condition: ConditionResults, who: str) -> Iterator[Claim]:
     """Judge the safety distance, where the paper looks and where it does not."""
-    c, unit, margin = condition, condition.condition.length_unit, measures.margin(condition)
+    c, unit, margin = condition, condition.length_unit, measures.margin(condition)
     source = "section 3.5, Fig. 7" if measures.planar(c) else "section 4.2, Fig. 13"
     kept = markdown.share(c.verdicts.with_margin, c.verdicts.judged)
     bodies = (
@@ -81,13 +84,13 @@ def safety(own_judge: kit.Judge, condition: kit.ConditionResults, who: str) -> I
         told = (
             f"{markdown.share(safe, c.done)} runs never below {margin:g} {unit}; least "
             f"{markdown.number(float(np.min(values)))}, median "
-            f"{markdown.number(kit.spread(values).median)} {unit}{more}"
+            f"{markdown.number(spread(values).median)} {unit}{more}"
         )
         hearing = own_judge.on(name, who=who, source=source)
         yield hearing.every(told, safe, c.done, c.planned)
 
 
-def assumed_safety(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Claim:
+def assumed_safety(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge the safety distance between via-points under assumed numbers."""
     c, values = condition, measures.safety_share(condition)
     safe = int(np.count_nonzero(values >= 1.0))
@@ -101,8 +104,8 @@ def assumed_safety(judge: kit.Judge, condition: kit.ConditionResults) -> kit.Cla
 
 
 def operators(
-    results: kit.Results, own_judge: kit.Judge, condition: kit.ConditionResults, who: str
-) -> list[kit.Claim]:
+    results: Results, own_judge: Judge, condition: ConditionResults, who: str
+) -> list[Claim]:
     """Judge the claim about the two operators from the stored ablations of the same scene."""
     experiment = f"rana_{'planar' if measures.planar(condition) else 'puma'}_ablations"
     stored = results.beside(experiment)
@@ -113,28 +116,24 @@ def operators(
     return operator_claims(stored, own, who, PRINTED) or [alone.elsewhere(told)]
 
 
-def evolution(
-    results: kit.Results, own_judge: kit.Judge, condition: kit.ConditionResults, who: str
-) -> kit.Claim:
+def evolution(results: Results, own_judge: Judge, condition: ConditionResults, who: str) -> Claim:
     """Judge what evolution adds to every control."""
     beside = [
-        c for c in results.evolved if c.is_control and kit.beside(condition.condition, c.condition)
+        c
+        for c in results.evolved
+        if c.is_control and comparisons.beside(condition.condition, c.condition)
     ]
     told, rows = measures.evolution_told(own_judge, condition, beside)
     return own_judge.on("evolution_adds", who=who).better_than_all(told, rows)
 
 
-def assumed_evolution(
-    judge: kit.Judge, condition: kit.ConditionResults, controls: Controls
-) -> kit.Claim:
+def assumed_evolution(judge: Judge, condition: ConditionResults, controls: Controls) -> Claim:
     """Judge what evolution adds to every control, under assumed numbers."""
     told, rows = measures.evolution_told(judge, condition, controls)
     return judge.on("evolution_adds", who="").better_than_all(told, rows)
 
 
-def operator_claims(
-    results: kit.Results, judge: kit.Judge, who: str = "", first: str = ""
-) -> list[kit.Claim]:
+def operator_claims(results: Results, judge: Judge, who: str = "", first: str = "") -> list[Claim]:
     """Judge the paper's claim about relaxation and redistribution, part by part that was run.
 
     `who` begins each claim; `first` is the label of the printed setting, or else the first one.
@@ -144,12 +143,14 @@ def operator_claims(
     if printed is None:
         return []
     others = [other for other in named.values() if other is not printed]
-    found = kit.compare_families([kit.Family.of([printed, *others])], COMPARED[:2], judge.settings)
+    found = comparisons.compare_families(
+        [Family.of([printed, *others])], COMPARED[:2], judge.settings
+    )
     rows = {one.measure.name: {row.quantity: row for row in one.rows} for one in found}
     parts = [other for other in others if other.label in PARTS]
     counts = {c.label: measures.refuted(c) for c in (printed, *parts)}
     own = counts[printed.label]
-    p_values = kit.holm([kit.fisher_exact(own, counts[part.label]) for part in parts])
+    p_values = holm([fisher_exact(own, counts[part.label]) for part in parts])
     claims = []
     for part, p_value in zip(parts, p_values, strict=True):
         other = counts[part.label]
@@ -176,10 +177,10 @@ def improves(says: list[int]) -> bool | None:
 
 
 def _told(
-    row: kit.Comparison | None,
+    row: Comparison | None,
     name: str,
     unit: str,
-    pair: tuple[kit.ConditionResults, kit.ConditionResults] | None = None,
+    pair: tuple[ConditionResults, ConditionResults] | None = None,
 ) -> str:
     """Return a comparison in words, with the medians of both where the pair is given."""
     if row is None:
@@ -190,14 +191,13 @@ def _told(
         with_it, without = (markdown.number(float(np.median(measures.unevenness(c)))) for c in pair)
         medians = f"{with_it}{shown} with, {without}{shown} without, "
     difference = markdown.number(row.median_difference)
-    return (
-        f"{name}: {medians}difference of medians {difference}{shown}, {kit.evidence(row, 'lower')}"
-    )
+    told = judging.evidence(row, "lower")
+    return f"{name}: {medians}difference of medians {difference}{shown}, {told}"
 
 
-def extensions(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[kit.Claim]:
+def extensions(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Judge section 5's claims of extension: static obstacles, more than two arms."""
-    problem, unit = condition.problem(Problem), condition.condition.length_unit
+    problem, unit = condition.problem(Problem), condition.length_unit
     arms, kinds = problem.assembly.num_arms, motions.kinds_of_pairs(condition)
     found = []
     if motions.OBSTACLES in kinds:
@@ -222,7 +222,7 @@ def extensions(judge: kit.Judge, condition: kit.ConditionResults) -> Iterator[ki
             yield hearing.every(text, holds, condition.done, condition.planned)
 
 
-def collision_weight(judge: kit.Judge, first: kit.ConditionResults) -> list[kit.Claim]:
+def collision_weight(judge: Judge, first: ConditionResults) -> list[Claim]:
     """Judge that collisions are avoided at all costs, with the weight k3 as printed."""
     straight, worth = motions.straight_length(first), motions.worth(first)
     hits = first.evaluate(motions.straight_line(first))["collisions"]

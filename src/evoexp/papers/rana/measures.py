@@ -9,8 +9,13 @@ from evoexp.papers.rana import motions
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray, generations
-from evoexp.report import kit
-from evoexp.report.kit import ConditionResults, markdown
+from evoexp.report.pages import markdown
+from evoexp.report.results.run_measures import grouped, planned_by
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics import comparisons
+from evoexp.report.statistics.comparisons import Comparison, FamilyComparison
+from evoexp.report.statistics.inference import Proportion
+from evoexp.report.statistics.judging import Judge, evidence
 
 UNEVENNESS = "term_unevenness_arm_"
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
@@ -18,7 +23,7 @@ EVENNESS = "unevenness of the best, C3 + C4"
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
 GENERATIONS = (0, 10, 50)  # whose pairs of strings are looked at
 PAIRS = 2000  # drawn of each generation
-COST = kit.by_column("best_cost")
+COST = comparisons.by_column("best_cost")
 
 
 def unevenness(condition: ConditionResults) -> FloatArray:
@@ -33,14 +38,14 @@ def unevenness(condition: ConditionResults) -> FloatArray:
 
 
 def evolution_told(
-    judge: kit.Judge, condition: kit.ConditionResults, controls: Sequence[kit.ConditionResults]
-) -> tuple[str, list[kit.Comparison]]:
+    judge: Judge, condition: ConditionResults, controls: Sequence[ConditionResults]
+) -> tuple[str, list[Comparison]]:
     """Return the evidence on what evolution adds to each control, and the comparisons of costs.
 
     The control of the lowest median cost comes first.
     """
     pairs = [(condition, control) for control in controls if control.done]
-    rows = {row.quantity: row for row in kit.compared(pairs, COST, judge.settings)}
+    rows = {row.quantity: row for row in comparisons.compared(pairs, COST, judge.settings)}
     shown = [control for control in controls if control.label in rows]
     shown.sort(key=lambda control: float(np.median(COST(control))))
     fitness = " · ".join(
@@ -53,24 +58,24 @@ def evolution_told(
         which = f"the best control, {control.label}" if place == 0 else control.label
         told.append(
             f"to {which}, evolution adds {markdown.number(-row.median_difference)} to the median: "
-            f"its best cost is {kit.evidence(row, 'lower')}"
+            f"its best cost is {evidence(row, 'lower')}"
         )
     if not shown:
         told.append("no control beside it")
     return "; ".join(told), [rows[control.label] for control in shown]
 
 
-def who(results: kit.Results, condition: ConditionResults) -> str:
+def who(results: Results, condition: ConditionResults) -> str:
     """Return the beginning of a line about a condition: nothing if there is no other one."""
     return f"{condition.label}: " if len(results.main) > 1 else ""
 
 
-def fits(results: kit.Results) -> bool:
+def fits(results: Results) -> bool:
     """Return whether the paper's figures can draw all conditions."""
     return bool(results.with_data) and all(map(can_be_drawn, results.with_data))
 
 
-def can_be_drawn(condition: kit.ConditionResults) -> bool:
+def can_be_drawn(condition: ConditionResults) -> bool:
     """Return whether the paper's figures can draw a condition.
 
     They draw several arms of two joints in a plane, or of three joints or more in space.
@@ -87,11 +92,6 @@ def planar(condition: ConditionResults) -> bool:
     return bool(motions.problem(condition).assembly.table.planar)
 
 
-def spatial(condition: ConditionResults) -> bool:
-    """Return whether the arms move in space."""
-    return not planar(condition)
-
-
 def arms(main: tuple[ConditionResults, ...]) -> str:
     """Return which arms the conditions have, in words."""
     return " and ".join(ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True))
@@ -102,19 +102,19 @@ def margin(condition: ConditionResults) -> float:
     return motions.problem(condition).security_margin
 
 
-def planar_scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
+def planar_scenes(results: Results) -> list[tuple[Results, str]]:
     """Return all conditions of each scene in the plane, and the end of its figure's stem."""
     return [(scene, suffix) for scene, suffix in _scenes(results) if planar(scene.with_data[0])]
 
 
-def spatial_scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
+def spatial_scenes(results: Results) -> list[tuple[Results, str]]:
     """Return all conditions of each scene in space, and the end of its figure's stem."""
-    return [(scene, suffix) for scene, suffix in _scenes(results) if spatial(scene.with_data[0])]
+    return [(scene, suffix) for scene, suffix in _scenes(results) if not planar(scene.with_data[0])]
 
 
-def _scenes(results: kit.Results) -> list[tuple[kit.Results, str]]:
+def _scenes(results: Results) -> list[tuple[Results, str]]:
     suffixes = {c.label: suffix for c, suffix in results.suffixed}
-    scenes = kit.grouped(results.conditions, lambda c: (c.condition.robot, c.condition.scenario))
+    scenes = grouped(results.conditions, lambda c: (c.robot, c.scenario))
     found = [
         (results._replace(conditions=own), [suffixes[c.label] for c in own if c.label in suffixes])
         for own in scenes
@@ -170,39 +170,34 @@ def safety_share(condition: ConditionResults) -> FloatArray:
     return np.asarray(condition.column(BETWEEN) / margin(condition))
 
 
-def refuted(condition: ConditionResults) -> kit.Proportion:
+def refuted(condition: ConditionResults) -> Proportion:
     """Count the motions whose bodies touch."""
     counts = condition.verdicts
-    return kit.Proportion(counts.refuted, counts.judged)
+    return Proportion(counts.refuted, counts.judged)
 
 
-def colliding(condition: ConditionResults) -> kit.Proportion:
+def colliding(condition: ConditionResults) -> Proportion:
     """Count the runs whose best string collides at a via-point by the paper's model."""
-    return kit.Proportion(condition.done - condition.solved, condition.done)
+    return Proportion(condition.done - condition.solved, condition.done)
 
 
-def varies_via_points(results: kit.Results) -> bool:
+def varies_via_points(results: Results) -> bool:
     """Return whether all conditions are of the paper's planner."""
-    return kit.planned_by(results, ViaPointGa)
+    return planned_by(results, ViaPointGa)
 
 
-def length(condition: kit.ConditionResults) -> FloatArray:
+def length(condition: ConditionResults) -> FloatArray:
     """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
     return np.asarray(motions.straight_length(condition) * ratio)
 
 
-def median_length(condition: ConditionResults) -> float:
-    """Return the median length of all arms' paths [deg]."""
-    return float(np.median(length(condition)))
-
-
-def any_planar(results: kit.Results) -> bool:
+def any_planar(results: Results) -> bool:
     """Return whether the arms of any condition can be drawn in the plane."""
     return any(map(drawable, results.main))
 
 
-def drawable(condition: kit.ConditionResults) -> bool:
+def drawable(condition: ConditionResults) -> bool:
     """Return whether a condition's arms move in a plane and have two joints each."""
     problem = condition.prepared.problem
     if not isinstance(problem, Problem) or not problem.assembly.table.planar:
@@ -232,7 +227,7 @@ def _changing(conditions: Sequence[ConditionResults], name: str) -> list[Conditi
     return [other for other in others if _changes(first, other, name)]
 
 
-def _changes(first: kit.ConditionResults, other: kit.ConditionResults, name: str) -> bool:
+def _changes(first: ConditionResults, other: ConditionResults, name: str) -> bool:
     """Return whether this setting, and no other, differs from the first condition's."""
     if other.is_control or not isinstance(other.planner, ViaPointGa):
         return False
@@ -241,20 +236,20 @@ def _changes(first: kit.ConditionResults, other: kit.ConditionResults, name: str
     return same and bool(getattr(other.planner, name) != value)
 
 
-def cost_difference(other: ConditionResults, compared: tuple[kit.FamilyComparison, ...]) -> str:
+def cost_difference(other: ConditionResults, compared: tuple[FamilyComparison, ...]) -> str:
     """Return how far the costs of a condition are from those of the first one, in words."""
-    return _difference(other, {"best cost": kit.rows_by_name(compared)["best cost"]})
+    return _difference(other, {"best cost": comparisons.rows_by_name(compared)["best cost"]})
 
 
-def reading_difference(other: ConditionResults, compared: tuple[kit.FamilyComparison, ...]) -> str:
+def reading_difference(other: ConditionResults, compared: tuple[FamilyComparison, ...]) -> str:
     """Return how far cost and evenness of a condition are from those of the first one."""
-    rows = kit.rows_by_name(compared)
+    rows = comparisons.rows_by_name(compared)
     return _difference(
         other, {"best cost": rows["best cost"], "unevenness C3 + C4": rows[EVENNESS]}
     )
 
 
-def _difference(other: kit.ConditionResults, tables: dict[str, Sequence[kit.Comparison]]) -> str:
+def _difference(other: ConditionResults, tables: dict[str, Sequence[Comparison]]) -> str:
     """Return the differences of the first condition from another one in words."""
     told = [
         f"the median of {name} differs by {markdown.number(row.median_difference)}, "
@@ -274,7 +269,7 @@ def told_apart(first: ConditionResults) -> str:
     )
 
 
-def kept_apart(condition: kit.ConditionResults) -> dict[int, float]:
+def kept_apart(condition: ConditionResults) -> dict[int, float]:
     """Return the share of pairs that are too far apart to be crossed, by generation.
 
     The first replicate is run again for some generations; sites and pairs are drawn at random.

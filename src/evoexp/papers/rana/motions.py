@@ -12,7 +12,9 @@ from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, groups, motion_geometry, style
+from evoexp.report.figures import groups, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
 
 STRAIGHT, OTHERS = "straight line", "replicate"
 MOST_PATHS = 200  # replicates whose paths are drawn, beside the best one; more hide each other

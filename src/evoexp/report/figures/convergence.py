@@ -204,8 +204,3 @@ def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
     above = axes.secondary_xaxis("top", functions=(forward, backward))
     above.set_xlabel("evaluations")
     above.xaxis.set_major_locator(style.few_ticks())
-
-
-BEST = cost_table, draw_best
-COST = cost_table, draw_cost
-FITNESS = fitness_table, draw_fitness

@@ -171,7 +171,3 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     is_clear = table["p_adjusted"] < level
     style.keys_below(figure, [keys[k] for k in (0, 1) if (is_clear == (k == 0)).any()])
     return figure
-
-
-EFFECTS = effects_table, draw_effects
-VALUES = values_table, draw_values

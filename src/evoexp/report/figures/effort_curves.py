@@ -170,8 +170,3 @@ def _ends(table: pd.DataFrame) -> tuple[float, float]:
     """Return the ends of the axis of effort, also where no run has a proven answer."""
     first, last = float(table["collision_queries"].min()), float(table["collision_queries"].max())
     return first, max(last, 1.01 * first)
-
-
-LENGTHS = length_table, draw_lengths
-SHARES = share_table, draw_shares
-SHARES_BY_PROBLEM = problem_share_table, draw_shares_by_problem

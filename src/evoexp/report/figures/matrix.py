@@ -20,13 +20,12 @@ DARK = 0.46  # [-] luminance below which a cell is dark
 
 
 def matrix_table(
-    pairs: Sequence[tuple[str, str]], rows: Sequence[Comparison], significance: float
+    compared_pairs: Sequence[tuple[tuple[str, str], Comparison]], significance: float
 ) -> pd.DataFrame:
     """Return how often one condition of each pair is better, seen from either side.
 
     Args:
-        pairs: Labels (first, second).
-        rows: Their comparisons.
+        compared_pairs: Labels (first, second), and their comparison.
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
@@ -34,7 +33,7 @@ def matrix_table(
         runs (of the condition), runs_other, significance.
     """
     found = []
-    for (first, second), row in zip(pairs, rows, strict=True):
+    for (first, second), row in compared_pairs:
         low, high = row.better.interval
         a12, p, one, two = row.better.a12, row.p_adjusted, row.num_first, row.num_second
         found.append((first, second, a12, low, high, p, one, two))
@@ -73,6 +72,3 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
     bar: dict[str, Any] = {"fraction": BAR / width, "aspect": SIZE * count / BAR}
     figure.colorbar(image, ax=axes, label="A12: the row is better", ticks=[0.0, 0.5, 1.0], **bar)
     return figure
-
-
-MATRIX = matrix_table, draw_matrix

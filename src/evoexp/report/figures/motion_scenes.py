@@ -15,7 +15,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from evoexp.playback.colours import OBJECT, OBSTACLE
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, motion_tables, records, style, surfaces
+from evoexp.report.figures import groups, records, style, surfaces
 from evoexp.report.figures.motion_tables import POSE, SIZE
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
@@ -226,9 +226,3 @@ def _key(figure: Figure, table: pd.DataFrame) -> None:
     if "target" in there:
         keys.append(style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"))
     style.keys_below(figure, keys)
-
-
-COVERS = motion_tables.covers_table, draw_covers
-JOINTS = motion_tables.joints_table, draw_joints
-SCENES = motion_tables.scenes_table, draw_scenes
-STAGES = motion_tables.stages_table, draw_stages

@@ -1,16 +1,41 @@
 """Planners over many problems: performance profiles, and mean ranks with a critical difference."""
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
-from evoexp.report.statistics.problem_ranks import alike, profile_table, rank_table
+from evoexp.report.statistics.problem_ranks import (
+    Standing,
+    alike,
+    critical_difference,
+    effort_ratios,
+    friedman,
+)
 
+END = 1.15  # times the largest finite ratio is where a performance profile ends
 LINE = 0.24  # [inch] between names of planners
 BAR = 0.09  # [inch] between bars that join planners
 ABOVE = 0.62  # [inch] of the bar of the critical difference and the axis' numbers
+
+
+def profiles_table(found: Standing) -> pd.DataFrame:
+    """Return the performance profile of each planner, at every ratio at which one rises.
+
+    Returns:
+        Columns planner, ratio, share (of problems), problems.
+    """
+    ratios = effort_ratios(found.efforts)
+    steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
+    axis = np.append(steps, max(END * steps[-1], 2.0))
+    rows = [
+        (planner, x, np.count_nonzero(own <= x) / len(own), len(own))
+        for planner, own in zip(found.planners, ratios.T, strict=True)
+        for x in axis
+    ]
+    return pd.DataFrame(rows, columns=["planner", "ratio", "share", "problems"])
 
 
 def draw_profiles(table: pd.DataFrame) -> Figure:
@@ -27,6 +52,21 @@ def draw_profiles(table: pd.DataFrame) -> Figure:
     axes.set_xlabel("expected running time to a proven answer, times that of the best planner [–]")
     name_curves(figure, axes, 3)
     return figure
+
+
+def critical_difference_table(found: Standing, significance: float) -> pd.DataFrame:
+    """Return mean ranks, best first, with the critical difference.
+
+    Returns:
+        Columns planner, mean_rank, problems, friedman_p, critical_difference.
+    """
+    table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
+    table["problems"] = len(found.problems)
+    table["friedman_p"] = friedman(found.lengths).p_value
+    table["critical_difference"] = critical_difference(
+        len(found.planners), len(found.problems), significance
+    )
+    return table.sort_values("mean_rank", kind="stable", ignore_index=True)
 
 
 def draw_critical_difference(table: pd.DataFrame) -> Figure:
@@ -70,7 +110,3 @@ def _scale(axes: Axes, count: int, difference: float, *, is_narrow: bool) -> Non
         axes.plot([end, end], [0.36, 0.44], color=style.NEUTRAL, linewidth=1.0)
     text = f"critical difference {difference:.2f}"
     axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", fontsize=size)
-
-
-CRITICAL_DIFFERENCE = rank_table, draw_critical_difference
-PROFILES = profile_table, draw_profiles

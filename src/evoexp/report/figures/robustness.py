@@ -1,6 +1,7 @@
 """Headline quantities under other assumed numbers, with the verdict at each."""
 
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import groups, records, style
+from evoexp.report.statistics.inference import spread
 from evoexp.report.statistics.judging import CONTRADICTED, REPRODUCED
 
 WRAPPED = 30  # characters of a quantity's name, per line
@@ -19,11 +21,25 @@ MARKS: dict[str, dict[str, Any]] = {
 }
 
 
+def robustness_table(judged: Sequence[Any]) -> pd.DataFrame:
+    """Return one row per claim and condition of `pages.assumptions.Judged`."""
+    positions = {c: k for k, c in enumerate(dict.fromkeys(one.condition for one in judged))}
+    rows = []
+    for one in judged:
+        median, lower, upper, _ = spread(one.headline.values(one.condition))
+        shipped = spread(one.headline.values(one.family.shipped)).median
+        given = one.headline.quantity, positions[one.condition], one.condition.label
+        family = one.family.shipped.label
+        rows.append((*given, median, lower, upper, one.claim.verdict, shipped, family))
+    names = ["quantity", "position", "condition", "median", "lower", "upper", "verdict"]
+    return pd.DataFrame(rows, columns=[*names, "shipped", "family"])
+
+
 def draw_robustness(table: pd.DataFrame) -> Figure:
     """Draw one panel per quantity, one row per condition, families one below the other.
 
     Args:
-        table: Of the page of assumptions; infinite values stand at the right edge, as "never".
+        table: Of `robustness_table`; infinite values stand at the right edge, as "never".
     """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))

@@ -88,6 +88,3 @@ def _ranges(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
         first = min(max(0.5 * (low + high - span), 0.0), 100.0 - span)
         ranges[quantity] = first - beyond, first + span + beyond
     return ranges
-
-
-SHARES = shares_table, draw_shares

@@ -212,7 +212,3 @@ def _limits(curves: pd.DataFrame) -> tuple[float, float]:
     low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
     room = 0.05 * (high - low) or 1.0
     return low - room, high + room
-
-
-CONVERGENCE = convergence_table, draw_convergence
-EFFECTS = effect_table, draw_effects

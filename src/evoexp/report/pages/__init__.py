@@ -42,7 +42,7 @@ def page_of(results: "Results", settings: ReportSettings) -> "Page":
         RegistrationError: If its package registered it wrongly.
     """
     from evoexp.report.pages import swept
-    from evoexp.report.pages.motion_pictures import best_motions, scene_drawing
+    from evoexp.report.pages.page_builder import scene_drawing
     from evoexp.report.results.swept_settings import sweep_of
     from evoexp.report.statistics.judging import left_out
 
@@ -53,7 +53,7 @@ def page_of(results: "Results", settings: ReportSettings) -> "Page":
     page = page._replace(claims=(*page.claims, *left_out(results, page.claims)))
     if any(drawing.plays for drawing in page.drawings):
         return page
-    return page._replace(drawings=(*page.drawings, *scene_drawing(best_motions(results))))
+    return page._replace(drawings=(*page.drawings, *scene_drawing(results, settings)))
 
 
 def _built(chosen: Registration, results: "Results", settings: ReportSettings) -> "Page":

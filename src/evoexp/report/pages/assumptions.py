@@ -27,12 +27,9 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-import pandas as pd
-
-from evoexp.report.figures import robustness
 from evoexp.report.pages import generic, markdown
-from evoexp.report.pages.page_parts import Claim, Page, Table
-from evoexp.report.pages.page_words import WORDS
+from evoexp.report.pages.page_builder import own_page
+from evoexp.report.pages.page_parts import Claim, Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import OVERRIDE, Parameter, parameters
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -111,16 +108,16 @@ def page(
         for headline in headlines
         for one in _heard(results, judge, family, headline)
     ]
-    drawing = WORDS.drawing(
-        "assumptions", (_drawn, robustness.draw_robustness), results.with_data, judged
-    )
-    return Page(
-        f"{paper}: assumed numbers, and which claims survive others",
-        WORDS.introduction("assumptions"),
-        generic.quantities(results),
-        claims=tuple(_claims(judge, judged)),
-        tables=(_effects(judged), _assumed(results, found)),
-        drawings=(drawing,),
+    return own_page(
+        "assumptions",
+        results,
+        settings,
+        paper=paper,
+        judged=judged,
+        headline_claims=tuple(_claims(judge, judged)),
+        headline_rows=_effects(judged),
+        headline_quantities=[f"{each.name}: {each.quantity}" for each in headlines],
+        assumed_rows=_assumed(results, found),
     )
 
 
@@ -185,11 +182,10 @@ def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
         yield hearing.own(told, f"{len(others)} variations", not differing if others else None)
 
 
-def _effects(judged: Sequence[Judged]) -> Table:
-    """Return the table of all verdicts, one row per condition: in the first family it is of."""
-    headlines = list(dict.fromkeys(one.headline for one in judged))
+def _effects(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
+    """Return all verdicts, one row per condition: in the first family it is of."""
     first = {one.condition: one.family for one in reversed(judged)}
-    rows = []
+    rows = list[tuple[object, ...]]()
     for condition in dict.fromkeys(one.condition for one in judged):
         family = first[condition]
         own = [one for one in judged if one.family is family and one.condition is condition]
@@ -201,12 +197,11 @@ def _effects(judged: Sequence[Judged]) -> Table:
         )
         names = ", ".join(f"`{name}`" for name in changed) or "as assumed"
         rows.append((condition.label, names, condition.done, *cells))
-    quantities = [f"{h.name}: {h.quantity}" for h in headlines]
-    return WORDS.table("headlines", rows, behind=quantities)
+    return rows
 
 
-def _assumed(results: Results, found: Sequence[Family]) -> Table:
-    """Return the table of every assumed number, with the conditions that vary it."""
+def _assumed(results: Results, found: Sequence[Family]) -> list[tuple[object, ...]]:
+    """Return every assumed number, with the conditions that vary it."""
     # name of a setting, or of a list of settings → its entries; entry → the varying conditions
     lists: dict[str, dict[Parameter, list[str]]] = {}
     for family in found:
@@ -216,7 +211,7 @@ def _assumed(results: Results, found: Sequence[Family]) -> Table:
                 by = [c.label for c, changed in family.varied if names & set(changed)]
                 entries = lists.setdefault(_INDEX.sub("[…]", parameter.name), {})
                 entries.setdefault(parameter, []).extend(by)
-    rows = []
+    rows = list[tuple[object, ...]]()
     for name, entries in lists.items():
         values = list(dict.fromkeys(p.value for p in entries))
         reasons = dict.fromkeys(p.source.removeprefix(ASSUMED).lstrip(": ") for p in entries)
@@ -226,25 +221,4 @@ def _assumed(results: Results, found: Sequence[Family]) -> Table:
         reason = "; ".join(filter(None, reasons)) or "–"
         by_label = "; ".join(varied) or "not varied"
         rows.append((f"`{name}`", shown, ", ".join(filter(None, units)) or "–", reason, by_label))
-    return WORDS.table("assumed", rows)
-
-
-def _drawn(judged: Sequence[Judged]) -> pd.DataFrame:
-    """Return the table of the figure, one row per claim and condition."""
-    positions = {c: k for k, c in enumerate(dict.fromkeys(one.condition for one in judged))}
-    rows = []
-    for one in judged:
-        found = spread(one.headline.values(one.condition))
-        shipped = spread(one.headline.values(one.family.shipped)).median
-        rows.append(
-            {
-                "quantity": one.headline.quantity,
-                "position": positions[one.condition],
-                "condition": one.condition.label,
-                **{name: getattr(found, name) for name in ("median", "lower", "upper")},
-                "verdict": one.claim.verdict,
-                "shipped": shipped,
-                "family": one.family.shipped.label,
-            }
-        )
-    return pd.DataFrame(rows)
+    return rows

@@ -9,11 +9,10 @@ import numpy as np
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
-from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.pages import markdown, ranking
-from evoexp.report.pages.page_parts import Drawing, Page, Table
-from evoexp.report.pages.page_words import WORDS
+from evoexp.report.pages.page_builder import own_page
+from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import shipped_best_known
 from evoexp.report.results.given_data import MARK, GivenData
@@ -90,18 +89,32 @@ def page_of_runs(
     """
     if not runs:
         raise NothingStored(f"{results.experiment or 'compare'}: no stored solution is a motion")
-    found, rows = standing(runs), rated(runs, settings)
-    return Page(
-        title=f"{results.experiment or 'stored runs'}: proven answers",
-        introduction=WORDS.introduction("comparison", given=_of_file(given) if given else ""),
-        tables=(
-            _problem_table(runs, ranking.too_few(found)),
-            _table(rows, settings),
-            _coin_table(rows),
-            *ranking.tables(found, settings),
-        ),
-        comparisons=_comparisons(runs, settings),
-        drawings=(*_drawings(runs), *ranking.drawings(found, runs, settings)),
+    ranks, rows = standing(runs), rated(runs, settings)
+    num_problems, ranked = len(problem_order(runs)), set(ranks.problems)
+    first = f" The first {MAX_PANELS} of {num_problems}; the CSV has all."
+    return own_page(
+        "comparison",
+        results,
+        settings,
+        runs=runs,
+        given_words=_of_file(given) if given else "",
+        problem_rows=tuple(_problem_rows(runs)),
+        too_few_ranks=ranking.too_few(ranks),
+        answer_rows=tuple(_answers(rows, settings)),
+        coin_rows=tuple(_coins(rows)),
+        compared_lengths=_comparisons(runs, settings),
+        compared_conditions=stored_conditions(runs),
+        unequal=_unequal(runs),
+        one_problem=num_problems == 1,
+        more_problems=num_problems > 1,
+        more_panels=first * (num_problems > MAX_PANELS),
+        ranks=ranks,
+        rank_rows=ranking.rank_rows(ranks),
+        left_out=ranking.left_out(ranks),
+        rank_test=ranking.rank_test(ranks, settings),
+        never_proven=ranking.never_proven(ranks),
+        num_ranked=len(ranks.problems),
+        ranked_conditions=stored_conditions(own for own in runs if own.problem.name in ranked),
     )
 
 
@@ -112,18 +125,6 @@ def _of_file(given: GivenData) -> str:
         f"(SHA-256 {given.sha256[:12]}…) tells them, the certifier has not seen them, and as seeds "
         "are not common they are not compared pair by pair."
     )
-
-
-def _drawings(runs: Sequence[PlannerRuns]) -> Iterator[Drawing]:
-    """Yield the figures: curves of all problems and of each, or of one with its lengths."""
-    given, problems = (stored_conditions(runs), runs), problem_order(runs)
-    yield WORDS.drawing("targets_reached", effort_curves.SHARES, *given, unequal=_unequal(runs))
-    if len(problems) == 1:
-        yield WORDS.drawing("proven_lengths", effort_curves.LENGTHS, *given)
-        return
-    first = f" The first {MAX_PANELS} of {len(problems)}; the CSV has all."
-    more = first * (len(problems) > MAX_PANELS)
-    yield WORDS.drawing("targets_by_problem", effort_curves.SHARES_BY_PROBLEM, *given, more=more)
 
 
 def _unequal(runs: Sequence[PlannerRuns]) -> str:
@@ -193,29 +194,21 @@ def _first_own(own: PlannerRuns) -> float:
     return quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5)
 
 
-def _problem_table(runs: Sequence[PlannerRuns], remark: str) -> Table:
-    """Tell of each problem the lengths that answers are measured by."""
+def _problem_rows(runs: Sequence[PlannerRuns]) -> Iterator[tuple[str, ...]]:
+    """Yield of each problem the lengths that answers are measured by."""
     found: dict[str, tuple[Problem, list[float]]] = {}
     for own in runs:
         best = found.setdefault(own.problem.name, (own.problem, []))[1]
         best.append(float(own.best_lengths.min()))
-    rows = tuple(
-        (
-            name,
-            f"`{problem.key}`" if problem.key else "–",
-            markdown.number(problem.straight),
-            markdown.number(problem.best_known),
-            markdown.number(min(best)),
-            problem.unit_name,
-        )
-        for name, (problem, best) in found.items()
-    )
-    return WORDS.table("problems", rows, remark=f" {remark}".rstrip())
+    for name, (problem, best) in found.items():
+        lengths = map(markdown.number, (problem.straight, problem.best_known, min(best)))
+        yield name, f"`{problem.key}`" if problem.key else "–", *lengths, problem.unit_name
 
 
-def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
-    cells = tuple(
-        (
+def _answers(rows: Sequence[Rated], settings: ReportSettings) -> Iterator[tuple[object, ...]]:
+    """Yield each condition's proven answers: how many, their effort and their lengths."""
+    for row in rows:
+        yield (
             row.condition,
             row.runs,
             Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
@@ -225,25 +218,20 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
             markdown.spread(row.in_units) if row.unit > 0.0 else "–",
             f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
-        for row in rows
-    )
-    return WORDS.table("answers", cells)
 
 
-def _coin_table(rows: Sequence[Rated]) -> Table:
-    cells = tuple(
-        (
-            row.condition,
-            markdown.number(row.body_tests),
-            effort_text(row.queries * row.body_tests),
-            effort_text(row.evaluations),
-            markdown.number(row.cpu_s),
-            markdown.spread(row.own_cost),
-        )
-        for row in rows
-        if row.own_cost.num_values
-    )
-    return WORDS.table("coins", cells)
+def _coins(rows: Sequence[Rated]) -> Iterator[tuple[str, ...]]:
+    """Yield the effort of each condition that was run here, counted in other ways."""
+    for row in rows:
+        if row.own_cost.num_values:
+            yield (
+                row.condition,
+                markdown.number(row.body_tests),
+                effort_text(row.queries * row.body_tests),
+                effort_text(row.evaluations),
+                markdown.number(row.cpu_s),
+                markdown.spread(row.own_cost),
+            )
 
 
 def effort_text(queries: float) -> str:

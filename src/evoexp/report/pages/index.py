@@ -234,7 +234,7 @@ def _parameters(results: Results) -> Table:
         for name in _ordered(by_name)
         for parameter, labels in by_name[name].items()
     ]
-    return WORDS.table("parameters", rows, note=PARTS * have_two_parts(every))
+    return WORDS.table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
 
 
 def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:

@@ -52,9 +52,10 @@ def number(value: float) -> str:
 def filled(template: str, words: Mapping[str, Any]) -> str:
     """Fill in the words of a sentence.
 
-    `{x!n}` is written as `number` does, `{p!p}` as `p_value`, `{xs!m}` as the median of its values
-    with quartiles, `{runs!i}` as a proportion with its interval at the level `confidence`, its
-    decimals behind a colon (`{runs!i:1}`). A method stands for what it returns: `{xs.mean:.2f}`.
+    `{x!n}` is written as `number` does, `{p!p}` as `p_value`, `{xs!d}` as the median of its values,
+    `{xs!m}` as that with quartiles, `{runs!i}` as a proportion with its interval at the level
+    `confidence`, its decimals behind a colon (`{runs!i:1}`). A method stands for what it returns:
+    `{xs.mean:.2f}`.
 
     Raises:
         KeyError: If a word is missing.
@@ -77,8 +78,9 @@ class Sentence(string.Formatter):
         """Return a value as the letter behind its exclamation mark asks."""
         if conversion == "i":
             return _Shared(value, self.words["confidence"])
-        if conversion == "m":
-            return spread(spread_of(value))
+        if conversion in ("d", "m"):
+            found = spread_of(value)
+            return number(found.median) if conversion == "d" else spread(found)
         if conversion in ("n", "p"):
             return (number if conversion == "n" else p_value)(float(value))
         return super().convert_field(value, conversion)

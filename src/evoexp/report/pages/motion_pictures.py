@@ -7,9 +7,7 @@ import numpy as np
 
 from evoexp.playback import player_page
 from evoexp.playback.recording import Heading, NoMotion, Recording, record
-from evoexp.report.figures import motion_scenes
 from evoexp.report.pages.page_parts import Drawing, PlayedRun, Player
-from evoexp.report.pages.page_words import WORDS
 from evoexp.report.results.stored_results import ConditionResults, Results
 
 JOIN = " · "  # between experiment and condition, as in the titles of `evoexp view`
@@ -56,9 +54,14 @@ def _player(experiment: str, run: PlayedRun) -> Player | None:
     return Player(words, f"motion_{c.condition.id[:12]}_{k:04d}.html", player_page.page([found]))
 
 
-def best_motions(results: Results) -> list[ShownMotion]:
-    """Return the best motions of the conditions that have one, at most `MOST`, best ones first."""
-    found: list[ShownMotion] = []
+def motion_results(results: Results) -> Results:
+    """Return the results whose motions are shown."""
+    return results
+
+
+def best_motions(motion_results: Results) -> list[ShownMotion]:
+    """Return the motions of the conditions with the least costs that have one, at most `MOST`."""
+    results, found = motion_results, list[ShownMotion]()
     for condition in sorted(results.with_data, key=_best_cost):
         if len(found) == MOST:
             break
@@ -72,52 +75,39 @@ def best_motions(results: Results) -> list[ShownMotion]:
     return sorted(found, key=lambda each: results.with_data.index(each.condition))
 
 
-def drawings(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
-    """Return the figures of motions; none without motions."""
-    if not shown:
-        return ()
-    best = min(shown, key=lambda each: _best_cost(each.condition))
-    given = (best.condition,), best.recording
-    return (
-        *scene_drawing(shown),
-        WORDS.drawing("stages", motion_scenes.STAGES, *given, label=best.condition.label),
-        WORDS.drawing("joints", motion_scenes.JOINTS, *given),
-        *_cover_drawing(shown),
-    )
+def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
+    """Return the values that figures of motions show, by name.
+
+    `best` is the motion of the least cost alone, `covered` are those with the covers of their
+    bodies, one per robot that has any.
+    """
+    covered: dict[object, tuple[ShownMotion, Sequence[Any]]] = {}
+    for each in best_motions:
+        planner, problem = each.condition.prepared
+        if covers := tuple(planner.covers(problem)):
+            key = each.condition.robot, len(covers)
+            covered.setdefault(key, (each, covers))
+    best = sorted(best_motions, key=lambda each: _best_cost(each.condition))[:1]
+    return {
+        "titled": [(each.title, each.recording) for each in best_motions],
+        "conditions": [each.condition for each in best_motions],
+        "runs": [each.run for each in best_motions],
+        "best": [each.recording for each in best],
+        "best_condition": [each.condition for each in best],
+        "covered": [(own.condition.label, own.recording, rows) for own, rows in covered.values()],
+        "covered_conditions": [own.condition for own, _ in covered.values()],
+    }
 
 
-def scene_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
-    """Return the figure of robots and scenes, with the motions to be played; none without any."""
-    titled = [(each.title, each.recording) for each in shown]
-    conditions, plays = [each.condition for each in shown], [each.run for each in shown]
-    found = WORDS.drawing("scene", motion_scenes.SCENES, conditions, titled, plays=plays)
-    return (found,) if shown else ()
-
-
-def notes(shown: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
+def notes(best_motions: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
     """Return (conditions, note): the notes on the conditions whose motions are shown."""
     labels: dict[str, list[str]] = {}
-    for each in shown:
+    for each in best_motions:
         for note in each.condition.condition.notes():
             own = labels.setdefault(note, [])
             if each.condition.label not in own:
                 own.append(each.condition.label)
     return tuple((", ".join(own), note) for note, own in labels.items())
-
-
-def _cover_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
-    """Return the figure of bodies beside covers: one row per robot that has covers."""
-    rows: dict[object, tuple[str, Recording, Sequence[Any]]] = {}
-    conditions = []
-    for each in shown:
-        planner, problem = each.condition.prepared
-        covers = tuple(planner.covers(problem))
-        key = each.condition.condition.robot, len(covers)
-        if covers and key not in rows:
-            rows[key] = each.condition.label, each.recording, covers
-            conditions.append(each.condition)
-    found = WORDS.drawing("covers", motion_scenes.COVERS, conditions, list(rows.values()))
-    return (found,) if rows else ()
 
 
 def _best_cost(condition: ConditionResults) -> float:

@@ -4,10 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from evoexp.report.pages import assumptions, generic, sweep_figures
-from evoexp.report.pages.page_file import GENERIC, PageFile
+from evoexp.report.pages.page_file import GENERIC, PageFile, own_pages
 from evoexp.report.pages.page_parts import Claim, Drawing, Page, PlayedRun, Quantity, Table
 from evoexp.report.pages.page_scope import Scope
 from evoexp.report.pages.page_words import quantity
@@ -20,27 +17,36 @@ from evoexp.report.statistics.comparisons import (
     compare_families,
     compared_with_controls,
     headed,
-    rows_by_name,
 )
 
 TITLE = "{paper}: {experiment}"
-TERMS, LENGTH = "terms", "length"
+LENGTH = "length"
 Entry = Mapping[str, Any]
-SHARED = {"best": generic.best_drawing, "convergence": generic.cost_drawing}
 
 
-def build(file: PageFile, name: str, results: Results, settings: ReportSettings) -> Page:
+def own_page(name: str, results: Results, settings: ReportSettings, **values: object) -> Page:
+    """Build one of evoexp's own pages, with the values that its entry is given."""
+    return build(own_pages(), name, results, settings, **values)
+
+
+def scene_drawing(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
+    """Return the figure of robots and scenes, with the motions to be played; none without any."""
+    file = own_pages()
+    scope = Scope(file.functions, {"results": results, "settings": settings})
+    return tuple(PageBuilder(file, scope).drawings("scene"))
+
+
+def build(
+    file: PageFile, name: str, results: Results, settings: ReportSettings, **values: object
+) -> Page:
     """Build a page; another one, or the generic one, if the results do not fit it."""
     entry = file.pages[name]
-    values = {"results": results, "settings": settings, "rules": file.rules}
-    scope = Scope(file.functions, {**values, "paper": file.words.name, "page": entry})
+    given = {"results": results, "settings": settings, "rules": file.rules, "page": entry}
+    scope = Scope(file.functions, {**given, "paper": file.words.name, **values})
     if "fits" in entry and not scope.value(entry["fits"]):
         other = entry.get("otherwise", GENERIC)
-        return (
-            generic.page(results, settings)
-            if other == GENERIC
-            else build(file, other, results, settings)
-        )
+        own = own_pages() if other == GENERIC else file
+        return build(own, other, results, settings)
     if "headlines" in entry:
         return _assumptions(file, scope, entry)
     return PageBuilder(file, scope.inner(compared=_compared(scope, entry))).page(entry)
@@ -58,7 +64,7 @@ class PageBuilder:
         """Return the page."""
         return Page(
             title=self.scope.text(entry.get("title", TITLE)),
-            introduction=self.scope.text(entry["introduction"]),
+            introduction=self.scope.text(entry["introduction"]).strip(),
             quantities=tuple(self.quantities(entry.get("quantities", ()))),
             claims=tuple(self.claims(entry.get("claims", ()))),
             tables=tuple(self.tables(entry.get("tables", ()))),
@@ -71,9 +77,7 @@ class PageBuilder:
         """Yield rows of the table of results, by the names of their lists or functions."""
         results = self.scope["results"]
         for name in names:
-            if name == TERMS:
-                yield from generic.term_quantities(results)
-            elif name not in self.words["quantities"]:
+            if name not in self.words["quantities"]:
                 yield from self.scope[name]
             else:
                 for title, unit, values in self.words["quantities"][name]:
@@ -101,12 +105,13 @@ class PageBuilder:
                 yield Table(self.scope.text(entry["heading"]), headers, rows, note)
 
     def rows(self, entry: Entry) -> Iterator[tuple[object, ...]]:
-        """Yield the rows of a table: those of a function, or one of texts per item."""
+        """Yield the rows of a table: those of a function, or one per item."""
         if "rows" in entry:
             yield from self.scope.value(entry["rows"])
             return
         for scope in self.items(entry):
-            yield tuple(map(scope.text, entry["cells"]))
+            row = scope.value(entry["row"]) if "row" in entry else map(scope.text, entry["cells"])
+            yield tuple(row)
 
     def checks(self, names: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield checks, (title, finding)."""
@@ -147,7 +152,7 @@ class PageBuilder:
         if "each" in entry:
             names, _, items = str(entry["each"]).rpartition(" in ")
             scopes = [_bound(own, names.split(", "), item) for item in own.value(items)]
-        return (each for each in scopes if "when" not in entry or each.value(entry["when"]))
+        return (each for each in scopes if "when" not in entry or _holds(each, entry["when"]))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""
@@ -159,30 +164,39 @@ class PageBuilder:
                     yield from together
 
     def drawings(self, name: str) -> Iterator[Drawing]:
-        """Yield a figure, or one of each item."""
-        if name in SHARED and name not in self.words["figures"]:
-            yield SHARED[name](self.scope["results"])
-            return
-        entry = self.words["figures"][name]
+        """Yield a figure, or one of each item; none where what it is drawn of is empty."""
+        entry = {**self.file.shared, **self.words["figures"]}[name]
+        if "kind" in entry:  # begins with one of the figures that all pages share
+            base = self.file.shared[entry["kind"]]
+            parts = {part: {**base.get(part, {}), **entry.get(part, {})} for part in PARTS}
+            entry = {"stem": entry["kind"], **base, **entry, **parts}
         for scope in self.items(entry):
-            if "kind" in entry:
-                yield from KINDS[entry["kind"]](scope, entry)
-            elif "shows" not in entry or scope.value(entry["shows"]):
-                yield self.drawing(name, scope, entry)
+            bound, arguments = self.bound(scope, entry)
+            is_empty = "needs" in entry and not any(bound.value(entry["needs"]).values())
+            if not is_empty and ("shows" not in entry or bound["shown"]):
+                yield self.drawing(name, bound, entry, arguments)
 
-    def drawing(self, name: str, scope: Scope, entry: Entry) -> Drawing:
-        """Return a figure of the paper's own."""
-        shown = scope.value(entry["shows"]) if "shows" in entry else ()
-        bound = scope.inner(shown=shown)
-        given = {
-            name: _argument(bound, value) for name, value in entry.get("arguments", {}).items()
-        }
+    def bound(self, scope: Scope, entry: Entry) -> tuple[Scope, dict[str, Any]]:
+        """Return the scope of a figure, and the arguments of its table, which are bound in it."""
+        items: dict[str, Any] = {"names": entry.get("names", {})}
+        if "shows" in entry:
+            items["shown"] = scope.value(entry["shows"])
+        if "of" in entry:
+            items["of"] = _argument(scope, entry["of"])
         if "among" in entry:  # results of some conditions alone
-            given["results"] = scope["results"]._replace(conditions=scope.value(entry["among"]))
-        functions = entry["functions"]
-        pair = functions if isinstance(functions, list) else [functions]
-        found = [self.file.function(path) for path in pair]
-        table, draw = found if len(found) == 2 else found[0]
+            items["results"] = scope["results"]._replace(conditions=scope.value(entry["among"]))
+        inner = scope.inner(**items)
+        words = {name: inner.text(text) for name, text in entry.get("words", {}).items()}
+        arguments = entry.get("arguments", {}).items()
+        given = {name: _argument(inner, value) for name, value in arguments}
+        return inner.inner(**words, **given), given
+
+    def drawing(
+        self, name: str, scope: Scope, entry: Entry, arguments: Mapping[str, Any]
+    ) -> Drawing:
+        """Return a figure, of the scope in which the arguments of its table are bound."""
+        table, draw = self.file.table_and_drawing(entry["functions"])
+        shown = scope["shown"] if "shows" in entry else ()
         if "conditions" in entry or "among" in entry:
             conditions = scope.value(entry.get("conditions") or entry["among"])
         elif shown:
@@ -196,7 +210,7 @@ class PageBuilder:
             stem=scope.text(entry.get("stem", name)) + suffix,
             title=f"{title} ({conditions[0].label})" if suffix else title,
             caption=scope.text(entry["caption"]),
-            table=partial(bound.call, table, **given),
+            table=partial(scope.call, table, **arguments),
             draw=partial(draw, **entry["options"]) if "options" in entry else draw,
             conditions=tuple(conditions),
             plays=tuple(
@@ -206,6 +220,15 @@ class PageBuilder:
             ),
             columns=entry.get("columns", ""),
         )
+
+
+PARTS = ("arguments", "words")  # of a figure, which one of its kind adds to
+
+
+def _holds(scope: Scope, condition: str) -> bool:
+    """Return whether the value of a name is true, or, behind "not", false."""
+    name = condition.removeprefix("not ")
+    return bool(scope.value(name)) == (name == condition)
 
 
 def _argument(scope: Scope, value: Any) -> Any:
@@ -246,54 +269,11 @@ def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
     return tuple(found)
 
 
-def _values(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
-    results = scope["results"]
-    if "among" in entry:
-        results = results._replace(conditions=scope.value(entry["among"]))
-    every = {scope.text(name): scope[of] for name, of in entry["of"].items()}
-    values = {  # without those that no run has
-        name: of
-        for name, of in every.items()
-        if any(not np.isnan(of(c)).all() for c in results.with_data)
-    }
-    return (sweep_figures.values_drawing(results, values),)
-
-
-def _effects(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
-    found = scope.value(entry["rows"]) if "rows" in entry else rows_by_name(scope["compared"])
-    names = entry.get("of", {name: name for name in found})
-    rows = {scope.text(shown): found[name] for name, shown in names.items() if found.get(name)}
-    words = [scope.text(entry[key]) for key in ("first", "better") if key in entry]
-    return sweep_figures.effects_drawings(scope["results"], scope["settings"], rows, *words)
-
-
-def _shares(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
-    results = scope["results"]
-    rows = (
-        scope.value(entry["rows"])
-        if "rows" in entry
-        else [
-            (name, results.position(c.label), c.label, scope[of](c))
-            for name, of in entry["of"].items()
-            for c in results.with_data
-        ]
-    )
-    printed = scope.value(entry["printed"]) if "printed" in entry else {}
-    caption = scope.text(entry["caption"])
-    return (sweep_figures.shares_drawing(results, scope["settings"], rows, caption, printed),)
-
-
-def _convergence(scope: Scope, entry: Entry) -> tuple[Drawing, ...]:
-    return (generic.cost_drawing(scope["results"]),)
-
-
-KINDS = {"convergence": _convergence, "values": _values, "effects": _effects, "shares": _shares}
-
-
 def _assumptions(file: PageFile, scope: Scope, entry: Entry) -> Page:
     """Build the page of what a paper leaves open."""
+    from evoexp.report.pages import assumptions  # which is built here, too
 
-    def headline(each: Entry) -> assumptions.Headline:
+    def headline(each: Entry) -> "assumptions.Headline":
         def judged(_: Any, condition: Any, controls: Any) -> Claim:
             own = scope.inner(condition=condition, controls=controls)
             return own.call(file.functions[each["judge"]])  # type: ignore[no-any-return]
@@ -305,4 +285,5 @@ def _assumptions(file: PageFile, scope: Scope, entry: Entry) -> Page:
     found = map(headline, entry["headlines"])
     name = file.words.name
     page = assumptions.page(results, scope["settings"], file.rules, name, tuple(found))
-    return page._replace(quantities=generic.quantities(scope["results"]))
+    rows = PageBuilder(own_pages(), scope).quantities(["usual"])
+    return page._replace(quantities=tuple(rows))  # of all conditions

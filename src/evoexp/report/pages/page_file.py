@@ -30,7 +30,7 @@ Its entry points `evoexp.pages` name the file: `my_paper = "my_paper:page.yaml"`
       tasks:
         heading: "Tasks"
         headers: [task, goal met]
-        each: condition in main       # one row each; `rows` names a function instead
+        each: condition in main       # one row each: `cells`, or a function `row`; or all `rows`
         cells: ["{condition.label}", "{success!i}"]
         note: "Median [quartiles]."
     checks:
@@ -43,15 +43,22 @@ Its entry points `evoexp.pages` name the file: `my_paper = "my_paper:page.yaml"`
         title: "Attempts"
         caption: "Share of runs that took so many attempts, with Wilson's {level:g} % interval."
         columns: "Columns attempts, having, …"  # of its table, for the file beside it
-        functions: figures.attempts.ATTEMPTS    # table and drawing, or the names of both
+        functions: figures.attempts.attempts  # attempts_table, draw_attempts; or a list of both
         arguments: {efforts: {"evaluations [-]": evaluations}}  # that are no values of their name
         among: main                   # shows the results of these conditions alone
+      effort:
+        kind: values                  # begins with a figure that all pages share, of `page.yaml`
+        of: {"effort [-]": effort}    # beside this file: values, effects, shares, convergence, best
 
 Words in braces are values and functions by name (`page_scope`), written as `markdown.filled`
 does. `each: x in xs` repeats an entry for all items, `when: name` leaves it out where the value is
-false. The keys of each kind of entry stand in `KEYS`.
+false, `when: not name` where it is true. Texts of a figure may name its arguments and its `words`,
+which are texts by name; it is not drawn without values of the argument that it `needs`. `given` are
+the names of values that code brings along, on evoexp's own pages. The keys of each kind of entry
+stand in `KEYS`.
 """
 
+import functools
 import importlib
 import importlib.util
 import re
@@ -75,21 +82,24 @@ GENERIC = "generic"
 KEYS: dict[str, set[str]] = {
     "file": {"name", "functions", "pages", "quantities", "tables", "checks", "figures"},
     "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
-    | {"comparisons", "checks", "figures", "headlines", "conditions"},
+    | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
     "claims": {"each", "when", "judge"},
     "comparisons": {"families", "measures", "controls", "when"},
     "headlines": {"claim", "quantity", "values", "judge"},
-    "tables": {"heading", "headers", "before", "behind", "each", "when", "cells", "rows", "note"},
+    "tables": {"heading", "headers", "before", "behind", "each", "when", "cells", "row", "rows"}
+    | {"note"},
     "checks": {"title", "finding", "each", "when", "rows"},
     "figures": {"title", "caption", "columns", "stem", "functions", "arguments", "options"}
-    | {"each", "when", "conditions", "plays", "shows", "kind", "of", "rows", "first", "better"}
-    | {"printed", "among"},
+    | {"each", "when", "conditions", "plays", "shows", "kind", "of", "names", "words", "needs"}
+    | {"among"},
 }
 _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
+_FIRST = re.compile(r"[.\[]")  # ends the first part of a name
 _NAMED = (
     "fits",
     "when",
     "among",
+    "row",
     "rows",
     "values",
     "judge",
@@ -100,17 +110,9 @@ _NAMED = (
 )
 _TEXTS = ("title", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (
-    "results",
-    "settings",
-    "rules",
-    "paper",
-    "page",
-    "condition",
-    "controls",
-    "shown",
-    "compared",
+    *("results", "settings", "rules", "paper", "page", "condition", "controls", "compared"),
+    *("shown", "of", "names"),  # in figures
 )
-SHARED_FIGURES = ("best", "convergence")  # of every page, see `generic`
 
 
 class PageFile(NamedTuple):
@@ -120,16 +122,28 @@ class PageFile(NamedTuple):
     functions: Functions  # of the paper, and of every page
     rules: Rules
     package: str  # that the file is in
+    shared: Mapping[str, Any]  # figures that all papers may draw, by their names
 
     @property
     def pages(self) -> Mapping[str, Any]:
         """The pages by name."""
         return self.words.words["pages"]
 
+    def table_and_drawing(self, paths: str | Sequence[str]) -> list[Any]:
+        """Return the functions of a figure: `m.costs` stands for `m.costs_table`, `m.draw_costs`.
+
+        Raises:
+            SettingError: If there is none.
+        """
+        if isinstance(paths, str):
+            module, _, name = paths.rpartition(".")
+            paths = [f"{module}.{name}_table", f"{module}.draw_{name}"]
+        return [self.function(path) for path in paths]
+
     def function(self, path: str) -> Any:
         """Return a function by its name, or by that of a module of the paper: `figures.x.TABLE`.
 
-        Figures that papers share are found as `convergence.FITNESS`.
+        Figures that papers share are found as `convergence.fitness`.
 
         Raises:
             SettingError: If there is none.
@@ -144,6 +158,12 @@ class PageFile(NamedTuple):
                     return found
         hint = nearest(path, self.functions)
         raise SettingError(f"{self.package}:{FILE}", "a function of the paper", path, hint)
+
+
+@functools.cache
+def own_pages() -> PageFile:
+    """Return evoexp's own pages: of any experiment, a sweep, a comparison."""
+    return read_page_file(__package__)
 
 
 def read_page_file(package: str, file: str = FILE) -> PageFile:
@@ -165,7 +185,9 @@ def read_page_file(package: str, file: str = FILE) -> PageFile:
     with resources.as_file(rules) as path:
         own_rules = read_rules(path) if path.is_file() else NO_RULES
     sections = {section: entries.get(section, {}) for section in sorted(KEYS["file"])}
-    found = PageFile(PageWords(entries["name"], sections), functions, own_rules, package)
+    own = package == __package__
+    shared = sections["figures"] if own else own_pages().words.words["figures"]
+    found = PageFile(PageWords(entries["name"], sections), functions, own_rules, package, shared)
     _check(found, f"{package}:{file}")
     return found
 
@@ -199,6 +221,8 @@ def _check(file: PageFile, field: str) -> None:
             if each is None:
                 raise SettingError(f"{path}.each", "'item in items'", entry["each"])
             bound |= set(each[1].split(", "))
+        for key in ("given", "arguments", "words"):
+            bound |= {*entry.get(key, ())}
     for path, entry in entries:
         for key, name in _names(entry):
             known = name in bound or is_column(name)
@@ -209,7 +233,7 @@ def _check(file: PageFile, field: str) -> None:
                     raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
     for page, entry in file.pages.items():
         for section in ("tables", "checks", "figures"):
-            known_here = {*sections[section], *(SHARED_FIGURES if section == "figures" else ())}
+            known_here = {*sections[section], *(file.shared if section == "figures" else ())}
             for name in _flat(entry.get(section, ())):
                 if name not in known_here:
                     must, hint = f"one of the {section} of this file", nearest(name, known_here)
@@ -257,7 +281,7 @@ def _names(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for key in _NAMED:
         for path in entry[key] if isinstance(entry.get(key), list) else (entry.get(key),):
             if isinstance(path, str):
-                yield key, path.partition(".")[0]
+                yield key, _FIRST.split(path.removeprefix("not "))[0]
     if "each" in entry:
         yield "each", str(entry["each"]).rpartition(" in ")[2].partition(".")[0]
     for key in _TEXTS:

@@ -5,10 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from evoexp.report.figures import matrix
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Drawing, Table
-from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -52,8 +49,8 @@ def pairs(results: Results) -> list[Pair]:
     return [(first, other) for other in others]
 
 
-def comparisons(
-    results: Results, settings: ReportSettings
+def pairs_of_conditions(
+    results: Results, settings: ReportSettings, differing: list[Measure]
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare conditions in every quantity in which they differ.
 
@@ -65,42 +62,40 @@ def comparisons(
         of = f"{results.evolved[0].label} against each other condition"
     found = (
         (f"{one.name}: {of}", compared(pairs(results), one.values, settings, named=_named))
-        for one in differing(results)
+        for one in differing
     )
     return tuple((heading, rows) for heading, rows in found if rows)
 
 
-def share_tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
-    """Return shares of runs with intervals, and how far they differ from each other."""
-    level = 100 * settings.confidence
-    rows = [
-        (c.label, *(of(c).with_interval(settings.confidence, 0) for of in SHARES.values()))
+def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ...]]:
+    """Return shares of runs with intervals, a row per condition."""
+    return [
+        (c.label, *(of(c).with_interval(confidence) for of in SHARES.values()))
         for c in results.with_data
     ]
-    between = [
-        row for name, of in SHARES.items() for row in _differences(results, settings, name, of)
+
+
+def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]]:
+    """Return how far shares differ from each other; no row of one that is the same everywhere."""
+    return [
+        row for name, of in SHARES.items() for row in _differences(results, confidence, name, of)
     ]
-    found = (
-        WORDS.table("shares", rows, level=level),
-        WORDS.table("share_differences", between, level=level),
-    )
-    return found if between else found[:1]
 
 
 def _differences(
     results: Results,
-    settings: ReportSettings,
+    confidence: float,
     name: str,
     of: Callable[[ConditionResults], Proportion],
-) -> list[tuple[object, ...]]:
+) -> list[tuple[str, ...]]:
     """Return one row per pair; none where the share is the same in all conditions."""
     found = [(a, b, of(a), of(b)) for a, b in pairs(results) if of(a).total and of(b).total]
     if len({p.share for _, _, *both in found for p in both}) < 2:
         return []
     p_values = [fisher_exact(one, two) for _, _, one, two in found]
-    rows: list[tuple[object, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for (a, b, one, two), p, adjusted in zip(found, p_values, holm(p_values), strict=True):
-        between = (one.share - two.share, *newcombe(one, two, settings.confidence))
+        between = (one.share - two.share, *newcombe(one, two, confidence))
         difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
         points = f"{difference} [{low}, {high}]".replace("-", "−")
         tests = markdown.p_value(p), markdown.p_value(adjusted)
@@ -108,20 +103,20 @@ def _differences(
     return rows
 
 
-def matrix_drawing(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
-    """Return the matrix of effect sizes in the best cost, of three conditions or more."""
+def compared_pairs(
+    results: Results, settings: ReportSettings, differing: list[Measure]
+) -> list[tuple[tuple[str, str], Comparison]]:
+    """Return (labels, comparison of best costs) of all pairs of three conditions or more."""
     best = EFFORTS[0]
-    if len(results.evolved) < 3 or best not in differing(results):
-        return ()
+    if len(results.evolved) < 3 or best not in differing:
+        return []
     every = [
-        (pair, rows)
-        for pair in itertools.combinations(results.evolved, 2)
-        if (rows := compared([pair], best.values, settings))
+        ((a.label, b.label), row)
+        for a, b in itertools.combinations(results.evolved, 2)
+        for row in compared([(a, b)], best.values, settings)
     ]
-    tested = adjusted_rows([row for _, rows in every for row in rows])
-    labels = [(a.label, b.label) for (a, b), _ in every]
-    given = results.evolved, labels, tested, settings.significance
-    return (WORDS.drawing("matrix", matrix.MATRIX, *given),)
+    tested = adjusted_rows([row for _, row in every])
+    return [(labels, row) for (labels, _), row in zip(every, tested, strict=True)]
 
 
 def _named(first: ConditionResults, second: ConditionResults) -> str:

@@ -1,15 +1,9 @@
 """The part of `evoexp compare`'s page that ranks planners over problems."""
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
 
-from evoexp.report.figures import rank_diagrams
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Drawing, Table
-from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.planner_runs import PlannerRuns, stored_conditions
 from evoexp.report.statistics.problem_ranks import (
     MIN_PLANNERS,
     MIN_PROBLEMS,
@@ -19,13 +13,13 @@ from evoexp.report.statistics.problem_ranks import (
 )
 
 
-def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:
-    """Return the table of mean ranks; none where there is but one planner, or one problem."""
+def rank_rows(found: Standing) -> list[tuple[str, ...]]:
+    """Return mean ranks, best first; none where there is but one planner, or one problem."""
     if not found.can_be_profiled:
-        return ()
+        return []
     lengths = found.lengths
     best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
-    rows = [
+    return [
         (
             planner,
             f"{found.mean_ranks[k]:.2f}",
@@ -37,8 +31,6 @@ def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:
             enumerate(found.planners), key=lambda each: found.mean_ranks[each[0]]
         )
     ]
-    more = f" {_left_out(found)} {_tested(found, settings)}".replace("  ", " ")
-    return (WORDS.table("ranks", rows, more=more),)
 
 
 def too_few(found: Standing) -> str:
@@ -46,22 +38,22 @@ def too_few(found: Standing) -> str:
     if found.can_be_profiled:
         return ""
     return (
-        "Planners are not ranked: a problem counts once, however many seeds it has, and it takes "
+        " Planners are not ranked: a problem counts once, however many seeds it has, and it takes "
         "two planners, and two problems at least that both were run on."
     )
 
 
-def _left_out(found: Standing) -> str:
+def left_out(found: Standing) -> str:
     """Name the problems and planners that do not count; empty if all do."""
     names = ", ".join(found.left_out)
-    problems = f"Left out, as some planner was not run on them: {names}." if names else ""
+    problems = f" Left out, as some planner was not run on them: {names}." if names else ""
     if not found.outsiders:
         return problems
     planners = ", ".join(found.outsiders)
     return f"{problems} Not ranked, as run on less than half of the problems: {planners}."
 
 
-def _tested(found: Standing, settings: ReportSettings) -> str:
+def rank_test(found: Standing, settings: ReportSettings) -> str:
     """Tell the outcome of the tests, or why there are none."""
     planners, problems = len(found.planners), len(found.problems)
     if not found.can_be_tested:
@@ -84,18 +76,7 @@ def _tested(found: Standing, settings: ReportSettings) -> str:
     )
 
 
-def drawings(
-    found: Standing, runs: Sequence[PlannerRuns], settings: ReportSettings
-) -> Iterator[Drawing]:
-    """Yield performance profiles, and the critical-difference diagram."""
-    counted = set(found.problems)
-    conditions = stored_conditions(own for own in runs if own.problem.name in counted)
-    if found.can_be_profiled:
-        unsolved = int(np.isinf(found.efforts).all(axis=1).sum())
-        never = f" No planner has a proven answer on {unsolved} of them." if unsolved else ""
-        profiled, problems = (rank_diagrams.PROFILES, conditions, found), len(found.problems)
-        yield WORDS.drawing("performance_profiles", *profiled, problems=problems, never=never)
-    if found.can_be_tested:
-        ranks, tested = rank_diagrams.CRITICAL_DIFFERENCE, _tested(found, settings)
-        given = ranks, conditions, found, settings.significance
-        yield WORDS.drawing("critical_difference", *given, tested=tested)
+def never_proven(found: Standing) -> str:
+    """Tell how many problems no planner has a proven answer on; empty if there is none."""
+    unsolved = int(np.isinf(found.efforts).all(axis=1).sum())
+    return f" No planner has a proven answer on {unsolved} of them." if unsolved else ""

@@ -85,7 +85,7 @@ def first_feasible(condition: ConditionResults) -> FloatArray:
 
 def num_joints(condition: ConditionResults) -> int:
     """Return the number of joints of the arm, whose start the scenario names."""
-    return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
+    return len(condition.scenario.q_start)
 
 
 def certified(condition: ConditionResults) -> Proportion:

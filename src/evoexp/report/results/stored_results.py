@@ -179,6 +179,21 @@ class ConditionResults:
         return found
 
     @property
+    def robot(self) -> Any:
+        """The robot."""
+        return self.condition.robot
+
+    @property
+    def scenario(self) -> Any:
+        """The scene and the task."""
+        return self.condition.scenario
+
+    @property
+    def length_unit(self) -> str:
+        """Unit of lengths in the scene."""
+        return self.condition.length_unit
+
+    @property
     def planner(self) -> Any:
         """The paper's planner; of a control or a reference the planner that it stands beside."""
         return wrapped(self.condition.planner)

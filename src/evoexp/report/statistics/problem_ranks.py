@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from scipy import stats
 
 from evoexp.records import FloatArray
@@ -18,7 +17,6 @@ from evoexp.report.statistics.inference import expected_effort, quantile
 
 MIN_PLANNERS = 3  # of a critical-difference diagram: two are compared by a test of pairs
 MIN_PROBLEMS = 5  # of it: with fewer, Friedman's test can hardly reject anything
-END = 1.15  # times the largest finite ratio is where a performance profile ends
 
 
 class Friedman(NamedTuple):
@@ -108,23 +106,6 @@ def effort_ratios(efforts: FloatArray) -> FloatArray:
     return np.where(efforts == best, np.where(np.isfinite(best), 1.0, np.inf), ratios)
 
 
-def profile_table(found: Standing) -> pd.DataFrame:
-    """Return the performance profile of each planner, at every ratio at which one rises.
-
-    Returns:
-        Columns planner, ratio, share (of problems), problems.
-    """
-    ratios = effort_ratios(found.efforts)
-    steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
-    axis = np.append(steps, max(END * steps[-1], 2.0))
-    rows = [
-        (planner, x, np.count_nonzero(own <= x) / len(own), len(own))
-        for planner, own in zip(found.planners, ratios.T, strict=True)
-        for x in axis
-    ]
-    return pd.DataFrame(rows, columns=["planner", "ratio", "share", "problems"])
-
-
 def friedman(lengths: FloatArray) -> Friedman:
     """Test whether planners rank alike (Friedman 1937).
 
@@ -141,21 +122,6 @@ def critical_difference(num_planners: int, num_problems: int, significance: floa
     """Return the difference of mean ranks that Nemenyi's test calls significant (Demšar 2006)."""
     q = float(stats.studentized_range.ppf(1.0 - significance, num_planners, np.inf)) / np.sqrt(2.0)
     return float(q * np.sqrt(num_planners * (num_planners + 1) / (6.0 * num_problems)))
-
-
-def rank_table(found: Standing, significance: float) -> pd.DataFrame:
-    """Return mean ranks, best first, with the critical difference.
-
-    Returns:
-        Columns planner, mean_rank, problems, friedman_p, critical_difference.
-    """
-    table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
-    table["problems"] = len(found.problems)
-    table["friedman_p"] = friedman(found.lengths).p_value
-    table["critical_difference"] = critical_difference(
-        len(found.planners), len(found.problems), significance
-    )
-    return table.sort_values("mean_rank", kind="stable", ignore_index=True)
 
 
 def alike(mean_ranks: Sequence[float], difference: float) -> list[tuple[int, int]]:

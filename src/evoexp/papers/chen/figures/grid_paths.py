@@ -12,7 +12,9 @@ from matplotlib.patches import Rectangle
 from evoexp.papers.chen.path_claims import Group, boxes, gaps, median_path, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, groups, marks, spread, style
+from evoexp.report.figures import groups, marks, style
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.inference import spread
 
 OBSTACLE = "obstacle"
 FAINT, MEDIAN, EXACT = "all runs", "run of median cost", "best path known (reference)"
@@ -48,7 +50,7 @@ def paths_table(panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]]) 
     """
     rows: list[tuple[object, ...]] = []
     for title, c, lines in panels:
-        head = title, c.condition.length_unit
+        head = title, c.length_unit
         for number, (x0, y0, x1, y1) in enumerate(boxes(c)):
             rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
         for number, line in enumerate(lines):
@@ -234,10 +236,3 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
 def _name(condition: ConditionResults, group: Group) -> str:
     """Return the part of a label that the condition adds to its group's: "elitism"."""
     return condition.label.removeprefix(group.name).strip(" ,·") or "genetic algorithm"
-
-
-COSTS = costs_table, draw_costs
-GAPS = gaps_table, draw_gaps
-PATHS = paths_table, draw_paths
-PLACES = places_table, draw_places
-ROUTES = paths_table, draw_routes

@@ -14,8 +14,12 @@ from matplotlib.patches import Rectangle
 from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
 from evoexp.planners.two_stage.planner import Problem, TwoStage
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import markdown, style
+from evoexp.report.figures import groups, style
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import PlayedRun
+from evoexp.report.results.run_measures import median_replicate, planned_by
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import Proportion
 
 PATH, TRAVEL, DOCKED = "path", "travel posture", "docking posture"
 TARGET, BODY, FORCE = "target", "body", "force"
@@ -24,16 +28,16 @@ PLATFORM: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": style.NEUTRAL}
 ARROW = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
 
 
-def missions_table(shown: Sequence[kit.ConditionResults]) -> pd.DataFrame:
+def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
     """Return the run of median cost of every condition, with everything that is drawn of it."""
     rows: list[tuple[object, ...]] = []
     for c in shown:
-        replicate = kit.median_replicate(c, c.column("best_cost"))
+        replicate = median_replicate(c, c.column("best_cost"))
         q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
         word = "certified" if verdict["certified"] else "not certified"
         told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
-        robot: Any = c.condition.robot
-        scenario: Any = c.condition.scenario
+        robot = c.robot
+        scenario = c.scenario
         arm = partial(_joints, c.problem(Problem).scene.model, robot.link_lengths[-1])
         reach, above = scenario.docking.target
         kinds = [
@@ -45,7 +49,7 @@ def missions_table(shown: Sequence[kit.ConditionResults]) -> pd.DataFrame:
             (TARGET, 0, [(scenario.task_origin[0] + reach, robot.body_height + above)]),
             (FORCE, 0, [scenario.docking.force]),
         ]
-        given = told, c.condition.length_unit
+        given = told, c.length_unit
         rows += [(*given, *kind, a, b) for *kind, points in kinds for a, b in points]
     return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
 
@@ -64,7 +68,7 @@ def draw_missions(table: pd.DataFrame) -> Figure:
     count = table["row"].nunique()
     figure = style.figure(3.1 * count + 0.3)
     panels = figure.subplots(count, 2, squeeze=False)
-    for (above, side), (name, rows) in zip(panels, kit.groups(table, "row"), strict=True):
+    for (above, side), (name, rows) in zip(panels, groups(table, "row"), strict=True):
         _draw_above(above, rows)
         _draw_side(side, rows)
         label, _, told = str(name).partition(", ")
@@ -76,7 +80,7 @@ def draw_missions(table: pd.DataFrame) -> Figure:
 
 def _draw_above(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw obstacles and the platform's way."""
-    for _, corners in kit.groups(rows[rows["kind"] == OBSTACLE], "number"):
+    for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
         draw_obstacle(axes, corners["a"], corners["b"])
     path = rows.loc[rows["kind"] == PATH, ["a", "b"]].to_numpy()
     axes.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
@@ -88,7 +92,7 @@ def _draw_above(axes: Axes, rows: pd.DataFrame) -> None:
 
 def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw the platform, both postures of the arm, the target and the force."""
-    first = {str(kind): own[["a", "b"]].to_numpy()[0] for kind, own in kit.groups(rows, "kind")}
+    first = {str(kind): own[["a", "b"]].to_numpy()[0] for kind, own in groups(rows, "kind")}
     (radius, height), (middle, _) = first[BODY], first[DOCKED]
     axes.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **PLATFORM))
     for name, colour, pattern in ((TRAVEL, style.FAINT, "--"), (DOCKED, style.ARM_COLOURS[1], "-")):
@@ -108,26 +112,26 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
     axes.margins(0.1)
 
 
-def fits_missions(results: kit.Results) -> bool:
+def fits_missions(results: Results) -> bool:
     """Return whether there are results, all of two searches in one."""
-    return kit.planned_by(results, TwoStage)
+    return planned_by(results, TwoStage)
 
 
-def median_missions(conditions: Sequence[kit.ConditionResults]) -> list[kit.PlayedRun]:
+def median_missions(conditions: Sequence[ConditionResults]) -> list[PlayedRun]:
     """Return the run of median cost of every condition."""
-    return [kit.PlayedRun(c, kit.median_replicate(c, c.column("best_cost"))) for c in conditions]
+    return [PlayedRun(c, median_replicate(c, c.column("best_cost"))) for c in conditions]
 
 
 def mission_checks(
-    conditions: Sequence[kit.ConditionResults], confidence: float
+    conditions: Sequence[ConditionResults], confidence: float
 ) -> Iterator[tuple[str, str]]:
     """Yield the rows on every condition's exact verdicts and on its docking places."""
     for condition in conditions:
-        label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
-        free = kit.Proportion(found.certified, found.judged)
+        label, found, scenario = condition.label, condition.verdicts, condition.scenario
+        free = Proportion(found.certified, found.judged)
         nearest = condition.summaries["clearance_pair"].value_counts()
         places = np.round(condition.column("term_platform_x"), 3)
-        near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]
+        near = np.count_nonzero(places < scenario.docking.target[0])
         verdicts = (
             f"{markdown.share(*free)} ({markdown.percent(free.interval(confidence))}) free "
             f"of contact over the whole motion; {found.refuted} touch, {found.undecided} "

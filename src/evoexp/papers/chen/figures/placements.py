@@ -12,7 +12,8 @@ from matplotlib.ticker import MultipleLocator
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.records import FloatArray
-from evoexp.report.kit import groups, marks, quantiles, records, rounded, style
+from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.statistics.inference import quantiles
 
 RUNS = ("GA", "GA, elitism", "random search")
 ORDER = (*RUNS, *METHODS)  # the place of a method gives its colour
@@ -157,7 +158,7 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
     """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles."""
     rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
-        scenario: Any = case.conditions[0].condition.scenario
+        scenario: Any = case.conditions[0].scenario
         own: list[tuple[Any, ...]] = [
             ("obstacle", "", *place, *place, float(getattr(obstacle, "radius", 0.0)))
             for obstacle, place in zip(
@@ -181,7 +182,7 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
 
 def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any, ...]]:
     """Return the platform and the links of a posture, of which the terms are given."""
-    robot: Any = case.conditions[0].condition.robot
+    robot: Any = case.conditions[0].robot
     length, height = 0.5 * np.array(robot.platform_size)
     angles = np.cumsum([np.radians(found[f"theta_{k}_deg"]) for k in (1, 2, 3)])
     steps = np.array([np.cos(angles), np.sin(angles)]) * np.array(robot.link_lengths)
@@ -315,9 +316,3 @@ def _draw_points(axes: Axes, rows: pd.DataFrame) -> None:
             axes.plot(x, y, linestyle="none", label=element, **look)
     axes.set(xlabel="θ₁ [deg]", ylabel="θ₂ [deg]", aspect="equal")
     axes.grid(False)
-
-
-FITNESS = fitness_table, draw_fitness
-GAPS = gaps_table, draw_gaps
-LANDSCAPE = landscape_table, draw_landscape
-POSTURES = postures_table, draw_postures

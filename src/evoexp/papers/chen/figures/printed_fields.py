@@ -15,8 +15,10 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import groups, records, style
+from evoexp.report.figures import groups, records, style
+from evoexp.report.pages.page_parts import Claim
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.judging import Judge
 
 BLOCKED = "*"
 MOST_LEVELS = 10  # of a map whose colour bar shows them one by one
@@ -164,14 +166,14 @@ def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
     )
 
 
-def field_references(results: kit.Results) -> tuple[kit.ConditionResults, ...]:
+def field_references(results: Results) -> tuple[ConditionResults, ...]:
     """Return the references that hold potential fields."""
     return tuple(c for c in results.references if isinstance(c.planner, GridPathGa))
 
 
 def printed_fields(
-    field_references: Sequence[kit.ConditionResults],
-) -> list[tuple[kit.ConditionResults, pd.DataFrame]]:
+    field_references: Sequence[ConditionResults],
+) -> list[tuple[ConditionResults, pd.DataFrame]]:
     """Return the references of the printed map, with all nodes of both fields."""
     return [(c, _compared(c)) for c in field_references if _fields(c)[0].shape == (16, 16)]
 
@@ -182,7 +184,7 @@ def nodes_table(nodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def single_fields(
-    printed_fields: list[tuple[kit.ConditionResults, pd.DataFrame]],
+    printed_fields: list[tuple[ConditionResults, pd.DataFrame]],
 ) -> list[tuple[str, pd.DataFrame]]:
     """Return the name and the nodes of every field."""
     return [
@@ -190,11 +192,11 @@ def single_fields(
     ]
 
 
-def _fields(condition: kit.ConditionResults) -> tuple[np.ndarray, np.ndarray]:
+def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
     return condition.array("goal_field"), condition.array("unsafeness")
 
 
-def _compared(condition: kit.ConditionResults) -> pd.DataFrame:
+def _compared(condition: ConditionResults) -> pd.DataFrame:
     """Return all nodes of both fields beside the printed ones; see `compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
@@ -203,7 +205,7 @@ def _compared(condition: kit.ConditionResults) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def wave_front(judge: kit.Judge, field: str, nodes: pd.DataFrame) -> kit.Claim:
+def wave_front(judge: Judge, field: str, nodes: pd.DataFrame) -> Claim:
     """Judge that a field is printed as the wave front computes it."""
     total = int((nodes["slip"] != SURPLUS).sum())
     same, wrong, missing, surplus = (
@@ -240,12 +242,12 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
     return f" (or any equal one of columns {first} to {last})" if first < last else ""
 
 
-def map_shape(condition: kit.ConditionResults) -> str:
+def map_shape(condition: ConditionResults) -> str:
     """Return the numbers of nodes along both axes, as stems have them."""
     return "_".join(map(str, _fields(condition)[0].shape))
 
 
-def map_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def map_table(condition: ConditionResults) -> pd.DataFrame:
     """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
     x, y = (axis.ravel() for axis in np.indices(goal.shape))

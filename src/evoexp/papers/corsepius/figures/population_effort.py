@@ -12,9 +12,13 @@ from matplotlib.ticker import NullFormatter, NullLocator
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
-from evoexp.report import kit
+from evoexp.report.figures import groups, marks, style
 from evoexp.report.figures.boxes import JITTER
-from evoexp.report.kit import marks, style
+from evoexp.report.results.run_measures import solved
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics import inference
+from evoexp.report.statistics.comparisons import Values
+from evoexp.report.statistics.inference import Proportion
 
 SHARE, EFFORT, RATIO = "share", "effort", "ratio"
 NUMBERS = "abcdef"
@@ -26,8 +30,8 @@ PROPORTIONAL: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.1, "lines
 
 def effort_table(
     found: tuple[Task, ...],
-    shares: Mapping[str, Callable[[kit.ConditionResults], kit.Proportion]],
-    effort: Mapping[str, kit.Values],
+    shares: Mapping[str, Callable[[ConditionResults], Proportion]],
+    effort: Mapping[str, Values],
     confidence: float,
     num_resamples: int,
 ) -> pd.DataFrame:
@@ -52,10 +56,10 @@ def effort_table(
     ]
     for name, values in effort.items():
         for *given, c in points:
-            runs = values(c), kit.solved(c)
+            runs = values(c), solved(c)
             expected = (
-                kit.expected_effort(*runs),
-                *kit.expected_interval(*runs, confidence, num_resamples),
+                inference.expected_effort(*runs),
+                *inference.expected_interval(*runs, confidence, num_resamples),
             )
             rows.append((name, EFFORT, *given, *expected, c.solved, c.done))
     return pd.DataFrame(rows, columns=[*NAMES, "having", "total"])
@@ -124,7 +128,7 @@ def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> 
     share = table["kind"].iloc[0] == SHARE
     scale = 100.0 if share else 1.0
     known = table.replace(np.inf, np.nan).dropna(subset="expected").sort_values("value")
-    for position, rows in kit.groups(known, "position"):
+    for position, rows in groups(known, "position"):
         x = rows["value"] * (1.0 + APART * (position - 0.5 * (count - 1)))
         look, most = _look(int(position)), rows["upper"].fillna(rows["expected"])
         axes.plot(x, scale * rows["expected"], linewidth=1.1, **look)
@@ -168,14 +172,14 @@ def floor_table(found: Sequence[Task]) -> pd.DataFrame:
         for scope, c in task.by_value.items():
             given = position, task.name
             for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
-                median, lower, upper, _ = kit.spread(values)
+                median, lower, upper, _ = inference.spread(values)
                 rows.append((*given, name, scope, median, lower, upper, c.done, slope(task)))
             rows += [
                 (*given, POINT, scope, value, value, value, 1, slope(task))
                 for value in measures.residuals(c)
             ]
     names = ["position", "task", "quantity", "scope", "median", "lower", "upper", "runs", "slope"]
-    unit = found[0].conditions[0].condition.length_unit
+    unit = found[0].conditions[0].length_unit
     return pd.DataFrame(rows, columns=names).assign(length_unit=unit)
 
 
@@ -184,7 +188,7 @@ def slope(task: Task) -> float:
 
     It is NaN if there are fewer than two scopes.
     """
-    medians = np.array([kit.spread(measures.residuals(c)).median for c in task.conditions])
+    medians = np.array([inference.spread(measures.residuals(c)).median for c in task.conditions])
     if len(medians) < 2 or not (medians > 0.0).all():
         return float("nan")
     x, y = np.log2(np.array(task.values)), np.log2(medians)
@@ -196,7 +200,7 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     """Draw residuals with every run, and cycles, against the scope, a colour per kind of goal."""
     figure, (left, right) = style.row_of_panels(3.4, 2)
     unit, keys = table["length_unit"].iloc[0], []
-    for (position, task), own in kit.groups(table, ["position", "task"]):
+    for (position, task), own in groups(table, ["position", "task"]):
         colour = style.arm_colour(int(position))
         name = f"{task} (slope {own['slope'].iloc[0]:.2f})"
         keys.append(style.key(name, color=colour, marker="o", markersize=4.5))
@@ -231,6 +235,3 @@ def _draw_floor_of(left: Axes, right: Axes, table: pd.DataFrame, colour: str) ->
     # a proportional line through the middle
     x, middle = residuals["scope"], len(residuals) // 2
     left.plot(x, residuals["median"].iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)
-
-
-FLOOR = floor_table, draw_floor

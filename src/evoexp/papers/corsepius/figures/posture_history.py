@@ -9,7 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.corsepius import measures
-from evoexp.report.kit import Results, counted, groups, marks, quantile, quantiles, records, style
+from evoexp.report.figures import groups, marks, records, style
+from evoexp.report.results.run_measures import counted
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.inference import quantile, quantiles
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels
@@ -47,7 +50,7 @@ def history_table(results: Results) -> pd.DataFrame:
                     "begun": wide.shape[1],
                     "running": wide.notna().sum(axis=1).to_numpy(),
                     "tolerance": measures.tolerances(c)[int(phase) - 1],
-                    "length_unit": c.condition.length_unit,
+                    "length_unit": c.length_unit,
                 }
                 parts.append(pd.DataFrame(table))
     return pd.concat(parts, ignore_index=True)
@@ -163,7 +166,3 @@ def draw_phases(table: pd.DataFrame) -> Figure:
     )
     right.set(xlim=(0, None), xlabel="cycles (median, quartiles)", title="b  cycles")
     return figure
-
-
-HISTORY = history_table, draw_history
-PHASES = phases_table, draw_phases

@@ -16,8 +16,10 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import motion_geometry, style
+from evoexp.report.figures import groups, records, rounded, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.inference import BOOTSTRAP_SEED
 from evoexp.robots.poses import frame_pose
 
 LINK, OBSTACLE, HELD, TIP, GOAL = "link", "obstacle", "held", "tip", "goal"
@@ -36,7 +38,7 @@ class ShownPath(NamedTuple):
     """The run of one panel, or of one panel per phase."""
 
     title: str  # title of the panel
-    condition: kit.ConditionResults  # the condition of the run
+    condition: ConditionResults  # the condition of the run
     replicate: int  # its replicate
     by_phase: bool = False  # whether each phase has a panel of its own
 
@@ -47,7 +49,7 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
     for one in shown:
         problem = measures.problem(one.condition)
         postures = measures.paths(one.condition)[one.replicate]
-        spans, unit = problem.spans(postures), one.condition.condition.length_unit
+        spans, unit = problem.spans(postures), one.condition.length_unit
         for number, span in enumerate(spans) if one.by_phase else [(0, spans[-1])]:
             first = span.first if one.by_phase else 0
             title = f"{number + 1}  {span.stage.phase.name}" if one.by_phase else one.title
@@ -55,12 +57,12 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
             panels.append([given | row for row in _panel(problem, span, postures, first)])
     rows = [row for panel in panels for row in panel]
     names = ["panel", "title", "element", "instant", "name", *solids.COLUMNS, *PATH, "length_unit"]
-    return kit.rounded(pd.DataFrame(rows).reindex(columns=names))
+    return rounded(pd.DataFrame(rows).reindex(columns=names))
 
 
 def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
     """Draw one panel per path or phase; where there are one or two, each from above, too."""
-    panels = list(kit.groups(table, ["panel", "title"]))
+    panels = list(groups(table, ["panel", "title"]))
     above = len(panels) <= FEW
     columns = 2 if above else min(PER_LINE, len(panels))
     lines = len(panels) if above else -(-len(panels) // columns)
@@ -147,12 +149,12 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     )
     first, last = sticks["instant"].min(), sticks["instant"].max()
     # obstacles, and the held object: earlier fainter
-    for row in kit.records(obstacles):
+    for row in records(obstacles):
         draw(axes, row, style.FAINT, 0.22)
-    for row in kit.records(held):
+    for row in records(held):
         draw(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
     # postures: earlier fainter, joints of the last one
-    for instant, links in kit.groups(sticks, "instant"):
+    for instant, links in groups(sticks, "instant"):
         points = [[links[name].iloc[0], *links[f"{name}_end"]] for name in names]
         shade = 0.12 + 0.4 * (instant - first) / max(1, last - first)
         newest = instant == last
@@ -167,7 +169,7 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     axes.plot(*(goal[name] for name in names), "*", zorder=8, **star)
 
 
-def scope_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def scope_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the shown path in its two liveliest joints, and the tool's reach at the start.
 
     The reach is told by hulls of the tool's places after one random step.
@@ -177,7 +179,7 @@ def scope_table(condition: kit.ConditionResults) -> pd.DataFrame:
     moved = np.abs(np.diff(q, axis=0)).sum(axis=0)
     a, b = sorted(int(k) for k in np.argsort(-moved, kind="stable")[:2])
     half = problem.scope[[a, b]] / DEGREE
-    rng = np.random.Generator(np.random.PCG64(kit.BOOTSTRAP_SEED))
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     steps = 2.0 * rng.random((STEPS, len(problem.start))) - 1.0
     parts = [(POSTURE, q[:, [a, b]] / DEGREE, *half, np.nan)]
     for factor in FACTORS:
@@ -190,10 +192,10 @@ def scope_table(condition: kit.ConditionResults) -> pd.DataFrame:
         for element, points, *rest in parts
         for n, (x, y) in enumerate(points)
     ]
-    table = kit.rounded(
+    table = rounded(
         pd.DataFrame(rows, columns=["element", "order", "x", "y", "half_x", "half_y", "factor"])
     )
-    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit)
+    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.length_unit)
 
 
 def draw_scope(table: pd.DataFrame) -> Figure:
@@ -201,7 +203,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     figure, (left, right) = style.row_of_panels(3.4, 2)
     path, reach, tool = (table[table["element"] == element] for element in (POSTURE, REACH, WAY))
     blue, last = style.arm_colour(0), max(1, len(path) - 1)
-    for row in kit.records(path):
+    for row in records(path):
         corner, shade = (row.x - row.half_x, row.y - row.half_y), 0.10 + 0.12 * row.order / last
         look: dict[str, Any] = {"linewidth": 0, "facecolor": blue, "alpha": shade}
         left.add_patch(Rectangle(corner, 2 * row.half_x, 2 * row.half_y, **look))
@@ -210,7 +212,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     joints = (int(table[name].iloc[0]) - 1 for name in ("joint_x", "joint_y"))
     x, y = (f"{style.joint_symbol(0, joint)} [deg]" for joint in joints)
     left.set(xlabel=x, ylabel=y, title="a  boxes of offspring along a path", **EQUAL)
-    for k, (factor, rows) in enumerate(sorted(kit.groups(reach, "factor"), reverse=True)):
+    for k, (factor, rows) in enumerate(sorted(groups(reach, "factor"), reverse=True)):
         colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
         look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
         right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **look)
@@ -227,6 +229,3 @@ def _draw_ends(axes: Axes, path: pd.DataFrame) -> None:
     look: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
     axes.plot(path["x"].iloc[:1], path["y"].iloc[:1], "s", markersize=6, label="start", **look)
     axes.plot(path["x"].iloc[-1:], path["y"].iloc[-1:], "*", markersize=9, label="end", **look)
-
-
-SCOPE = scope_table, draw_scope

@@ -13,10 +13,13 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
+from evoexp.papers.corsepius.measures import Conditions
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import marks, style
+from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.results.run_measures import median_replicate, solved
+from evoexp.report.results.stored_results import ConditionResults
+from evoexp.report.statistics.inference import BOOTSTRAP_SEED
 
 TOOL, CELL, ESCAPE, OBSTACLE, GOAL = "tool", "cell", "escape", "obstacle", "goal"
 CELLS = 81  # of the landscape, along each joint
@@ -29,25 +32,21 @@ END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
 Rows = list[dict[str, object]]
 
 
-def pair(
-    shown: tuple[kit.ConditionResults, ...],
-) -> tuple[kit.ConditionResults, kit.ConditionResults] | None:
-    """Return a task of one phase in which runs get stuck, and with sub-goals, solved."""
-    return next(
-        (
-            (stuck, helped)
-            for helped in shown
-            for stuck in shown
-            if stuck.solved < stuck.done
-            and helped.solved > 0
-            and len(measures.phase_names(stuck)) == 1
-            and measures.only_subgoals_differ(stuck, helped)
-        ),
-        None,
+def stuck_pair(obstructed: Conditions) -> Conditions:
+    """Return a task of one phase in which runs get stuck, and with sub-goals, solved; or none."""
+    pairs = (
+        (stuck, helped)
+        for helped in obstructed
+        for stuck in obstructed
+        if stuck.solved < stuck.done
+        and helped.solved > 0
+        and len(measures.phase_names(stuck)) == 1
+        and measures.only_subgoals_differ(stuck, helped)
     )
+    return next(pairs, ())
 
 
-def trap_table(stuck: kit.ConditionResults, helped: kit.ConditionResults) -> pd.DataFrame:
+def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
     """Return ways of the tools with distances to the goal, and the cost around a stuck posture.
 
     That posture is the end of the median run that is stuck. The planner's own `cost` judges all
@@ -55,10 +54,10 @@ def trap_table(stuck: kit.ConditionResults, helped: kit.ConditionResults) -> pd.
     """
     rows: Rows = []
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
-        wanted, found = kit.solved(condition) == (series == HELPED), measures.paths(condition)
+        wanted, found = solved(condition) == (series == HELPED), measures.paths(condition)
         for replicate in condition.summaries.index[wanted]:
             rows += _way(stuck, series, int(replicate), found[replicate])
-    median = kit.median_replicate(stuck, measures.evaluations(stuck), ~kit.solved(stuck))
+    median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
     failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
     rows += [*_cells(stuck, failed[-1], a, b), *_escape(stuck, failed[-1])]
@@ -69,18 +68,18 @@ def trap_table(stuck: kit.ConditionResults, helped: kit.ConditionResults) -> pd.
     standing = [solids.solid(*shape) for shape in shapes]
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
     names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS]
-    table = kit.rounded(pd.DataFrame(rows).reindex(columns=[*names, "x_end", "y_end", "scope_deg"]))
-    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
+    table = rounded(pd.DataFrame(rows).reindex(columns=[*names, "x_end", "y_end", "scope_deg"]))
+    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.length_unit)
 
 
-def _cost(condition: kit.ConditionResults, q: FloatArray) -> FloatArray:
+def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
     """Return the cost of postures q (nq, postures) [rad]; NaN: infeasible."""
     planner, problem = condition.prepared
     cost = planner.cost(problem, q).cost
     return np.where(np.isinf(cost), np.nan, cost)
 
 
-def _way(condition: kit.ConditionResults, series: str, replicate: int, q: FloatArray) -> Rows:
+def _way(condition: ConditionResults, series: str, replicate: int, q: FloatArray) -> Rows:
     """Return the places of the tool along a path, and its distances to the goal."""
     planner, problem = condition.prepared
     judged = planner.cost(problem, q.T)
@@ -93,7 +92,7 @@ def _way(condition: kit.ConditionResults, series: str, replicate: int, q: FloatA
     ]
 
 
-def _cells(condition: kit.ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
+def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
     """Return the cost over two joints, the others as at the end of the run that is stuck."""
     problem = measures.problem(condition)
     low, high = _box(problem, end, AROUND)
@@ -106,9 +105,9 @@ def _cells(condition: kit.ConditionResults, end: FloatArray, a: int, b: int) -> 
     return [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
 
 
-def _escape(condition: kit.ConditionResults, end: FloatArray) -> Rows:
+def _escape(condition: ConditionResults, end: FloatArray) -> Rows:
     """Return the least cost of random postures in boxes around a posture, and its own cost."""
-    rng = np.random.Generator(np.random.PCG64(kit.BOOTSTRAP_SEED))
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     (own,), rows = _cost(condition, end[:, None]), list[dict[str, object]]()
     for n, half in enumerate(BOXES):
         low, high = _box(measures.problem(condition), end, half)
@@ -133,14 +132,14 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     )
     unit = table["length_unit"].iloc[0]
     # ways of both kinds of runs, crosses where they are stuck
-    for row in kit.records(obstacles):
+    for row in records(obstacles):
         solids.draw_outline(above, row, style.FAINT, 0.35)
     looks = {
         STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
         HELPED: (style.arm_colour(0), "with a sub-goal"),
     }
     for series, (colour, _) in looks.items():
-        for _, rows in kit.groups(tools[tools["series"] == series], "replicate"):
+        for _, rows in groups(tools[tools["series"] == series], "replicate"):
             for axes, x, y in ((above, "x", "y"), (along, "order", "value")):
                 axes.plot(rows[x], rows[y], color=colour, linewidth=0.7, alpha=0.45)
             if series == STUCK:
@@ -190,6 +189,3 @@ def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
         title="d  random postures around it",
         ylim=(0.0, None),
     )
-
-
-TRAP = trap_table, draw_trap

@@ -12,8 +12,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from evoexp.papers.corsepius import measures
 from evoexp.records import FloatArray
-from evoexp.report.figures import surfaces
-from evoexp.report.kit import ConditionResults, groups, records, rounded, style
+from evoexp.report.figures import groups, records, rounded, style, surfaces
+from evoexp.report.results.stored_results import ConditionResults
 
 BALL, BRICK, ROD, DRUM = "sphere", "box", "capsule", "cylinder"
 SIZES = ["size_1", "size_2", "size_3"]  # box: half its edges; else radius and half the length
@@ -113,7 +113,7 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
             capsules = zip(cover.start, cover.end, cover.radius, strict=True)
             own += [(COVER, name, *_capsule(joint, *capsule)) for capsule in capsules]
-        unit = c.condition.length_unit
+        unit = c.length_unit
         rows += [(position, title, *row, bodies.inflation, unit) for row in own]
     return rounded(
         pd.DataFrame(
@@ -156,6 +156,3 @@ def _capsule(joint: Any, start: FloatArray, stop: FloatArray, radius: float) -> 
         axis = np.array([0.0, 0.0, 1.0])
         shape, turn = ROD, pin.Quaternion.FromTwoVectors(axis, along).matrix()
     return (shape, *joint.act(middle), *(joint.rotation @ turn).ravel(), radius, half, 0.0)
-
-
-MODELS = models_table, draw_models

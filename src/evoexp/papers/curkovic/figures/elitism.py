@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic.hall_shares import Corner, Gain, Shares, short_label
-from evoexp.report.kit import groups, marks, style
+from evoexp.report.figures import groups, marks, style
 
 COLUMNS = ["measure", "corner", "elites", "share", "lower", "upper"]
 WRAPPED = 16  # characters of a quantity's name, per line

@@ -10,7 +10,10 @@ from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, Results, grouped, groups, quantile, style
+from evoexp.report.figures import groups, style
+from evoexp.report.results.run_measures import grouped
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import quantile
 
 Trait = Callable[[ConditionResults], str]
 MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own

@@ -11,7 +11,8 @@ from evoexp.collision.planar.closed_form import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
-from evoexp.report.kit import ConditionResults, marks, records, rounded, style
+from evoexp.report.figures import marks, records, rounded, style
+from evoexp.report.results.stored_results import ConditionResults
 
 SAMPLES = 200  # configurations per segment of the straight line among which one is chosen
 TOP_LINKS = 3  # of the four pairs of links that `closed_form` tells apart
@@ -47,7 +48,7 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
         nu=round(float(nu[k]), 9),
         share=float(steps[k, 0, 0]),
         crossing=bool(found.crossing[TOP_LINKS, k]),
-        length_unit=condition.condition.length_unit,
+        length_unit=condition.length_unit,
     )
 
 
@@ -103,6 +104,3 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
 
 def _middle(row: Any) -> tuple[float, float]:
     return 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
-
-
-INTERSECTION = intersection_table, draw_intersection

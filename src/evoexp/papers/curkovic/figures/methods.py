@@ -11,7 +11,9 @@ from matplotlib.lines import Line2D
 
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray
-from evoexp.report.kit import Results, groups, marks, quantile, style
+from evoexp.report.figures import groups, marks, style
+from evoexp.report.results.stored_results import Results
+from evoexp.report.statistics.inference import quantile
 
 SPREAD = 0.2  # [rows] over which points are spread to either side
 CURVE, FINAL, BOUND, THRESHOLD = "best so far", "final", "lower bound", "threshold"
@@ -227,7 +229,3 @@ def _lines(axes: Axes, table: pd.DataFrame) -> None:
     low, high = axes.get_ylim()
     bound = float(table.loc[table["series"] == BOUND, "value"].iloc[0])
     axes.set_ylim(min(low, bound - 0.04 * (high - bound)), high)
-
-
-COSTS = costs_table, draw_costs
-METHODS = methods_table, draw_methods

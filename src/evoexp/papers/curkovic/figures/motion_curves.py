@@ -13,8 +13,9 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import ConditionResults, groups, marks, motion_geometry, rounded, style
+from evoexp.report.figures import groups, marks, rounded, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
 
 SAMPLES = 40  # per segment
 HALF_TURN = 180.0  # [deg]
@@ -95,7 +96,7 @@ def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
     turns.set_ylim(bottom=0.0)
 
 
-def distances_table(conditions: tuple[kit.ConditionResults, ...], samples: int) -> pd.DataFrame:
+def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
     """Return the bodies' least distance: range over all motions, best replicate, straight line."""
     parts = []
     for position, c in enumerate(conditions):
@@ -107,12 +108,12 @@ def distances_table(conditions: tuple[kit.ConditionResults, ...], samples: int) 
             parts.append(
                 pd.DataFrame(columns | {"instant": instants, "distance": distances} | counts)
             )
-    return kit.rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=conditions[0].condition.length_unit
+    return rounded(pd.concat(parts, ignore_index=True)).assign(
+        length_unit=conditions[0].length_unit
     )
 
 
-def _series(condition: kit.ConditionResults, samples: int) -> dict[str, FloatArray]:
+def _series(condition: ConditionResults, samples: int) -> dict[str, FloatArray]:
     """Return the distances of each series, (instants,) [length unit]."""
     prepared, solutions = condition.prepared, condition.solutions
     scene = condition.problem(Problem).scene
@@ -142,9 +143,9 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for axes in panels[len(positions) :]:
         axes.set_axis_off()
-    for axes, (position, rows) in zip(panels, kit.groups(table, "position"), strict=False):
+    for axes, (position, rows) in zip(panels, groups(table, "position"), strict=False):
         colour = style.condition_colour(int(position))
-        own = dict(kit.groups(rows, "series"))
+        own = dict(groups(rows, "series"))
         low, high, best, straight = (own[name] for name in (LOWEST, HIGHEST, BEST, STRAIGHT))
         marks.band(axes, low["instant"], low["distance"], high["distance"], colour)
         axes.plot(straight["instant"], straight["distance"], ":", color=style.FAINT)
@@ -170,6 +171,3 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     ]
     style.keys_below(figure, keys)
     return figure
-
-
-DISTANCES = distances_table, draw_distances

@@ -10,8 +10,11 @@ from matplotlib.figure import Figure
 from evoexp.evolution.pareto import pareto_front
 from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report import kit
-from evoexp.report.kit import groups, marks, rounded, style
+from evoexp.report.figures import groups, marks, rounded, style
+from evoexp.report.pages.page_parts import Quantity
+from evoexp.report.results.run_measures import counted
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import Proportion, spread
 from evoexp.store.log_reader import read_log
 
 CRITERIA = ("c1", "c2", "c3", "c4")
@@ -80,14 +83,14 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
 Fronts = dict[int, list[FrontRow]]  # replicate → front of each population
 
 
-def fronts(condition: kit.ConditionResults) -> Fronts:
+def fronts(condition: ConditionResults) -> Fronts:
     """Return the fronts that the logs of a condition hold."""
     return {
         int(k): read_log(condition.run.log_path(int(k))).fronts for k in condition.summaries.index
     }
 
 
-def front_conditions(results: kit.Results) -> list[tuple[kit.ConditionResults, str]]:
+def front_conditions(results: Results) -> list[tuple[ConditionResults, str]]:
     """Return the conditions whose fronts are drawn, each with the end of its figure's stem."""
     several = len(results.with_data) > 1
     return [
@@ -97,20 +100,20 @@ def front_conditions(results: kit.Results) -> list[tuple[kit.ConditionResults, s
     ]
 
 
-def best_fronts(condition: kit.ConditionResults, fronts: Fronts) -> list[FrontRow]:
+def best_fronts(condition: ConditionResults, fronts: Fronts) -> list[FrontRow]:
     """Return the fronts of the best replicate."""
     return fronts[condition.best_replicate]
 
 
-def front_sizes(results: kit.Results) -> Iterator[kit.Quantity]:
+def front_sizes(results: Results) -> Iterator[Quantity]:
     """Yield the rows of the sizes of fronts, population by population."""
     found = {c.label: fronts(c) for c in results.with_data}
     most = max(len(rows) for own in found.values() for rows in own.values())
     for population in range(most):
-        yield kit.Quantity(
+        yield Quantity(
             f"individuals on the front of robot {population + 1}'s population",
             "–",
-            {label: kit.spread(_sizes(own, population)) for label, own in found.items()},
+            {label: spread(_sizes(own, population)) for label, own in found.items()},
         )
 
 
@@ -126,14 +129,14 @@ def _sizes(fronts: Fronts, population: int) -> FloatArray:
     )
 
 
-def large_fronts(condition: kit.ConditionResults, fronts: Fronts) -> kit.Proportion:
+def large_fronts(condition: ConditionResults, fronts: Fronts) -> Proportion:
     """Count the fronts that are larger than the hall of fame may be."""
-    return kit.counted(_all_sizes(fronts) > condition.planner.ga.num_hall_teams)
+    return counted(_all_sizes(fronts) > condition.planner.ga.num_hall_teams)
 
 
-def single_fronts(fronts: Fronts) -> kit.Proportion:
+def single_fronts(fronts: Fronts) -> Proportion:
     """Count the fronts of a single point."""
-    return kit.counted(_all_sizes(fronts) == 1)
+    return counted(_all_sizes(fronts) == 1)
 
 
 def _all_sizes(fronts: Fronts) -> np.ndarray:

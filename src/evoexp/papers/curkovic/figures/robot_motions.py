@@ -13,8 +13,9 @@ from matplotlib.patches import Circle
 
 from evoexp.condition import Prepared
 from evoexp.papers.curkovic import link_motions, measures
-from evoexp.report import kit
-from evoexp.report.kit import marks, motion_geometry, style
+from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
@@ -26,7 +27,7 @@ TOOL = 2  # number of a robot's third link, which is the body around its end-eff
 DASHES: Any = (0, (2, 1))
 
 
-def motion_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def motion_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the trail of the best replicate, and end-effector paths and contacts of all."""
     prepared, best = condition.prepared, condition.best_replicate
     parts = [_obstacles(condition)]
@@ -41,8 +42,8 @@ def motion_table(condition: kit.ConditionResults) -> pd.DataFrame:
                 for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1))
             ]
     parts.append(_contacts(condition))
-    table = kit.rounded(pd.concat(parts, ignore_index=True)).assign(
-        best=best, length_unit=condition.condition.length_unit
+    table = rounded(pd.concat(parts, ignore_index=True)).assign(
+        best=best, length_unit=condition.length_unit
     )
     return table[["element", "replicate", *LINK, "best", "length_unit"]]
 
@@ -55,11 +56,11 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     best, unit = table["best"].iloc[0], table["length_unit"].iloc[0]
     path, contacts = table[table["element"] == PATH], table[table["element"] == CONTACT]
     for axes in (trail, paths):
-        for _, outline in kit.groups(table[table["element"] == OBSTACLE], "link"):
+        for _, outline in groups(table[table["element"] == OBSTACLE], "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
         style.operational_axes(axes, unit)
     _trail(trail, table)
-    for (robot, replicate), rows in kit.groups(path, ["robot", "replicate"]):
+    for (robot, replicate), rows in groups(path, ["robot", "replicate"]):
         colour = style.arm_colour(int(robot))
         if replicate == best:
             trail.plot(rows["x_end"], rows["y_end"], ".", color=colour, markersize=2.6, zorder=4)
@@ -75,7 +76,7 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def tools_table(conditions: Sequence[kit.ConditionResults]) -> pd.DataFrame:
+def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
     """Return the end-effector paths of conditions that differ in the end-effector's radius."""
     parts = []
     for position, c in enumerate(conditions):
@@ -92,8 +93,8 @@ def tools_table(conditions: Sequence[kit.ConditionResults]) -> pd.DataFrame:
             refuted=shown in motion_geometry.refuted(c),
         )
         parts.append(given)
-    table = kit.rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=conditions[0].condition.length_unit
+    table = rounded(pd.concat(parts, ignore_index=True)).assign(
+        length_unit=conditions[0].length_unit
     )
     return table.drop(columns=["element", "link", "radius"])
 
@@ -108,17 +109,17 @@ def draw_tools(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(1, len(tests), sharex=True, sharey=True, squeeze=False)[0]
     for axes, substeps in zip(panels, tests, strict=True):
         style.operational_axes(axes, unit)
-        for (radius, _), rows in kit.groups(
+        for (radius, _), rows in groups(
             table[table["collision_substeps"] == substeps], ["tcp_radius", "robot"]
         ):
             colour = style.condition_colour(radii.index(radius))
             kind = DASHES if rows["refuted"].any() else "-"
             axes.plot(rows["x_end"], rows["y_end"], color=colour, linestyle=kind)
-            for row in kit.records(rows[rows["at_configuration"]]):
+            for row in records(rows[rows["at_configuration"]]):
                 tip = row.x_end, row.y_end
                 axes.add_patch(Circle(tip, radius, fill=False, edgecolor=colour, lw=0.7, alpha=0.7))
             _ends(axes, rows)
-        for robot, rows in kit.groups(table, "robot"):
+        for robot, rows in groups(table, "robot"):
             look: dict[str, Any] = {"fontsize": 7.5, "zorder": 7, "path_effects": marks.HALO}
             start = rows["x_end"].iloc[0], rows["y_end"].iloc[0]
             marks.write(axes, f"robot {int(robot) + 1}", start, (0, -13), **look)
@@ -155,7 +156,7 @@ def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFra
     return tips.assign(element=PATH, x=before["x_end"], y=before["y_end"])
 
 
-def _contacts(condition: kit.ConditionResults) -> pd.DataFrame:
+def _contacts(condition: ConditionResults) -> pd.DataFrame:
     """Return the first contacts of bodies in the motions that the exact verdict refutes."""
     rows = []
     for replicate, (instant, pair) in motion_geometry.refuted(condition).items():
@@ -166,9 +167,9 @@ def _contacts(condition: kit.ConditionResults) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
 
 
-def _obstacles(condition: kit.ConditionResults) -> pd.DataFrame:
+def _obstacles(condition: ConditionResults) -> pd.DataFrame:
     """Return the outlines of the obstacles."""
-    table = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    table = obstacle_table(condition.scenario.obstacles)
     rows = [
         (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
         for k, outline in enumerate(motion_geometry.obstacle_outlines(table))
@@ -181,7 +182,7 @@ def _trail(axes: Axes, table: pd.DataFrame) -> None:
     """Draw postures, and at configurations the boundaries of thick links and tools."""
     postures, at = table[table["element"] == POSTURE], table[table["element"] == CONFIGURATION]
     last = postures["instant"].max()
-    for (robot, instant), rows in kit.groups(postures, ["robot", "instant"]):
+    for (robot, instant), rows in groups(postures, ["robot", "instant"]):
         links = rows[rows["link"] < TOOL]
         if instant in (0.0, last):
             style.draw_arm(axes, int(robot), links, dashed=instant == 0.0)
@@ -189,7 +190,7 @@ def _trail(axes: Axes, table: pd.DataFrame) -> None:
             x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
             axes.plot(x, y, color=style.arm_colour(int(robot)), linewidth=0.9, alpha=0.3, zorder=2)
         marks.base(axes, links["x"].iloc[0], links["y"].iloc[0], 6, zorder=2)
-    for row in kit.records(at[at["radius"] > 0.0]):
+    for row in records(at[at["radius"] > 0.0]):
         look: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.6, "zorder": 2}
         look["color"] = style.arm_colour(row.robot)
         if row.link == TOOL:
@@ -238,6 +239,3 @@ def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
         *_end_keys(),
         *([contact] if contacts else []),
     ]
-
-
-TOOLS = tools_table, draw_tools

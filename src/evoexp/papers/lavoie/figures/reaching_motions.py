@@ -13,8 +13,11 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.lavoie import measures
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import markdown, marks, motion_geometry, style
+from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.pages import markdown
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.run_measures import median_replicate, solved
+from evoexp.report.results.stored_results import ConditionResults
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
 LINK, TOUCHING, CONTACT = "link", "touching", "contact"
@@ -42,33 +45,33 @@ class ShownMotion(NamedTuple):
     """The scene of one panel, and the motion in it."""
 
     title: str  # title of the panel
-    condition: kit.ConditionResults  # the condition whose scene is drawn
+    condition: ConditionResults  # the condition whose scene is drawn
     # the replicate whose solution is drawn; None: the start posture only
     replicate: int | None = None
     # (instant, bodies) of the first contact on each sub-path that has one
     contacts: Sequence[tuple[float, str]] = ()
 
 
-def starts(conditions: Sequence[kit.ConditionResults]) -> list[ShownMotion]:
+def starts(conditions: Sequence[ConditionResults]) -> list[ShownMotion]:
     """Return the start posture of every condition."""
     return [ShownMotion(c.label, c) for c in conditions]
 
 
-def solutions(conditions: Sequence[kit.ConditionResults]) -> list[ShownMotion]:
+def solutions(conditions: Sequence[ConditionResults]) -> list[ShownMotion]:
     """Return every condition's solved run of median error."""
-    return [_shown(c, kit.solved(c)) for c in conditions if kit.solved(c).any()]
+    return [_shown(c, solved(c)) for c in conditions if solved(c).any()]
 
 
-def refuted_solutions(conditions: Sequence[kit.ConditionResults]) -> list[ShownMotion]:
+def refuted_solutions(conditions: Sequence[ConditionResults]) -> list[ShownMotion]:
     """Return every condition's solved run of median error among those that touch an obstacle."""
-    touching = ((c, kit.solved(c) & measures.touches(c)) for c in conditions)
+    touching = ((c, solved(c) & measures.touches(c)) for c in conditions)
     return [_shown(c, rows) for c, rows in touching if rows.any()]
 
 
-def _shown(condition: kit.ConditionResults, among: np.ndarray) -> ShownMotion:
+def _shown(condition: ConditionResults, among: np.ndarray) -> ShownMotion:
     """Return the run of median error among some, (done,), as it is drawn."""
     errors = measures.errors(condition)
-    replicate = kit.median_replicate(condition, errors, among)
+    replicate = median_replicate(condition, errors, among)
     verdict = motion_geometry.refuted(condition).get(replicate)
     contacts = measures.contacts(condition, replicate, verdict) if verdict else []
     error = float(errors[condition.summaries.index.get_loc(replicate)])
@@ -81,14 +84,14 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
     parts = []
     for panel, one in enumerate(shown):
         rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]
-        end = one.condition.condition.length_unit
+        end = one.condition.length_unit
         parts += [(panel, one.title, *row, end) for row in rows]
-    return kit.rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
+    return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
     """Draw every scene with its postures, and below each motion a close view of its box."""
-    panels = [rows for _, rows in kit.groups(table, "panel")]
+    panels = [rows for _, rows in groups(table, "panel")]
     ratios = [x / y for x, y in map(_span, panels)]
     moving = bool((table["sub_path"] > 0).any())
     height = min(4.6, 6.1 / sum(ratios))
@@ -110,9 +113,9 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _scene(condition: kit.ConditionResults) -> list[tuple[Any, ...]]:
+def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
     """Return the rows of ellipses, box and targets."""
-    scenario: Any = condition.condition.scenario
+    scenario = condition.scenario
     table = scenario.obstacle_table()
     angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
     ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)
@@ -171,15 +174,15 @@ def _span(rows: pd.DataFrame) -> tuple[float, float]:
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw ellipses, box and targets."""
-    for row in kit.records(rows[rows["element"] == ELLIPSE]):
+    for row in records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
         look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
         axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
-    for row in kit.records(rows[rows["element"] == BOX]):
+    for row in records(rows[rows["element"] == BOX]):
         size = row.x_end - row.x, row.y_end - row.y
         edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
         axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
-    for row in kit.records(rows[rows["element"] == TARGET]):
+    for row in records(rows[rows["element"] == TARGET]):
         wide = 8 if row.name == "via point" else 11
         point: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
         axes.plot(row.x, row.y, MARKERS[row.name], ms=wide, **point)
@@ -197,7 +200,7 @@ def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
 
 def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
     """Draw the start in black, each sub-path in a colour of its own, its end strong."""
-    for (element, sub_path, instant), rows in kit.groups(links, ["element", "sub_path", "instant"]):
+    for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
         x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
         colour, share = _colour(sub_path), instant - (sub_path - 1)
         if element == TOUCHING:

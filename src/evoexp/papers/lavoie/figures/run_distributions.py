@@ -9,8 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from evoexp.report import kit
-from evoexp.report.kit import marks, style
+from evoexp.report.figures import groups, marks, records, style
+from evoexp.report.results.run_measures import counted
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Values
+from evoexp.report.statistics.inference import Proportion, spread
 
 ATTEMPT_COLUMNS = [
     *("position", "condition", "attempts", "having", "total"),
@@ -22,7 +25,7 @@ DISTRIBUTION_COLUMNS = [
     *("series", "position", "condition", "error", "having", "total"),
     *("share", "lower", "upper"),
 ]
-Point = tuple[float, kit.Proportion]
+Point = tuple[float, Proportion]
 """(x, count of the paper's runs)."""
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart
@@ -32,13 +35,13 @@ STOPPING_COLUMNS = [
 ]
 
 
-def attempts_table(results: kit.Results, confidence: float) -> pd.DataFrame:
+def attempts_table(results: Results, confidence: float) -> pd.DataFrame:
     """Return how many runs take 1, 2, … attempts."""
     rows: list[tuple[object, ...]] = []
     for c in results.with_data:
         taken = c.column("term_attempts")
         for number in range(1, 1 + c.planner.num_attempts):
-            found = kit.counted(taken == number)
+            found = counted(taken == number)
             share = *found, found.share, *found.interval(confidence)
             rows.append((results.position(c.label), c.label, number, *share, float(taken.mean())))
     return pd.DataFrame(rows, columns=ATTEMPT_COLUMNS)
@@ -49,7 +52,7 @@ def draw_attempts(table: pd.DataFrame) -> Figure:
     figure, (axes,) = style.row_of_panels(2.9, 1)
     count = table["position"].nunique()
     width = 0.8 / count
-    for k, (position, rows) in enumerate(kit.groups(table, "position")):
+    for k, (position, rows) in enumerate(groups(table, "position")):
         first = rows.iloc[0]
         x = rows["attempts"].to_numpy() + width * (k - 0.5 * (count - 1))
         colour = style.condition_colour(int(position))
@@ -58,7 +61,7 @@ def draw_attempts(table: pd.DataFrame) -> Figure:
         seen = rows.assign(x=x)[rows["share"] > 0.0]
         lower, upper = 100.0 * seen["lower"], 100.0 * seen["upper"]
         axes.vlines(seen["x"], lower, upper, color=style.NEUTRAL, linewidth=1.0)
-        for row in kit.records(seen):
+        for row in records(seen):
             marks.write(axes, str(row.having), (row.x, 100.0 * row.upper), (0, 2), fontsize=6.5)
     axes.set_xticks(sorted(table["attempts"].unique()))
     axes.set(xlabel="attempts of SP1 → SP2", ylabel="share of runs [%]")
@@ -68,9 +71,9 @@ def draw_attempts(table: pd.DataFrame) -> Figure:
 
 
 def distribution_table(
-    results: kit.Results,
-    errors: kit.Values,
-    printed: Callable[[kit.ConditionResults], Sequence[Point]],
+    results: Results,
+    errors: Values,
+    printed: Callable[[ConditionResults], Sequence[Point]],
     confidence: float,
 ) -> pd.DataFrame:
     """Return P(error < x) of every condition at each error that occurs, and the printed points."""
@@ -79,11 +82,11 @@ def distribution_table(
         values = errors(c)
         steps, counts = np.unique(values[np.isfinite(values)], return_counts=True)
         totals = zip([0.0, *steps], [0, *np.cumsum(counts)], strict=True)
-        points = [(FOUND, x, kit.Proportion(int(count), len(values))) for x, count in totals]
+        points = [(FOUND, x, Proportion(int(count), len(values))) for x, count in totals]
         for series, x, share in [*points, *((PRINTED, *point) for point in printed(c))]:
             given = series, results.position(c.label), c.label, x
             rows.append((*given, *share, share.share, *share.interval(confidence)))
-    unit = results.with_data[0].condition.length_unit
+    unit = results.with_data[0].length_unit
     return (
         pd.DataFrame(rows, columns=DISTRIBUTION_COLUMNS)
         .astype({"error": "float64"})
@@ -97,9 +100,9 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
     printed, found = (table[table["series"] == series] for series in (PRINTED, FOUND))
     greatest = max(2.1, 1.05 * float(table["error"].max()))
     for axes in (whole, close):
-        for (position, condition), rows in kit.groups(found, ["position", "condition"]):
+        for (position, condition), rows in groups(found, ["position", "condition"]):
             _curve(axes, rows, greatest, style.condition_colour(int(position)), str(condition))
-        for position, rows in kit.groups(printed, "position"):
+        for position, rows in groups(printed, "position"):
             _points(axes, rows, style.condition_colour(int(position)))
         axes.set(
             xlim=(0.0, greatest),
@@ -110,7 +113,7 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
     low = min([0.93, *printed["lower"]])
     near = low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low)
     close.set(ylim=near, title="b  where the printed percentages are")
-    for row in kit.records(printed):
+    for row in records(printed):
         _label(close, row, row.share == printed.loc[printed["error"] == row.error, "share"].max())
     style.legend_below(figure, whole, 2)
     return figure
@@ -141,17 +144,17 @@ def _label(axes: Axes, row: Any, greatest: bool) -> None:
     marks.write(axes, f"{100 * row.share:.1f} %", (row.error, row.share), offset, **look)
 
 
-def stopping_table(results: kit.Results, errors: kit.Values, effort: kit.Values) -> pd.DataFrame:
+def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataFrame:
     """Return precision and effort of every condition by its stopping value and its generations."""
     rows = [
         (
             *(name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label),
-            *(*kit.spread(values(c))[:3], c.solved, c.done),
+            *(*spread(values(c))[:3], c.solved, c.done),
         )
         for name, values in ((ERROR, errors), (EFFORT, effort))
         for c in results.with_data
     ]
-    unit = results.with_data[0].condition.length_unit
+    unit = results.with_data[0].length_unit
     return pd.DataFrame(rows, columns=STOPPING_COLUMNS).assign(length_unit=unit)
 
 
@@ -167,7 +170,7 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
     }
     for axes, (quantity, (title, label)) in zip(panels, labels.items(), strict=True):
         own = table[table["quantity"] == quantity].replace(np.inf, np.nan)
-        for k, (generations, rows) in enumerate(kit.groups(own, "num_generations")):
+        for k, (generations, rows) in enumerate(groups(own, "num_generations")):
             rows = rows.sort_values("stop_cost")
             x = rows["stop_cost"] + apart * (2 * k - count + 1)
             solved, done = rows[["solved", "done"]].sum()
@@ -188,8 +191,3 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
     panels[0].invert_xaxis()
     style.legend_below(figure, panels[0], 2)
     return figure
-
-
-ATTEMPTS = attempts_table, draw_attempts
-STOPPING = stopping_table, draw_stopping
-DISTRIBUTION = distribution_table, draw_distribution

@@ -12,8 +12,9 @@ from matplotlib.patches import Arc, Circle
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import marks, motion_geometry, style
+from evoexp.report.figures import groups, marks, records, rounded, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
 
 ANGLES = ["joint_1_deg", "joint_2_deg"]
 CLOSEST: dict[str, tuple[str, dict[str, Any]]] = {  # pairs of points: name, look of their line
@@ -25,7 +26,7 @@ NUMBER_OFFSET = 10.0  # [pt] from via-point to number
 NUMBER_ROOM = 0.07  # [-] of the path's extent, from via-point to number
 
 
-def arms_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and joint angles at start and goal."""
     problem = motions.problem(condition)
     rows = []
@@ -36,9 +37,7 @@ def arms_table(condition: kit.ConditionResults) -> pd.DataFrame:
             direction = np.degrees(np.arctan2(y, x))
             rows.append((posture, arm, joint, *start[0, :2], *end[0, :2], direction - angle, angle))
     names = ["posture", "arm", "joint", "x", "y", "x_end", "y_end", "reference_deg", "angle_deg"]
-    return kit.rounded(pd.DataFrame(rows, columns=names)).assign(
-        length_unit=condition.condition.length_unit
-    )
+    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.length_unit)
 
 
 def draw_arms(table: pd.DataFrame) -> Figure:
@@ -46,12 +45,12 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     figure = style.figure(4.7, 4.2)
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])
-    for (posture, arm), links in kit.groups(table, ["posture", "arm"]):
+    for (posture, arm), links in groups(table, ["posture", "arm"]):
         at_start = posture == "start"
         style.draw_arm(axes, arm, links, alpha=1.0 if at_start else 0.35, dashed=not at_start)
-        for row in kit.records(links) if at_start else ():
+        for row in records(links) if at_start else ():
             _angle(axes, row)
-    for row in kit.records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
+    for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
         marks.base(axes, row.x, row.y, 9, zorder=2)
         colour = style.arm_colour(row.arm)
         marks.write(axes, f"arm {row.arm + 1}", (row.x, row.y), (0, -22), color=colour)
@@ -64,7 +63,7 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def via_points_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def via_points_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the via-points of the best replicate, at the beginning and at the end.
 
     At the beginning: the best individual of the initial population.
@@ -108,14 +107,14 @@ def configuration_planes(
     table: pd.DataFrame, height: float
 ) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
     """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm)."""
-    by_arm = list(kit.groups(table, "arm"))
+    by_arm = list(groups(table, "arm"))
     figure, panels = style.row_of_panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
     for axes, (arm, _) in zip(panels, by_arm, strict=True):
         style.configuration_axes(axes, arm)
     return figure, [(axes, *own) for axes, own in zip(panels, by_arm, strict=True)]
 
 
-def circles_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def circles_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and circles of the best replicate at its via-point of least centre distance."""
     problem = motions.problem(condition)
     q = motions.best_motion(condition)
@@ -135,10 +134,10 @@ def circles_table(condition: kit.ConditionResults) -> pd.DataFrame:
         ("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance)
     )
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
-    return kit.rounded(pd.DataFrame(rows, columns=names)).assign(
+    return rounded(pd.DataFrame(rows, columns=names)).assign(
         safety_distance=problem.security_margin,
         instant=instant,
-        length_unit=condition.condition.length_unit,
+        length_unit=condition.length_unit,
     )
 
 
@@ -148,15 +147,15 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     axes = figure.subplots()
     unit, radius = table["length_unit"].iloc[0], table["radius"].max()
     style.operational_axes(axes, unit)
-    for row in kit.records(table[table["element"] == "circle"]):
+    for row in records(table[table["element"] == "circle"]):
         colour = style.arm_colour(row.arm)
         axes.add_patch(Circle((row.x, row.y), row.radius, fc=colour, alpha=0.14, lw=0))
         axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, ec=colour, lw=0.8))
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
-    for arm, links in kit.groups(table[table["element"] == "link"], "arm"):
+    for arm, links in groups(table[table["element"] == "link"], "arm"):
         style.draw_arm(axes, arm, links)
         marks.base(axes, links["x"].iloc[0], links["y"].iloc[0], 9, zorder=2)
-    for row in kit.records(table[table["distance"].notna()]):
+    for row in records(table[table["distance"].notna()]):
         what, line = CLOSEST[row.element]
         label = f"least distance of {what}: {row.distance:.3f} {unit}"
         axes.plot([row.x, row.x_end], [row.y, row.y_end], zorder=6, label=label, **line)
@@ -170,7 +169,7 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def path_table(condition: kit.ConditionResults, solution: FloatArray) -> pd.DataFrame:
+def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
     frames = []
     shape = condition.planner.shape(motions.problem(condition))

@@ -15,8 +15,9 @@ from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.kit import marks, motion_geometry, style
+from evoexp.report.figures import groups, marks, rounded, style
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
@@ -56,14 +57,14 @@ TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
-def snapshots_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion."""
     problem = motions.problem(condition)
     links = motion_geometry.links_table(problem.assembly, motions.best_motion(condition))
     table = motion_geometry.in_stages(links.sort_values("instant", kind="stable"), STAGES)
     spans = (links["x_end"] - links["x"]).abs() + (links["y_end"] - links["y"]).abs()
     spans += (links["z_end"] - links["z"]).abs()
-    obstacles = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    obstacles = obstacle_table(condition.scenario.obstacles)
     outlines = motion_geometry.obstacle_outlines(obstacles, 2.0 * float(spans.max()))
     last = int(links["instant"].max())
     rows = [
@@ -73,9 +74,7 @@ def snapshots_table(condition: kit.ConditionResults) -> pd.DataFrame:
     ]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     found = pd.concat([table[names], pd.DataFrame(rows, columns=names)]) if rows else table[names]
-    return kit.rounded(found.reset_index(drop=True)).assign(
-        length_unit=condition.condition.length_unit
-    )
+    return rounded(found.reset_index(drop=True)).assign(length_unit=condition.length_unit)
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
@@ -94,9 +93,9 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     for axes in panels.ravel()[len(stages) :]:
         axes.set_axis_off()
-    for axes, (stage, rows) in zip(panels.ravel(), kit.groups(table, "stage"), strict=False):
+    for axes, (stage, rows) in zip(panels.ravel(), groups(table, "stage"), strict=False):
         whole = stage == stages[-1]
-        for _, outline in kit.groups(obstacles, "link"):
+        for _, outline in groups(obstacles, "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
         _snapshot(axes, rows, whole=whole)
         style.operational_axes(axes, unit)
@@ -114,7 +113,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def paths_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line, in configuration space."""
     return motions.paths_table(condition, path_table, "best")
 
@@ -129,7 +128,7 @@ def draw_paths(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def sampled_distances(condition: kit.ConditionResults, samples: int) -> pd.DataFrame:
+def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
     """Return the distances along the best motion and the straight line, and their range over all.
 
     They are the least distances between two arms, and to obstacles where there are any: of circle
@@ -162,10 +161,10 @@ def sampled_distances(condition: kit.ConditionResults, samples: int) -> pd.DataF
         }
         instants = np.arange(len(ranges[0].lowest)) / samples
         parts.append({"series": name, "instant": instants} | values)
-    return kit.rounded(pd.concat(map(pd.DataFrame, parts), ignore_index=True))
+    return rounded(pd.concat(map(pd.DataFrame, parts), ignore_index=True))
 
 
-def _measures(condition: kit.ConditionResults) -> dict[str, tuple[Measure, Measure]]:
+def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]:
     """Return column of `sampled_distances` → its exact measure, and one that is as good and quick.
 
     Both take configurations (nq, instants) [deg].
@@ -191,9 +190,9 @@ def _in_radians(measure: Measure) -> Measure:
     return lambda q: measure(DEGREE * q)
 
 
-def distances_table(condition: kit.ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
+def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
     """Return the distances that Fig. 7 shows."""
-    found = {name: rows.set_index("instant") for name, rows in kit.groups(sampled, "series")}
+    found = {name: rows.set_index("instant") for name, rows in groups(sampled, "series")}
     best = found[BEST]
     found[AT_VIA_POINTS] = best[best.index == best.index.to_numpy().round()]
     drawn = (BEST, AT_VIA_POINTS, LOWEST, HIGHEST, STRAIGHT)
@@ -210,8 +209,8 @@ def distances_table(condition: kit.ConditionResults, sampled: pd.DataFrame) -> p
                 columns = {"measure": measure, "series": name, "instant": values.index}
                 rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
                 parts.append(rows.assign(kind=kind, safety_distance=margin))
-    table = kit.rounded(pd.concat(parts, ignore_index=True))
-    return table.assign(length_unit=condition.condition.length_unit)
+    table = rounded(pd.concat(parts, ignore_index=True))
+    return table.assign(length_unit=condition.length_unit)
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
@@ -223,7 +222,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     kinds = list(dict.fromkeys(table["kind"]))
     panels = figure.subplots(2, len(kinds), sharex=True, squeeze=False)
     unit, letters = table["length_unit"].iloc[0], iter("abcd")
-    required = {kind: rows["safety_distance"].iloc[0] for kind, rows in kit.groups(table, "kind")}
+    required = {kind: rows["safety_distance"].iloc[0] for kind, rows in groups(table, "kind")}
     below = ", ".join(f"{required[kind]:g} {unit} {kind}" for kind in kinds)
     for axes_of_kind, kind in zip(panels.T, kinds, strict=True):
         own = table[table["kind"] == kind]
@@ -242,7 +241,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
 
 
 def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> None:
-    series = dict(kit.groups(rows, "series"))
+    series = dict(groups(rows, "series"))
     low, high, colour = series[LOWEST], series[HIGHEST], style.ARM_COLOURS[0]
     ends = low["distance"], high["distance"]
     marks.band(axes, low["instant"], *ends, colour, label="range over replicates")
@@ -259,12 +258,12 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> 
 def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
     """Draw the instants of one stage."""
     first, last = rows["instant"].min(), rows["instant"].max()
-    for arm, own in kit.groups(rows, "arm"):
+    for arm, own in groups(rows, "arm"):
         colour = style.arm_colour(arm)
         tips = own[own["link"] == own["link"].max()]
         axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
         between, shades = [], []
-        for instant, links in kit.groups(own, "instant"):
+        for instant, links in groups(own, "instant"):
             x, y = (np.append(links[name], links[f"{name}_end"].iloc[-1]) for name in "xy")
             if instant == last:
                 style.draw_arm(axes, arm, links)
@@ -277,6 +276,3 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
         )
         marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)
-
-
-DISTANCES = distances_table, draw_distances

@@ -10,9 +10,9 @@ from matplotlib.lines import Line2D
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
-from evoexp.report import kit
-from evoexp.report.figures import surfaces
-from evoexp.report.kit import marks, motion_geometry, style
+from evoexp.report.figures import groups, marks, records, rounded, style, surfaces
+from evoexp.report.results import motion_geometry
+from evoexp.report.results.stored_results import ConditionResults
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 VIEW = (24.0, -35.0)  # [deg] elevation, azimuth
@@ -20,24 +20,24 @@ POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
 BEST = "best replicate"
 
 
-def links_table(condition: kit.ConditionResults, q: FloatArray) -> pd.DataFrame:
+def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion.
 
     Returns:
         Columns of `motion_geometry.links_table`, length_unit.
     """
     table = motion_geometry.links_table(motions.problem(condition).assembly, q)
-    return kit.rounded(table).assign(length_unit=condition.condition.length_unit)
+    return rounded(table).assign(length_unit=condition.length_unit)
 
 
-def arm_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def arm_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and spheres of the first arm at its start."""
     problem = motions.problem(condition)
     links = links_table(condition, problem.start[:, None])
     spheres = problem.sphere_centres(problem.start)[0]
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
     rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
-    added = kit.rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
+    added = rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
     added = added.assign(
         element="sphere", radius=problem.sphere_radius, length_unit=first["length_unit"].iloc[0]
     )
@@ -55,7 +55,7 @@ def draw_arm(table: pd.DataFrame) -> Figure:
         axes.set_title(title)
         _arm(axes, 0, links, width=1.2 if k == 0 else 2.6)
         if k == 0:
-            for row in kit.records(spheres):
+            for row in records(spheres):
                 axes.plot_surface(
                     *_ball(row), color=style.arm_colour(0), alpha=0.25, linewidth=0, shade=True
                 )
@@ -64,7 +64,7 @@ def draw_arm(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def two_arms_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the links of all arms at start (instant 0) and goal (instant 1), and their reach.
 
     The reach of an arm is the length of its links that move, from its shoulder on.
@@ -87,7 +87,7 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     axes.set_title("a  start (full) and goal (dashed)")
     above = figure.add_subplot(1, 2, 2)
     above.set_title("b  from above, with each arm's reach")
-    for (arm, instant), rows in kit.groups(table, ["arm", "instant"]):
+    for (arm, instant), rows in groups(table, ["arm", "instant"]):
         _arm(axes, arm, rows, dashed=instant == 1)
         x, y = [rows["x"].iloc[0], *rows["x_end"]], [rows["y"].iloc[0], *rows["y_end"]]
         colour, dashes = style.arm_colour(arm), (0, (2, 1)) if instant else "-"
@@ -104,7 +104,7 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def snapshots_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion, stage by stage."""
     links = links_table(condition, motions.best_motion(condition))
     return motion_geometry.in_stages(links, STAGES)
@@ -120,11 +120,11 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         rows = table[table["stage"] == stage]
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
         axes.set_title(motions.stage_title(rows, whole=k == len(stages) - 1))
-        for (arm, instant), links in kit.groups(rows, ["arm", "instant"]):
+        for (arm, instant), links in groups(rows, ["arm", "instant"]):
             newest = instant == last
             shade = 1.0 if newest else 0.15 + 0.45 * (instant - first) / max(1, last - first)
             _arm(axes, arm, links, width=2.4 if newest else 0.9, alpha=shade, joints=newest)
-        for arm, links in kit.groups(rows[rows["link"] == rows["link"].max()], "arm"):
+        for arm, links in groups(rows[rows["link"] == rows["link"].max()], "arm"):
             tips = (links[f"{name}_end"] for name in "xyz")
             axes.plot(*tips, ":", color=style.arm_colour(arm), linewidth=1.0)
     _legend(figure, table, style.key("trace of the tip", color=style.NEUTRAL, lw=1.0, ls=":"))
@@ -200,10 +200,10 @@ def _legend(figure: Figure, table: pd.DataFrame, more: Line2D) -> None:
     style.keys_below(figure, [*arms, more])
 
 
-def paths_table(condition: kit.ConditionResults) -> pd.DataFrame:
+def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line in both spaces."""
-    table = kit.rounded(motions.paths_table(condition, _path, BEST))
-    return table.assign(length_unit=condition.condition.length_unit)
+    table = rounded(motions.paths_table(condition, _path, BEST))
+    return table.assign(length_unit=condition.length_unit)
 
 
 def draw_configuration_space(table: pd.DataFrame) -> Figure:
@@ -226,7 +226,7 @@ def draw_operational_space(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     figure = style.figure(4.2, 5.6)
     axes: Any = figure.add_subplot(projection="3d")
-    for arm, rows in kit.groups(table, "arm"):
+    for arm, rows in groups(table, "arm"):
         motions.draw_paths(axes, rows, ["x", "y", "z"], BEST, style.arm_colour(arm))
     _label(axes, [f"{name} [{unit}]" for name in "xyz"], "")
     spans = [float(np.ptp(table[name])) for name in "xyz"]
@@ -236,7 +236,7 @@ def draw_operational_space(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _path(condition: kit.ConditionResults, solution: FloatArray) -> pd.DataFrame:
+def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return one solution's joint angles and tips."""
     problem = motions.problem(condition)
     q = motion_geometry.configurations(condition.prepared, solution)

@@ -23,7 +23,7 @@ SLACK = 1e-6
 
 
 TRAPPED, ADVANCED, REACHED = range(3)
-"""What comes of a step toward a configuration (Kuffner & LaValle 2000, Fig. 2)."""
+"""Outcomes of a step toward a configuration (Kuffner & LaValle 2000, Fig. 2)."""
 
 
 class Trees(NamedTuple):

@@ -28,7 +28,7 @@ from evoexp.collision.bodies.body_tables import (
 from evoexp.collision.bodies.distances import (
     MARGIN,
     POINT,
-    nearest,
+    between_spheres,
     nearest_to_obstacle,
     place_point,
     point_at,
@@ -41,7 +41,6 @@ from evoexp.numeric.vectors import (
     any_lane,
     lower,
     magnitude,
-    root,
     select,
     spread,
     store,
@@ -293,7 +292,7 @@ def _meet_each_other(
             if _meet(scene, memory, one, two, time, near):
                 _place_spheres(scene, memory, one, time)
                 _place_spheres(scene, memory, two, time)
-                least = _measure(scene, memory, one, two, least)
+                least = between_spheres(scene, memory.centers, one, two, least)
                 near = _near(least, limits)
         if _is_over(least, limits, at_first):
             break
@@ -308,16 +307,3 @@ def _meet(scene: BodyTables, memory: Memory, one: int, two: int, time: float, ne
     _place(scene, memory, two, time)
     a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
     return any_lane(squared_distance(a, b) - reach * reach < near)
-
-
-@inlined
-def _measure(scene: BodyTables, memory: Memory, one: int, two: int, least: Vector) -> Vector:
-    """Lower a clearance to the least one of two units' spheres."""
-    units, runs, spheres = scene.units, scene.runs, scene.spheres
-    for a in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
-        i, end = U(runs[a, 0]), U(runs[a, 1])
-        for b in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
-            first, stop = U(runs[b, 0]), U(runs[b, 1])
-            square = nearest(memory.centers, i, end, first, stop)
-            least = lower(least, root(square) - (spheres[i, 3] + spheres[first, 3]))
-    return least

@@ -8,8 +8,6 @@ rules out no contact, and the result does not depend on what was skipped.
 Where robots are made of spheres alone and only yes or no is asked for, `contact_kernels` answers.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from evoexp.collision.bodies.body_tables import (
@@ -38,12 +36,13 @@ from evoexp.collision.bodies.capsule_distances import (
 from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.distances import (
     MARGIN,
-    POINT,
+    Memory,
     Motion,
     Place,
     Row,
     between_spheres,
     distance_from_core,
+    memory_of,
     moved_point,
     place_point,
     point_at,
@@ -67,18 +66,8 @@ from evoexp.numeric.vectors import (
 )
 from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, eight_of, spatial_frames
-from evoexp.robots.kinematics import SPATIAL_ROWS, U
+from evoexp.robots.kinematics import U
 from evoexp.scenarios.obstacles import HALF_SPACE
-
-
-class Memory(NamedTuple):
-    """Scratch for eight configurations."""
-
-    q: FloatArray  # (nq · LANES,) the last ones of a batch, padded
-    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
-    middles: FloatArray  # (units · POINT,) centres of the balls
-    centers: FloatArray  # (spheres · POINT,) of two bodies, seen from one of them
-    least: FloatArray  # (3 · LANES,) rows OBSTACLES, BETWEEN, SELF of the clearances so far
 
 
 @kernel
@@ -103,13 +92,7 @@ def least_clearances(
                 for n in range(count):
                     out[row, n] = -np.inf if hits[n] else limit
             return
-    memory = Memory(
-        np.zeros(U(q.shape[0]) * VECTOR),
-        np.empty(U(len(named.chain.parent) + 1) * SPATIAL_FRAME),
-        np.empty(U(len(named.units)) * POINT),
-        np.empty(U(len(named.spheres)) * POINT),
-        np.empty(3 * LANES),
-    )
+    memory = memory_of(named, q.shape[0])
     _least_clearances(named, limit, decide, q.reshape(-1), count, out, memory)
 
 
@@ -126,10 +109,6 @@ def _least_clearances(
     """Do the work of `least_clearances` in given memory, so that no loop counts references."""
     tables, q, out, memory = borrowed((tables, q, out, memory))
     units, middles, least = tables.units, memory.middles, memory.least
-    world = U(len(tables.chain.parent)) * SPATIAL_FRAME
-    for row in range(SPATIAL_ROWS):
-        one = 1.0 if row in (0, 4, 8) else 0.0
-        store(memory.frames, world + U(row) * VECTOR, spread(one))
     for first in range(0, count, LANES):
         # frames of the joints, centres of the balls
         eight, sound = eight_of(q, first, count, memory.q), spread(0.0)

@@ -3,14 +3,16 @@
 A point of eight configurations is three vectors (`numeric.vectors`) side by side.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from evoexp.collision.bodies.body_tables import FIRST_RUN, STOP_RUN, THICKNESS, BodyTables
 from evoexp.numeric.compilation import inlined
-from evoexp.numeric.vectors import Vector, load, lower, magnitude, root, spread, store, upper
+from evoexp.numeric.vectors import LANES, Vector, load, lower, magnitude, root, spread, store, upper
 from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
-from evoexp.robots.kinematics import U
+from evoexp.robots.kinematics import SPATIAL_ROWS, U
 from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE, SPHERE
 
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
@@ -24,6 +26,38 @@ Motion = tuple[Row, Row, Row]
 
 Place = tuple[Vector, Vector, Vector]
 """Eight points or directions: x, y, z."""
+
+
+class Memory(NamedTuple):
+    """Scratch for eight configurations."""
+
+    q: FloatArray  # (nq · LANES,) the last ones of a batch, the last of all repeated
+    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
+    middles: FloatArray  # (units · POINT,) centres of the balls
+    centers: FloatArray  # (spheres · POINT,) in the world, or of two bodies, seen from one of them
+    least: FloatArray  # (3 · LANES,) rows OBSTACLES, BETWEEN, SELF of the clearances so far
+    # (units,) the first of the eight for which centres of a unit's spheres were computed
+    known: FloatArray
+    placed: FloatArray  # (units,) the same of the ball's centre
+
+
+@inlined
+def memory_of(tables: BodyTables, nq: int) -> Memory:
+    """Return the scratch of a robot, the world's frame in it."""
+    num_units, world = len(tables.units), U(len(tables.chain.parent)) * SPATIAL_FRAME
+    frames = np.empty(world + SPATIAL_FRAME)
+    for row in range(SPATIAL_ROWS):
+        one = 1.0 if row in (0, 4, 8) else 0.0
+        store(frames, world + U(row) * VECTOR, spread(one))
+    return Memory(
+        np.zeros(U(nq) * VECTOR),
+        frames,
+        np.empty(U(num_units) * POINT),
+        np.empty(U(len(tables.spheres)) * POINT),
+        np.empty(3 * LANES),
+        np.full(num_units, -1.0),
+        np.full(num_units, -1.0),
+    )
 
 
 @inlined

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier.convex_distance import CONVERGED
-from evoexp.collision.certifier.local_minima import polish
+from evoexp.collision.certifier.least_distance import polish
 from evoexp.collision.certifier.task import (
     Task,
     least_separation,

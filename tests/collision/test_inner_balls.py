@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.covers.inner_balls import inner_balls
+from evoexp.collision.covers.body_covers import inner_balls
 from evoexp.records import FloatArray
 
 DEPTH = 0.001

@@ -7,8 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.covers.body_covers import sphere_cover
-from evoexp.collision.covers.kept_covers import kept_sphere_cover
+from evoexp.collision.covers.body_covers import kept_sphere_cover, sphere_cover
 
 PLACE = pin.SE3(
     pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix(), np.array([0.3, -0.2, 0.1])

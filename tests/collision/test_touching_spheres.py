@@ -138,15 +138,6 @@ def test_one_sphere_per_link_sits_in_the_middle() -> None:
     assert single.bind(ONE_PLANAR.build(), ()).spheres.local[:, 0].tolist() == [2.0, 2.0]
 
 
-def test_a_batch_is_its_configurations_one_by_one() -> None:
-    assembly = TWO_PLANAR.build()
-    collision = MODEL.bind(assembly, OBSTACLES)
-    q = np.random.default_rng(2).uniform(-360.0, 360.0, size=(4, 131))
-    together = collision.clearance(q).least
-    alone = [collision.clearance(q[:, k : k + 1]).least[0] for k in range(q.shape[1])]
-    assert np.array_equal(together, alone)
-
-
 def test_a_wrong_number_of_joints_is_refused() -> None:
     collision = MODEL.bind(TWO_PLANAR.build(), ())
     with pytest.raises(ValueError, match=r"q must have shape \(4, configurations\)"):

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.references.grid_exchanges import Exchanges
+from evoexp.references.grid_bounds import Exchanges, network_of
 from evoexp.references.grid_frontier import frontier
-from evoexp.references.grid_networks import network_of
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
 

@@ -11,9 +11,8 @@ import pytest
 import scipy
 
 from evoexp.errors import SettingError
+from evoexp.references.grid_bounds import arrivals_of, best_walks, network_of, relaxed
 from evoexp.references.grid_frontier import GridFrontier, best_walk, frontier
-from evoexp.references.grid_networks import arrivals_of, best_walks, network_of
-from evoexp.references.grid_relaxation import relaxed
 from planners.grid_samples import planner, robot, scenario, solvable
 from references.all_paths import all_simple_paths, path_cost
 from shipped_conditions import expanded

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from composed import composed
+from evoexp.references.grid_bounds import arrivals_of, network_of, relaxed, without_loops
 from evoexp.references.grid_frontier import GridFrontier
-from evoexp.references.grid_networks import arrivals_of, network_of
-from evoexp.references.grid_relaxation import relaxed, without_loops
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
 from references.test_grid_frontier import SETTINGS

@@ -4,12 +4,12 @@ The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no
 algorithm minimises it. The truth is enclosed:
 
 - from above, by valid paths: the frontier of D + μ ΣS over all μ, the best of its paths improved by
-  exchanges of a few nodes (`grid_exchanges`);
+  exchanges of a few nodes (`grid_bounds`);
 - from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
   ε D + (λ / N) ΣS is additive, so dynamic programming over 1 … N nodes finds the best walk, for
   every N. That is the exact optimum where nodes may be passed again. Where they may not,
   multipliers that punish further visits raise the bound, and the walks without their loops are
-  further paths (`grid_relaxation`).
+  further paths.
 
 Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`): every path
 of the frontier was improved, and the bounds are those of walks that never go straight back.
@@ -28,9 +28,14 @@ from pydantic import Field
 from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.references.grid_exchanges import Exchanges
-from evoexp.references.grid_networks import Network, arrivals_of, best_walks, network_of
-from evoexp.references.grid_relaxation import relaxed
+from evoexp.references.grid_bounds import (
+    Exchanges,
+    Network,
+    arrivals_of,
+    best_walks,
+    network_of,
+    relaxed,
+)
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import LayoutCount, NonNegativeCount, Positive
 

@@ -18,9 +18,9 @@ from evoexp.collision.covers.body_covers import (
     around_cylinder,
     capsule_cover,
     given_cover,
+    inner_balls,
+    kept_sphere_cover,
 )
-from evoexp.collision.covers.inner_balls import inner_balls
-from evoexp.collision.covers.kept_covers import kept_sphere_cover
 from evoexp.collision.derived_pairs import Pair
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly

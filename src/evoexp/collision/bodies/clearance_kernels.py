@@ -8,8 +8,6 @@ rules out no contact, and the result does not depend on what was skipped.
 Where robots are made of spheres alone and only yes or no is asked for, `contact_kernels` answers.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from evoexp.collision.bodies.body_tables import (
@@ -38,18 +36,19 @@ from evoexp.collision.bodies.capsule_distances import (
 from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.distances import (
     MARGIN,
-    POINT,
+    Memory,
     Motion,
     Place,
     Row,
+    between_spheres,
     distance_from_core,
-    move_spheres,
+    memory_of,
     moved_point,
     place_point,
     point_at,
     seen_from,
-    spheres_to_spheres,
     squared_distance,
+    store_point,
     turned,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
@@ -67,18 +66,8 @@ from evoexp.numeric.vectors import (
 )
 from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, eight_of, spatial_frames
-from evoexp.robots.kinematics import SPATIAL_ROWS, U
+from evoexp.robots.kinematics import U
 from evoexp.scenarios.obstacles import HALF_SPACE
-
-
-class Memory(NamedTuple):
-    """Scratch for eight configurations."""
-
-    q: FloatArray  # (nq · LANES,) the last ones of a batch, padded
-    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
-    middles: FloatArray  # (units · POINT,) centres of the balls
-    centers: FloatArray  # (spheres · POINT,) a body's, seen from another
-    least: FloatArray  # (3 · LANES,) rows OBSTACLES, BETWEEN, SELF of the clearances so far
 
 
 @kernel
@@ -103,13 +92,7 @@ def least_clearances(
                 for n in range(count):
                     out[row, n] = -np.inf if hits[n] else limit
             return
-    memory = Memory(
-        np.zeros(U(q.shape[0]) * VECTOR),
-        np.empty(U(len(named.chain.parent) + 1) * SPATIAL_FRAME),
-        np.empty(U(len(named.units)) * POINT),
-        np.empty(U(len(named.spheres)) * POINT),
-        np.empty(3 * LANES),
-    )
+    memory = memory_of(named, q.shape[0])
     _least_clearances(named, limit, decide, q.reshape(-1), count, out, memory)
 
 
@@ -126,10 +109,6 @@ def _least_clearances(
     """Do the work of `least_clearances` in given memory, so that no loop counts references."""
     tables, q, out, memory = borrowed((tables, q, out, memory))
     units, middles, least = tables.units, memory.middles, memory.least
-    world = U(len(tables.chain.parent)) * SPATIAL_FRAME
-    for row in range(SPATIAL_ROWS):
-        one = 1.0 if row in (0, 4, 8) else 0.0
-        store(memory.frames, world + U(row) * VECTOR, spread(one))
     for first in range(0, count, LANES):
         # frames of the joints, centres of the balls
         eight, sound = eight_of(q, first, count, memory.q), spread(0.0)
@@ -254,28 +233,32 @@ def _meet_body(tables: BodyTables, memory: Memory, p: int, decide: bool) -> None
 def _between(tables: BodyTables, memory: Memory, one: int, two: int) -> Vector:
     """Return the clearances of two units, as seen from the first one's frame."""
     units, runs, spheres, capsules = tables.units, tables.runs, tables.spheres, tables.capsules
-    centers, least = memory.centers, spread(np.inf)
+    centers = memory.centers
     x, y, z = _frame(memory.frames, units[one, JOINT])
     motion = _seen_from(x, y, z, _frame(memory.frames, units[two, JOINT]))
-    first, stop = units[two, FIRST_RUN], units[two, STOP_RUN]
-    begin, end = (runs[first, 0], runs[stop - 1, 1]) if first < stop else (0, 0)
-    move_spheres(motion, spheres, begin, end, centers)
-    # the second's spheres against the first's spheres and capsules
+    # the first's spheres as they are, the second's as seen from there
     for run in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
-        least = spheres_to_spheres(runs, spheres, run, first, stop, centers, least)
+        for i in range(runs[run, 0], runs[run, 1]):
+            place = spread(spheres[i, 0]), spread(spheres[i, 1]), spread(spheres[i, 2])
+            store_point(centers, U(i), place)
+    for run in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
+        for j in range(runs[run, 0], runs[run, 1]):
+            place = moved_point(motion, spheres[j, 0], spheres[j, 1], spheres[j, 2])
+            store_point(centers, U(j), place)
+    # the second's spheres against the first's spheres and capsules
+    least = between_spheres(tables, centers, one, two, spread(np.inf))
     for i in range(units[one, FIRST_CAPSULE], units[one, STOP_CAPSULE]):
-        for j in range(begin, end):
-            distance = segment_to_point(
-                _axis(capsules[i]), capsules[i, 7], point_at(centers, U(j - begin))
-            )
-            least = lower(least, distance - (capsules[i, 6] + spheres[j, 3]))
+        for run in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
+            for j in range(runs[run, 0], runs[run, 1]):
+                center = point_at(centers, U(j))
+                distance = segment_to_point(_axis(capsules[i]), capsules[i, 7], center)
+                least = lower(least, distance - (capsules[i, 6] + spheres[j, 3]))
     # the second's capsules against both
     for j in range(units[two, FIRST_CAPSULE], units[two, STOP_CAPSULE]):
         segments, thickness = _moved_axis(motion, capsules[j]), capsules[j, 6]
         for run in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
             for i in range(runs[run, 0], runs[run, 1]):
-                center = spheres[i, 0], spheres[i, 1], spheres[i, 2]
-                distance = segment_to_point(segments, capsules[j, 7], center)
+                distance = segment_to_point(segments, capsules[j, 7], point_at(centers, U(i)))
                 least = lower(least, distance - (thickness + spheres[i, 3]))
         for i in range(units[one, FIRST_CAPSULE], units[one, STOP_CAPSULE]):
             distance = segment_to_segments(capsules[i], segments, capsules[j, 7])

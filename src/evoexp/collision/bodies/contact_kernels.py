@@ -27,35 +27,33 @@ from evoexp.collision.bodies.body_tables import (
 )
 from evoexp.collision.bodies.distances import (
     MARGIN,
-    POINT,
-    nearest,
+    Memory,
+    between_spheres,
+    memory_of,
     nearest_to_obstacle,
     place_point,
     point_at,
     squared_distance,
 )
-from evoexp.numeric.compilation import borrowed, inlined, kernel, view_part
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import (
     LANES,
     Vector,
     any_lane,
     lower,
     magnitude,
-    root,
     select,
     spread,
     store,
 )
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.forward_kinematics import (
-    SPATIAL_FRAME,
-    VECTOR,
     Eight,
     coordinate,
     eight_of,
     spatial_frames,
 )
-from evoexp.robots.kinematics import SPATIAL_ROWS, U
+from evoexp.robots.kinematics import U
 from evoexp.scenarios.obstacles import SPHERE
 
 ROUNDING = 1e-12
@@ -63,18 +61,6 @@ ROUNDING = 1e-12
 
 LARGEST_Q = 1e6
 """[rad] or [length unit]; beyond it nothing is sure, nor with NaN."""
-
-
-class Memory(NamedTuple):
-    """Scratch for eight configurations."""
-
-    q: FloatArray  # (nq · LANES,) the last ones of a batch, the last of all repeated
-    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
-    middles: FloatArray  # (units · POINT,) centres of the balls
-    centers: FloatArray  # (spheres · POINT,)
-    # (units,) the first of the eight for which centres of a unit's spheres were computed
-    known: FloatArray
-    placed: FloatArray  # (units,) the same of the ball's centre
 
 
 class Limits(NamedTuple):
@@ -99,25 +85,8 @@ def find_contacts(tables: FlatTables, at_first: bool, q: FloatArray, out: BoolAr
         left there.
     """
     scene = named_tables(tables[0], tables[1])
-    num_joints, num_units = U(len(scene.chain.parent)), U(len(scene.units))
-    num_frames, num_q = (num_joints + U(1)) * SPATIAL_FRAME, U(q.shape[0]) * VECTOR
-    num_middles, num_centers = num_units * POINT, U(len(scene.spheres)) * POINT
-    # one piece of memory, cut up
-    room = np.empty(num_q + num_frames + num_middles + num_centers + U(2) * num_units)
-    frames, middles = num_q, num_q + num_frames
-    centers, known = middles + num_middles, middles + num_middles + num_centers
-    memory = Memory(
-        view_part(room, U(0), num_q),
-        view_part(room, frames, num_frames),
-        view_part(room, middles, num_middles),
-        view_part(room, centers, num_centers),
-        view_part(room, known, num_units),
-        view_part(room, known + num_units, num_units),
-    )
-    flat, count = view_part(q, 0, q.size), q.shape[1]
-    found = _find_contacts(scene, at_first, flat, count, out, memory)
-    room[0] = 0.0  # it lives until here
-    return found
+    memory = memory_of(scene, q.shape[0])
+    return _find_contacts(scene, at_first, q.reshape(-1), q.shape[1], out, memory)
 
 
 @kernel
@@ -126,12 +95,7 @@ def _find_contacts(
 ) -> int:
     """Do the work of `find_contacts` in given memory, so that no loop counts references."""
     scene, q, out, memory = borrowed((scene, q, out, memory))
-    for unit in range(len(memory.known)):
-        memory.known[unit] = memory.placed[unit] = -1.0
-    world, doubts = U(len(scene.chain.parent)) * SPATIAL_FRAME, 0
-    for row in range(SPATIAL_ROWS):
-        one = 1.0 if row in (0, 4, 8) else 0.0
-        store(memory.frames, world + U(row) * VECTOR, spread(one))
+    doubts = 0
     for first in range(0, count, LANES):
         eight, time = eight_of(q, first, count, memory.q), float(first)
         limits = _limits(scene, eight)
@@ -293,7 +257,7 @@ def _meet_each_other(
             if _meet(scene, memory, one, two, time, near):
                 _place_spheres(scene, memory, one, time)
                 _place_spheres(scene, memory, two, time)
-                least = _measure(scene, memory, one, two, least)
+                least = between_spheres(scene, memory.centers, one, two, least)
                 near = _near(least, limits)
         if _is_over(least, limits, at_first):
             break
@@ -308,16 +272,3 @@ def _meet(scene: BodyTables, memory: Memory, one: int, two: int, time: float, ne
     _place(scene, memory, two, time)
     a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
     return any_lane(squared_distance(a, b) - reach * reach < near)
-
-
-@inlined
-def _measure(scene: BodyTables, memory: Memory, one: int, two: int, least: Vector) -> Vector:
-    """Lower a clearance to the least one of two units' spheres."""
-    units, runs, spheres = scene.units, scene.runs, scene.spheres
-    for a in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
-        i, end = U(runs[a, 0]), U(runs[a, 1])
-        for b in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
-            first, stop = U(runs[b, 0]), U(runs[b, 1])
-            square = nearest(memory.centers, i, end, first, stop)
-            least = lower(least, root(square) - (spheres[i, 3] + spheres[first, 3]))
-    return least

@@ -3,14 +3,16 @@
 A point of eight configurations is three vectors (`numeric.vectors`) side by side.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from evoexp.collision.bodies.body_tables import THICKNESS, BodyTables
+from evoexp.collision.bodies.body_tables import FIRST_RUN, STOP_RUN, THICKNESS, BodyTables
 from evoexp.numeric.compilation import inlined
-from evoexp.numeric.vectors import Vector, load, lower, magnitude, root, spread, store, upper
-from evoexp.records import FloatArray, IntArray
+from evoexp.numeric.vectors import LANES, Vector, load, lower, magnitude, root, spread, store, upper
+from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
-from evoexp.robots.kinematics import U
+from evoexp.robots.kinematics import SPATIAL_ROWS, U
 from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE, SPHERE
 
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
@@ -24,6 +26,38 @@ Motion = tuple[Row, Row, Row]
 
 Place = tuple[Vector, Vector, Vector]
 """Eight points or directions: x, y, z."""
+
+
+class Memory(NamedTuple):
+    """Scratch for eight configurations."""
+
+    q: FloatArray  # (nq · LANES,) the last ones of a batch, the last of all repeated
+    frames: FloatArray  # (joints + 1 · SPATIAL_FRAME,), the world's at the end
+    middles: FloatArray  # (units · POINT,) centres of the balls
+    centers: FloatArray  # (spheres · POINT,) in the world, or of two bodies, seen from one of them
+    least: FloatArray  # (3 · LANES,) rows OBSTACLES, BETWEEN, SELF of the clearances so far
+    # (units,) the first of the eight for which centres of a unit's spheres were computed
+    known: FloatArray
+    placed: FloatArray  # (units,) the same of the ball's centre
+
+
+@inlined
+def memory_of(tables: BodyTables, nq: int) -> Memory:
+    """Return the scratch of a robot, the world's frame in it."""
+    num_units, world = len(tables.units), U(len(tables.chain.parent)) * SPATIAL_FRAME
+    frames = np.empty(world + SPATIAL_FRAME)
+    for row in range(SPATIAL_ROWS):
+        one = 1.0 if row in (0, 4, 8) else 0.0
+        store(frames, world + U(row) * VECTOR, spread(one))
+    return Memory(
+        np.zeros(U(nq) * VECTOR),
+        frames,
+        np.empty(U(num_units) * POINT),
+        np.empty(U(len(tables.spheres)) * POINT),
+        np.empty(3 * LANES),
+        np.full(num_units, -1.0),
+        np.full(num_units, -1.0),
+    )
 
 
 @inlined
@@ -44,7 +78,7 @@ def moved_point(motion: Motion, x: float, y: float, z: float) -> Place:
 
 @inlined
 def point_at(points: FloatArray, k: np.uint64) -> Place:
-    """Return a point that `place_point` or `move_spheres` wrote."""
+    """Return a point that `place_point` or `store_point` wrote."""
     own = U(k) * POINT
     return load(points, own), load(points, own + VECTOR), load(points, own + U(2) * VECTOR)
 
@@ -72,24 +106,12 @@ def place_point(
 
 
 @inlined
-def move_spheres(
-    motion: Motion, spheres: FloatArray, begin: int, end: int, centers: FloatArray
-) -> None:
-    """Write the centres of some spheres after a motion, one behind the other.
-
-    Args:
-        motion: From their body's frame to another one.
-        spheres: (spheres, 4) centres in the body's frame, and radii.
-        begin: First sphere.
-        end: One past the last.
-        centers: (≥ spheres · POINT,) written.
-    """
-    for j in range(begin, end):
-        x, y, z = moved_point(motion, spheres[j, 0], spheres[j, 1], spheres[j, 2])
-        o = U(j - begin) * POINT
-        store(centers, o, x)
-        store(centers, o + VECTOR, y)
-        store(centers, o + U(2) * VECTOR, z)
+def store_point(points: FloatArray, k: np.uint64, point: Place) -> None:
+    """Write a point that `point_at` reads."""
+    own = U(k) * POINT
+    store(points, own, point[0])
+    store(points, own + VECTOR, point[1])
+    store(points, own + U(2) * VECTOR, point[2])
 
 
 @inlined
@@ -198,55 +220,22 @@ def nearest(
 
 
 @inlined
-def spheres_to_spheres(
-    runs: IntArray,
-    spheres: FloatArray,
-    one: int,
-    other: int,
-    other_stop: int,
-    centers: FloatArray,
-    least: Vector,
+def between_spheres(
+    tables: BodyTables, centers: FloatArray, one: int, two: int, least: Vector
 ) -> Vector:
-    """Lower a clearance to the distances of a run of constant spheres from moved ones.
+    """Lower a clearance to the least one of two units' spheres [length unit].
 
     Args:
-        runs: (runs, 2) first and one-past-last sphere of equal radius.
-        spheres: See `move_spheres`.
-        one: The run.
-        other: First run of the other body.
-        other_stop: One past its last.
-        centers: Of `move_spheres`, of the other body.
-        least: The clearance so far [length unit].
+        centers: (spheres · POINT,), those of both units in one frame.
+        one: A unit.
+        two: Another one.
+        least: The clearance so far.
     """
-    base = runs[other, 0] if other < other_stop else 0
-    for two in range(other, other_stop):
-        square = spread(np.inf)
-        for j in range(runs[two, 0], runs[two, 1]):
-            center = point_at(centers, U(j - base))
-            square = _nearest_constant(spheres, runs[one, 0], runs[one, 1], center, square)
-        both = spheres[runs[one, 0], 3] + spheres[runs[two, 0], 3]
-        least = lower(least, root(square) - both)
+    units, runs, spheres = tables.units, tables.runs, tables.spheres
+    for a in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
+        i, end = U(runs[a, 0]), U(runs[a, 1])
+        for b in range(units[two, FIRST_RUN], units[two, STOP_RUN]):
+            first, stop = U(runs[b, 0]), U(runs[b, 1])
+            square = nearest(centers, i, end, first, stop)
+            least = lower(least, root(square) - (spheres[i, 3] + spheres[first, 3]))
     return least
-
-
-@inlined
-def _nearest_constant(
-    spheres: FloatArray, first: int, stop: int, center: Place, square: Vector
-) -> Vector:
-    """Lower a squared distance to the least of a moved centre from constant ones."""
-    # two chains of minima: the next does not wait for the last
-    i, other = first, square
-    while i + 1 < stop:
-        square = lower(square, squared_distance(center, _constant(spheres, i)))
-        other = lower(other, squared_distance(center, _constant(spheres, i + 1)))
-        i += 2
-    if i < stop:
-        square = lower(square, squared_distance(center, _constant(spheres, i)))
-    nearest_of_both: Vector = lower(square, other)
-    return nearest_of_both
-
-
-@inlined
-def _constant(spheres: FloatArray, i: int) -> tuple[float, float, float]:
-    """Return a sphere's centre in its body's frame."""
-    return spheres[i, 0], spheres[i, 1], spheres[i, 2]

@@ -1,13 +1,31 @@
-"""Least distances of bodies at many configurations, by the certifier's kernels."""
+"""Least distances of bodies: at many configurations, and local minima of pairs along a motion."""
 
 import numpy as np
 
 from evoexp.collision.certifier.convex_distance import CONVERGED
-from evoexp.collision.certifier.task import Task, Workspace, pair_distance, work_space
+from evoexp.collision.certifier.task import (
+    Task,
+    Workspace,
+    move_to,
+    pair_distance,
+    work_space,
+)
 from evoexp.collision.motion_bounds import joint_frames
 from evoexp.collision.scene import Scene
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
+
+FIRST_STEP = 0.02  # [segments] towards a local minimum
+
+FINEST = 1e-10  # [segments] the last step is not less
+
+SHRINK = 0.0625  # [-] of the step where neither side is closer
+
+MAX_MOVES = 1000  # on the way to a local minimum
+
+MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least distances
+
+SAME = 1e-4  # [segments] a local minimum so close is the same one
 
 
 class LeastDistance:
@@ -73,3 +91,93 @@ def _least_distances(task: Task, work: Workspace, q: FloatArray, least: FloatArr
             _, high = pair_distance(task, work, pair, best, -np.inf, CONVERGED)
             best = min(best, high)
         least[k] = max(best, 0.0)
+
+
+@kernel
+def polish(
+    task: Task, work: Workspace, pairs: IntArray, t: FloatArray, distances: FloatArray
+) -> None:
+    """Walk from given instants to local minima of pairs' distances.
+
+    The walk goes on in equal steps while a neighbour is closer. Where neither is, the vertex of the
+    parabola through the three is tried, and the step shrinks: a smooth minimum takes some 25
+    distances; a minimum at an instant, where the motion bends, takes no more.
+
+    Args:
+        work: From `work_space`.
+        pairs: (walks,) the pair of each walk.
+        t: (walks,) where it begins; written: where it ended.
+        distances: (walks,), written.
+    """
+    task, work, pairs, t, distances = borrowed((task, work, pairs, t, distances))
+    for walk in range(len(pairs)):
+        here, best, step = t[walk], np.inf, FIRST_STEP
+        for move in range(MAX_MOVES):
+            after = before = np.inf
+            closer = False
+            # the place itself (once), a step ahead, a step back, the parabola's vertex
+            for k in range(1 if move > 0 else 0, 4):
+                ahead = 0.0
+                if k == 1:
+                    ahead = step
+                elif k == 2:
+                    ahead = -step
+                elif k == 3:
+                    bend = (after - best) + (before - best)
+                    ahead = 0.5 * step * (before - after) / bend if 0.0 < bend < np.inf else 0.0
+                tried = min(max(here + ahead, 0.0), task.last)
+                if tried == here and k > 0:
+                    continue
+                segment = min(int(tried), len(task.coefficients) - 1)
+                move_to(task, work, segment, tried - segment)
+                _, distance = pair_distance(task, work, pairs[walk], np.inf, -np.inf, CONVERGED)
+                after = distance if k == 1 else after
+                before = distance if k == 2 else before
+                if distance < best:
+                    here, best, closer = tried, distance, k in (1, 2)
+                    if closer:
+                        break
+            step *= 1.0 if closer else SHRINK
+            if step < FINEST:
+                break
+        t[walk], distances[walk] = here, best
+
+
+def nearest_minimum(
+    task: Task,
+    work: Workspace,
+    least: FloatArray,
+    begins: FloatArray,
+    worth: float,
+    known: tuple[int, float],
+    rounding: float,
+) -> tuple[int, float]:
+    """Return pair and instant of the least local minimum; of equal ones the first in time.
+
+    Args:
+        work: From `work_space`.
+        least: (pairs,) the distance of each that was found.
+        begins: (pairs,) its instant, at which the walk begins.
+        worth: Pairs with a greater distance are left out, and those whose distances are not exact.
+        known: Pair and instant of a local minimum that is known.
+        rounding: Distances closer than that are equal [length unit].
+
+    Returns:
+        A pair of −1 if there is none but the known one.
+    """
+    # the pairs that came closest, without the one that is known
+    close = np.flatnonzero((least <= worth) & task.exact)
+    pairs = close[np.argsort(least[close], kind="stable")][:MAX_POLISHED]
+    # a motion of one instant is swept as a segment without movement
+    t = np.minimum(begins[pairs], task.last)
+    is_new = (pairs != known[0]) | ~(np.abs(t - known[1]) < SAME)
+    pairs, t = pairs[is_new], t[is_new]
+    if len(pairs) == 0:
+        return -1, np.nan
+    # their local minima; of equal ones the first
+    distances = np.empty(len(pairs))
+    polish(task, work, pairs, t, distances)
+    tied = distances <= distances.min() + rounding
+    first = tied & (t <= t[tied].min() + SAME)
+    nearest = int(np.argmin(np.where(first, distances, np.inf)))
+    return int(pairs[nearest]), float(t[nearest])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.body_table import BodyTable
-from evoexp.collision.certifier.convex_distance import distance_bounds, separation_later
+from evoexp.collision.certifier.convex_distance import distance_bounds, support
 from evoexp.collision.motion_bounds import (
     FRAME,
     configuration,
@@ -141,3 +141,52 @@ def least_separation(
     one, two, normal = task.pairs[pair, 0], task.pairs[pair, 1], work.normals[pair]
     before = separation_later(bodies, world, twists, one, two, normal, -half, scratch)
     return min(before, separation_later(bodies, world, twists, one, two, normal, half, scratch))
+
+
+@inlined
+def separation_later(
+    bodies: BodyTable,
+    world: FloatArray,
+    twists: FloatArray,
+    one: int,
+    two: int,
+    normal: FloatArray,
+    later: float,
+    scratch: FloatArray,
+) -> float:
+    """Return the gap of two bodies across a normal, `later` ahead, at constant velocities.
+
+    A point x of a body then stands at x + later (v + ω × x), at a height
+    n·x + later (n·v + (n × ω)·x) that is linear in x: the least and the greatest height are those
+    of support points in a turned direction. The gap is a concave function of `later`.
+
+    Args:
+        world: (bodies, 12) frames of the bodies.
+        twists: (joints, 6) from `joint_twists`.
+        one: Index of a body.
+        two: Index of the other.
+        normal: (3,) from the second to the first, of any length.
+        later: How far ahead; negative: back.
+        scratch: (3, 3) scratch.
+    """
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+    if not length > 0.0:
+        return -np.inf
+    nx, ny, nz = normal[0] / length, normal[1] / length, normal[2] / length
+    gap, turned, point = 0.0, scratch[2], scratch[1]
+    for side in range(2):
+        body, sign = (one, -1.0) if side == 0 else (two, 1.0)
+        joint = bodies.joint[body]
+        # the normal turned with the body, and the height that its velocity adds
+        turned[0], turned[1], turned[2], moved = nx, ny, nz, 0.0
+        if joint >= 0:
+            w = twists[joint]
+            turned[0] += later * (ny * w[2] - nz * w[1])
+            turned[1] += later * (nz * w[0] - nx * w[2])
+            turned[2] += later * (nx * w[1] - ny * w[0])
+            moved = later * (nx * w[3] + ny * w[4] + nz * w[5])
+        support(bodies, world, body, turned, sign, point)
+        tx, ty, tz = turned[0], turned[1], turned[2]
+        height = tx * point[0] + ty * point[1] + tz * point[2] + moved
+        gap -= sign * height + bodies.radius[body] * np.sqrt(tx * tx + ty * ty + tz * tz)
+    return gap

@@ -18,7 +18,7 @@ from evoexp.collision.certifier.coal_distances import (
     search_interval,
     walk_down,
 )
-from evoexp.collision.certifier.local_minima import MAX_POLISHED, nearest_minimum
+from evoexp.collision.certifier.least_distance import MAX_POLISHED, nearest_minimum
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
 from evoexp.collision.certifier.task import Task, approach_weights, work_space
 from evoexp.collision.motion_bounds import approach_bounds, moved_by_one

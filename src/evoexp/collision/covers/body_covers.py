@@ -1,18 +1,32 @@
 """Covers of bodies by spheres or capsules, which the fast kernels test in place of coal's shapes.
 
 A cover contains its body, so it touches whatever the body touches. Its inflation is the greatest
-distance by which it reaches beyond the body, bounded from above for every body.
+distance by which it reaches beyond the body, bounded from above for every body. Those of a robot's
+hulls take seconds, and change with nothing: spheres that were found are kept on disk.
+
+Covers of bodies that touch overlap by far more than the bodies. Where a contact is allowed up to
+some depth, the body is replaced by shapes inside it (`inner_balls`), which must stay free:
+everything of a ball or capsule that lies deeper than the allowed depth, and of boxes and cylinders
+points below their edges. Against a plane, whatever the body's tilt, free points mean that the body
+overlaps by no more than the allowed depth; the exact verdict has the last word.
 """
 
+import contextlib
+import functools
+import hashlib
+import json
+from importlib import metadata
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.box_support import coal
-from evoexp.collision.covers.covered_solids import Solid, solid_of
-from evoexp.collision.covers.varied_spheres import Balls, varied_spheres
+from evoexp.collision.box_support import EXACT, coal
+from evoexp.collision.covers.solid_balls import Balls, Solid, solid_of, varied_spheres
+from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.elementary import sincos
+from evoexp.numeric.kernel_folders import sources_key
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
@@ -22,6 +36,14 @@ MOST_VARIED = 300  # of one hull for which equal spheres do not suffice
 MEASURED = 24  # points along each edge of a body's box, by which given covers are measured
 MOST_IN_A_ROW = 10_000  # spheres on the axis of one body
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
+
+AROUND = 24  # points around the axis of a cylinder, inside it
+SPACING = 0.02  # [length unit] of points along edges and on faces, inside a body, at most
+MOST_RINGS = 100_000  # of a cylinder
+MOST = 12  # points along one edge of a box, at most
+
+_LIBRARIES = ("numpy", "scipy", "coal")
+_SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 
 
 class Cover(NamedTuple):
@@ -75,7 +97,7 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
     """
     shape = item.geometry
     if isinstance(shape, coal.Sphere | coal.Capsule):
-        half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
+        half = _half_axis(shape)
         radius = shape.radius + (inflation if half > 0.0 else 0.0)
         spacing = 2.0 * np.sqrt(max(radius * radius - shape.radius * shape.radius, 0.0)) / WIDER
         count = _in_a_row(item, 2.0 * half, spacing) + 1 if half > 0.0 else 1
@@ -98,6 +120,16 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
     return _placed_balls(item, best)
 
 
+def _half_axis(shape: Any) -> float:
+    """Return half the length of the axis of a capsule; 0 of a ball."""
+    return float(shape.halfLength) if isinstance(shape, coal.Capsule) else 0.0
+
+
+def _ends(half: float) -> tuple[FloatArray, FloatArray]:
+    """Return both ends (1, 3) of an axis along z."""
+    return np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
+
+
 def _placed_balls(item: Any, balls: Balls) -> Cover:
     return Cover.placed(item, balls.centers, balls.centers, balls.radii * WIDER, balls.reach)
 
@@ -115,7 +147,7 @@ def given_cover(item: Any, spheres: FloatArray) -> Cover:
     shape, centers, radii = item.geometry, spheres[:, :3], spheres[:, 3]
     margin = 0.0
     if isinstance(shape, coal.Sphere | coal.Capsule):
-        half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
+        half = _half_axis(shape)
         points = np.array([[0.0, 0.0, z] for z in np.linspace(-half, half, MEASURED)])
         onto = np.clip(centers[:, 2], -half, half)
         square = centers[:, 0] ** 2 + centers[:, 1] ** 2 + (centers[:, 2] - onto) ** 2
@@ -177,8 +209,7 @@ def capsule_cover(item: Any) -> Cover:
     """
     shape = item.geometry
     if isinstance(shape, coal.Sphere | coal.Capsule):
-        half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
-        ends = np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
+        ends = _ends(_half_axis(shape))
         return Cover.placed(item, *ends, np.array([shape.radius]), 0.0)
     solid = solid_of(item)
     edges, middle = solid.high - solid.low, 0.5 * (solid.low + solid.high)
@@ -200,8 +231,7 @@ def capsule_cover(item: Any) -> Cover:
 
 def around_cylinder(item: Any) -> Cover:
     """Return the capsule as thick as a cylinder, its ends on the middles of both faces."""
-    half, radius = float(item.geometry.halfLength), float(item.geometry.radius)
-    ends = np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
+    radius, ends = float(item.geometry.radius), _ends(float(item.geometry.halfLength))
     return Cover.placed(item, *ends, np.array([radius * WIDER]), radius)
 
 
@@ -228,3 +258,99 @@ def _cells(solid: Solid, counts: tuple[int, ...]) -> Balls:
     centers = centers[solid.near(centers) <= radius]
     reach = float((solid.far(centers) + radius).max())
     return Balls(centers, np.full(len(centers), radius), reach)
+
+
+def inner_balls(item: Any, depth: float) -> Cover | None:
+    """Return balls, capsules and points inside a body, in its joint's frame.
+
+    Args:
+        item: A `pin.GeometryObject`.
+        depth: How deep the body may overlap another one [length unit].
+
+    Returns:
+        The shapes; None if the body is no ball, capsule, box or cylinder: only the exact verdict
+        bounds how deep such a body overlaps another one.
+    """
+    shape = item.geometry
+    if isinstance(shape, coal.Sphere | coal.Capsule):
+        ends = _ends(_half_axis(shape))
+        return Cover.placed(item, *ends, np.array([max(shape.radius - depth, 0.0)]))
+    if isinstance(shape, coal.Cylinder):
+        points = _of_cylinder(float(shape.radius), float(shape.halfLength), depth / np.sqrt(2.0))
+        return Cover.placed(item, points, points, np.zeros(len(points)))
+    if isinstance(shape, coal.Box):
+        points = _of_box(np.array(shape.halfSide), depth / np.sqrt(3.0))
+        return Cover.placed(item, points, points, np.zeros(len(points)))
+    return None
+
+
+def _of_cylinder(radius: float, half: float, inset: float) -> FloatArray:
+    """Return points of a cylinder around z that is smaller on all sides, rings and two middles."""
+    radius, half = max(radius - inset, 0.0), max(half - inset, 0.0)
+    turns = [sincos(2.0 * np.pi * k / AROUND) for k in range(AROUND)]
+    ring = radius * np.array([(cosine, sine) for sine, cosine in turns])
+    if not 2.0 * half < MOST_RINGS * SPACING:
+        raise UnsupportedShape(
+            f"scenario: a cylinder that is grasped must be at most {MOST_RINGS * SPACING:g} long, "
+            f"was {2.0 * half:.4g}"
+        )
+    heights = np.linspace(-half, half, int(np.ceil(2.0 * half / SPACING)) + 1)
+    rings = [np.column_stack([ring, np.full(AROUND, height)]) for height in heights]
+    return np.vstack([*rings, [[0.0, 0.0, -half], [0.0, 0.0, half]]])
+
+
+def _of_box(half: FloatArray, inset: float) -> FloatArray:
+    """Return points on the surface of a box that is smaller on all sides, corners included."""
+    half = np.maximum(half - inset, 0.0)
+    counts = np.minimum(np.ceil(2.0 * half / SPACING).astype(int) + 1, MOST)
+    axes = [np.linspace(-h, h, max(int(n), 2)) for h, n in zip(half, counts, strict=True)]
+    points = np.array(list(product(*axes)))
+    return np.asarray(points[(np.abs(points) >= half - 1e-12).any(axis=1)])
+
+
+def kept_sphere_cover(item: Any, inflation: float) -> Cover:
+    """Return the cover of `sphere_cover`, from where it is kept if it was found before.
+
+    It is kept under the body's shape and placement, the inflation, and the code and the libraries
+    that find it.
+
+    Raises:
+        UnsupportedShape: As `sphere_cover`.
+    """
+    if isinstance(item.geometry, coal.Sphere | coal.Capsule):
+        return sphere_cover(item, inflation)
+    digest = hashlib.sha256(_code())
+    for part in (*_shape(item.geometry), item.placement.homogeneous, inflation):
+        digest.update(np.ascontiguousarray(part, dtype=np.float64).tobytes())
+    digest.update(type(item.geometry).__name__.encode())
+    path = cache_root() / "covers" / digest.hexdigest()[:32]
+    with contextlib.suppress(FileNotFoundError, Damaged):
+        start, end, radius, reach = json.loads(read_kept(path))
+        return Cover(np.array(start), np.array(end), np.array(radius), reach)
+    found = sphere_cover(item, inflation)
+    start, end, radius = (array.tolist() for array in found[:3])
+    with contextlib.suppress(OSError):
+        write_kept(path, json.dumps([start, end, radius, float(found.inflation)]).encode())
+    return found
+
+
+def _shape(shape: Any) -> list[Any]:
+    """Return all numbers that a shape consists of."""
+    if isinstance(shape, coal.ConvexBase):
+        faces = range(shape.num_polygons if hasattr(shape, "polygons") else 0)
+        points = [shape.point(k) for k in range(shape.num_points)]
+        return [points, [_corners(shape.polygons(k)) for k in faces]]
+    if isinstance(shape, coal.BVHModelBase):
+        points = [shape.vertex(k) for k in range(shape.num_vertices)]
+        return [points, [_corners(shape.tri_indices(k)) for k in range(shape.num_tris)]]
+    return [getattr(shape, name) for name in _SIZES if hasattr(shape, name)]
+
+
+def _corners(triangle: Any) -> list[int]:
+    return [int(triangle[k]) for k in range(3)]
+
+
+@functools.cache
+def _code() -> bytes:
+    versions = [*map(metadata.version, _LIBRARIES)]
+    return hashlib.sha256(json.dumps([*versions, EXACT, sources_key()]).encode()).digest()

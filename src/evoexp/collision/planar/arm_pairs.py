@@ -8,7 +8,8 @@ envelopes:
   each arm 1 and each block of eight arms 2 reach toward each other: where they end before they
   meet, no arm of the block can touch. That spares four of five tests of an arm and a block, at the
   price of a load and a comparison each, or once for eight arms and a block.
-- The others are tested one arm against a block (`pair_tests`).
+- The others are tested one arm against a block: all pairs of lines by the signs of cross products
+  (in angles: the sines of Eq. 12), circles by squared distances.
 - What rounding leaves open is decided by `planar_arms.colliding`.
 
 So counts are the same whatever the vector width, and exact but for what rounding hides: lines and
@@ -16,27 +17,22 @@ circles nearer than `segment_predicates.contact_tolerance` touch, parallel, coll
 ones, too.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.planar.pair_tests import (
-    envelope_quantities,
-    envelope_reach,
-    error_bound,
-    greatest_distance,
-    line_products,
-)
 from evoexp.collision.planar.planar_arms import (
     OUTLINE_ROWS,
     POINT_ROWS,
     Arm,
-    Point,
+    Bounds,
+    bounds_of,
     checked,
     colliding,
     tolerance_of,
 )
+from evoexp.collision.planar.segment_predicates import Line, sign_product, squared_from_link
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vector_rows import Eight, transposed
 from evoexp.numeric.vectors import (
@@ -45,6 +41,7 @@ from evoexp.numeric.vectors import (
     Vector,
     any_lane,
     load,
+    lower,
     select,
     spread,
     store,
@@ -56,13 +53,6 @@ from evoexp.robots.kinematics import U
 MOST_CONFIGURATIONS = 32767  # counts are int16
 LARGEST = 1e70  # [length unit] of coordinates: products of four do not overflow
 
-_MARGIN = 2.0**-40
-"""Of the greatest distance, added to reaches, whose sums of at most six numbers are rounded."""
-
-_LINE_ROWS = 6
-"""Vectors of a block in a configuration: of both links x, y, then how far beside each of them the
-other's base lies; for envelopes, how far along them follows."""
-
 
 class Crossings(NamedTuple):
     """Numbers of configurations in which individuals collide."""
@@ -73,17 +63,21 @@ class Crossings(NamedTuple):
     sums_2: IntArray  # (N2,) the other way round
 
 
-class Table(NamedTuple):
-    """A population in blocks of eight, the last one filled up by copies of the last individual.
+class Population(NamedTuple):
+    """A population in blocks of eight, the last one filled up by copies of the last individual."""
 
-    Coordinates count from the base of arm 1.
-    """
-
-    blocks: FloatArray  # (blocks · K · rows · LANES,) see `_LINE_ROWS`
-    # (individuals · K · LANES,) of arm 1 along x, y, x + y, x − y, then against them
+    arm: Arm
+    outlines: FloatArray  # (K · rows · width,) of `planar_arms`, width a multiple of eight
+    rows: int  # 4, or 8 with the links' directions
+    width: int
+    # (width · K · LANES,) of arm 1 along x, y, x + y, x − y, then against them
     reaches: FloatArray
-    # (blocks · K · LANES,) of those in a block that reach farthest; of arm 2 the other way round
+    # (width · K,) of those in a block that reach farthest; of arm 2 the other way round
     block_reaches: FloatArray
+
+
+Directions = tuple[Any, Any, Any, Any]
+"""Cosine and sine of the first link, and of the second, of one arm or of eight."""
 
 
 def count_collisions(
@@ -101,7 +95,7 @@ def count_collisions(
         ValueError: If the shapes do not fit, there are more than 32767 configurations, something is
             not finite or above 1e70, or a half width or radius is negative.
     """
-    enveloped = one.is_enveloped or two.is_enveloped or None
+    enveloped = one.is_enveloped or two.is_enveloped
     rows = (OUTLINE_ROWS,) if enveloped else (POINT_ROWS, OUTLINE_ROWS)
     outlines_1 = checked("outlines_1", outlines_1, *rows)
     outlines_2 = checked("outlines_2", outlines_2, *rows)
@@ -128,8 +122,7 @@ def count_collisions(
     num_1, num_2 = outlines_1.shape[2], outlines_2.shape[2]
     sums = np.zeros(num_1, dtype=np.int64), np.zeros(num_2, dtype=np.int64)
     crossings = Crossings(np.zeros((num_1, num_2), dtype=np.int16), *sums)
-    tolerance = tolerance_of(one, two)
-    count_pairs(one, outlines_1, two, outlines_2, tolerance, enveloped, *crossings)
+    count_pairs(one, outlines_1, two, outlines_2, tolerance_of(one, two), *crossings)
     return crossings
 
 
@@ -140,7 +133,6 @@ def count_pairs(
     arm_2: Arm,
     outlines_2: FloatArray,
     tolerance: float,
-    enveloped: bool | None,
     counts: NDArray[np.int16],
     sums_1: IntArray,
     sums_2: IntArray,
@@ -149,141 +141,80 @@ def count_pairs(
 
     Args:
         arm_1: Arm of population 1.
-        outlines_1: (K, 4 | 8, N1), finite.
+        outlines_1: (K, 4 | 8, N1), finite; with directions if an arm has an envelope.
         arm_2: Arm of population 2.
         outlines_2: (K, 4 | 8, N2), finite.
         tolerance: Of `tolerance_of`.
-        enveloped: None if both arms are lines: the tests of envelopes are not compiled then.
         counts: (N1, N2) int16.
         sums_1: (N1,) int64.
         sums_2: (N2,) int64.
     """
-    tau = error_bound(arm_1, arm_2, tolerance, enveloped)
-    # twice: along x ± y, whose unit is sqrt 2
-    margin = 2.0 * (tolerance + envelope_reach(arm_1, arm_2))
-    margin += _MARGIN * greatest_distance(arm_1, arm_2, tolerance)
-    dx, dy = arm_2.base[0] - arm_1.base[0], arm_2.base[1] - arm_1.base[1]
-    one = _table(arm_1, outlines_1, (dx, dy), 1.0, enveloped)
-    two = _table(arm_2, outlines_2, (-dx, -dy), -1.0, enveloped)
+    bounds = bounds_of(arm_1, arm_2, tolerance)
+    one, two = _population(arm_1, outlines_1, 1.0), _population(arm_2, outlines_2, -1.0)
     num_1, num_2, num_configurations = len(sums_1), len(sums_2), outlines_1.shape[0]
-    width = (num_2 + LANES - 1) // LANES * LANES
     # eight rows of certain collisions, one per arm 1, then eight of possible ones
-    tally = np.empty(2 * LANES * width)
+    tally = np.empty(2 * LANES * two.width)
+    sums_2[:] = 0
     for first in range(0, num_1, LANES):
         count = min(LANES, num_1 - first)
         for n in range(len(tally)):
             tally[U(n)] = 0.0
-        for begin in range(0, width, LANES):
-            pair = one, first, count, two, begin, num_configurations
-            _test_block(*pair, arm_1, arm_2, enveloped, margin, tau, tally)
+        for begin in range(0, two.width, LANES):
+            _test_block(one, first, count, two, begin, num_configurations, bounds, tally)
         for r in range(count):
-            certain, possible, i = U(r * width), U((r + LANES) * width), U(first + r)
-            undecided = 0
-            for n in range(num_2):
-                undecided += tally[certain + U(n)] != tally[possible + U(n)]
+            certain, possible, i = U(r * two.width), U((r + LANES) * two.width), U(first + r)
             for n in range(num_2):
                 counts[i, U(n)] = np.int16(tally[certain + U(n)])
-            # what rounding leaves open
-            for n in range(num_2 if undecided > 0 else 0):
-                if tally[certain + U(n)] != tally[possible + U(n)]:
+            for n in range(num_2):
+                if tally[certain + U(n)] != tally[possible + U(n)]:  # rounding leaves it open
                     total = 0
                     for k in range(num_configurations):
                         total += colliding(
                             arm_1, outlines_1, first + r, arm_2, outlines_2, n, k, tolerance
                         )
                     counts[i, U(n)] = total
-    _sum_counts(counts, sums_1, sums_2)
+            sums_1[i] = 0
+            for n in range(num_2):
+                sums_1[i] += counts[i, U(n)]
+                sums_2[U(n)] += counts[i, U(n)]
 
 
 @kernel
-def _sum_counts(counts: NDArray[np.int16], sums_1: IntArray, sums_2: IntArray) -> None:
-    """Write the sums of a matrix's rows and columns."""
-    for j in range(counts.shape[1]):
-        sums_2[U(j)] = 0
-    for i in range(counts.shape[0]):
-        total = 0
-        for j in range(counts.shape[1]):
-            total += counts[U(i), U(j)]
-        sums_1[U(i)] = total
-        for j in range(counts.shape[1]):
-            sums_2[U(j)] += counts[U(i), U(j)]
-
-
-@kernel
-def _table(
-    arm: Arm,
-    outlines: FloatArray,  # (K, 4 | 8, N)
-    way: Point,
-    toward: float,
-    enveloped: bool | None,
-) -> Table:
-    """Return the table of a population.
+def _population(arm: Arm, outlines: FloatArray, toward: float) -> Population:
+    """Return a population in blocks.
 
     Args:
-        way: From its base to the other's.
+        outlines: (K, 4 | 8, N).
         toward: 1 for arm 1; −1 for arm 2, which reaches against the axes.
-        enveloped: See `count_pairs`.
     """
-    num_configurations, num_rows, num = outlines.shape
-    num_blocks, flat = (num + LANES - 1) // LANES, borrowed(outlines.reshape(-1))
-    rows = _LINE_ROWS if enveloped is None else _LINE_ROWS + 2
-    blocks = np.empty(num_blocks * num_configurations * rows * LANES)
-    reaches = np.empty(num_blocks * LANES * num_configurations * LANES)
-    block_reaches, filled = np.empty(num_blocks * num_configurations * LANES), np.empty(LANES)
-    dx, dy = way
-    origin_x, origin_y = (0.0, 0.0) if toward > 0.0 else (-dx, -dy)
-    for block in range(num_blocks):
+    num_configurations, rows, num = outlines.shape
+    width, flat = (num + LANES - 1) // LANES * LANES, borrowed(outlines.reshape(-1))
+    padded = np.empty(num_configurations * rows * width)
+    for row in range(num_configurations * rows):
+        for n in range(width):
+            padded[U(row * width + n)] = flat[U(row * num + min(n, num - 1))]
+    reaches = np.empty(width * num_configurations * LANES)
+    block_reaches, step = np.empty(width * num_configurations), U(width)
+    x, y = toward * arm.base[0], toward * arm.base[1]
+    for first in range(0, width, LANES):
         for k in range(num_configurations):
-            row, first = k * num_rows, block * LANES
-            x, y = _row(flat, row, num, first, filled), _row(flat, row + 1, num, first, filled)
-            tip_x = _row(flat, row + 2, num, first, filled)
-            tip_y = _row(flat, row + 3, num, first, filled)
-            u, v, w, z = x - arm.base[0], y - arm.base[1], tip_x - x, tip_y - y
-            a, b, c, d = u, v, w, z
-            if enveloped is not None:
-                a = _row(flat, row + 4, num, first, filled)
-                b = _row(flat, row + 5, num, first, filled)
-                c = _row(flat, row + 6, num, first, filled)
-                d = _row(flat, row + 7, num, first, filled)
-            # both vectors, and the other's base beside and along them, from base and elbow
-            o, step = U((block * num_configurations + k) * rows * LANES), U(LANES)
-            store(blocks, o, a)
-            store(blocks, o + step, b)
-            store(blocks, o + U(2) * step, c)
-            store(blocks, o + U(3) * step, d)
-            store(blocks, o + U(4) * step, a * dy - b * dx)
-            store(blocks, o + U(5) * step, c * (dy - v) - d * (dx - u))
-            if enveloped is not None:
-                store(blocks, o + U(6) * step, a * dx + b * dy)
-                store(blocks, o + U(7) * step, c * (dx - u) + d * (dy - v))
-            # how far arms reach toward the others, each and all of them
-            elbow_x, elbow_y = toward * (origin_x + u), toward * (origin_y + v)
-            ends = elbow_x, elbow_y, elbow_x + toward * w, elbow_y + toward * z
-            each = transposed(_reaches(toward * origin_x, toward * origin_y, ends))
+            o = U(k * rows * width + first)
+            elbow_x, elbow_y = toward * load(padded, o), toward * load(padded, o + step)
+            tip_x = toward * load(padded, o + U(2) * step)
+            tip_y = toward * load(padded, o + U(3) * step)
+            # how far each arm reaches toward the others, and all of them
+            each = transposed(_reaches(x, y, elbow_x, elbow_y, tip_x, tip_y))
             most = each[0]
             for lane in range(LANES):
                 most = upper(most, each[lane])
-                if toward > 0.0:
-                    store(reaches, U(((first + lane) * num_configurations + k) * LANES), each[lane])
-            store(block_reaches, U((block * num_configurations + k) * LANES), most)
-    return Table(blocks, reaches, block_reaches)
+                store(reaches, U(((first + lane) * num_configurations + k) * LANES), each[lane])
+            store(block_reaches, U(first * num_configurations + k * LANES), most)
+    return Population(arm, padded, rows, width, reaches, block_reaches)
 
 
 @inlined
-def _row(flat: FloatArray, row: int, num: int, first: int, filled: FloatArray) -> Vector:
-    """Return eight numbers of a row of `num`, from `first` on, copies of the last one behind it."""
-    begin = row * num
-    if first + LANES <= num:
-        return load(flat, U(begin + first))
-    for lane in range(LANES):
-        filled[U(lane)] = flat[U(begin + min(first + lane, num - 1))]
-    return load(filled, U(0))
-
-
-@inlined
-def _reaches(x: float, y: float, ends: tuple[Vector, Vector, Vector, Vector]) -> Eight:
+def _reaches(x: float, y: float, a: Vector, b: Vector, c: Vector, d: Vector) -> Eight:
     """Return how far base, elbow and tip reach along x, y, x + y, x − y, then against them."""
-    a, b, c, d = ends
     return (
         _most(x, a, c),
         _most(y, b, d),
@@ -303,53 +234,138 @@ def _most(base: float, elbow: Vector, tip: Vector) -> Vector:
 
 @kernel
 def _test_block(
-    one: Table,
+    one: Population,
     first: int,
     count: int,
-    two: Table,
+    two: Population,
     begin: int,
     num_configurations: int,
-    arm_1: Arm,
-    arm_2: Arm,
-    enveloped: bool | None,
-    margin: float,
-    tau: float,
+    bounds: Bounds,
     tally: FloatArray,
 ) -> None:
     """Count the configurations in which arms 1 of a block collide with those of a block of arms 2.
 
     Args:
-        one: Of population 1.
-        first: First arm of its block, a multiple of eight.
+        first: First arm of a block of population 1.
         count: How many arms 1 there are.
-        two: Of population 2.
-        begin: First arm of its block, a multiple of eight.
+        begin: First arm of a block of population 2.
         num_configurations: K.
-        arm_1: Arm of population 1.
-        arm_2: Arm of population 2.
-        enveloped: See `count_pairs`.
-        margin: Distance of reaches above which nothing touches.
-        tau: See `pair_tests`.
         tally: See `count_pairs`; those of the block are added.
     """
     one, two, tally = borrowed((one, two, tally))
-    rows, lanes, column = U(_LINE_ROWS if enveloped is None else _LINE_ROWS + 2), U(LANES), U(begin)
-    size, width = U(num_configurations) * lanes, U(len(tally) // (2 * LANES))
-    block_1, block_2 = U(first // LANES) * size, U(begin // LANES) * size
-    for k in range(U(0), size, lanes):
-        least = 0.0 - (load(two.block_reaches, block_2 + k) + margin)
-        if any_lane(load(one.block_reaches, block_1 + k) < least):
+    lanes, size, column = U(LANES), U(num_configurations * LANES), U(begin)
+    arm_1, arm_2 = one.arm, two.arm
+    enveloped = arm_1.half_width + arm_1.tcp_radius + arm_2.half_width + arm_2.tcp_radius > 0.0
+    x, y = spread(arm_2.base[0]), spread(arm_2.base[1])
+    block_1, block_2 = U(first * num_configurations), U(begin * num_configurations)
+    for k in range(num_configurations):
+        at = U(k) * lanes
+        least = 0.0 - (load(two.block_reaches, block_2 + at) + bounds.margin)
+        if any_lane(load(one.block_reaches, block_1 + at) < least):
             continue  # an axis separates all from all
+        own, other = U(k * one.rows * one.width + first), U(k * two.rows * two.width + begin)
         for r in range(U(0), U(count), U(1)):
-            if any_lane(load(one.reaches, (U(first) + r) * size + k) < least):
+            if any_lane(load(one.reaches, (U(first) + r) * size + at) < least):
                 continue  # an axis separates this one from all
-            own, other = (block_1 + k) * rows + r, (block_2 + k) * rows
-            if enveloped is None:
-                quantity = line_products(one.blocks, own, two.blocks, other)
+            links_1 = _links(arm_1.base[0], arm_1.base[1], *_numbers(one, own + r))
+            links_2 = _links(x, y, *_vectors(two, other))
+            circles = spread(np.inf)
+            if enveloped:
+                turns_1 = _numbers(one, own + r + U(POINT_ROWS * one.width))
+                turns_2 = _vectors(two, other + U(POINT_ROWS * two.width))
+                lines = _boundary_products(arm_1, links_1, turns_1, arm_2, links_2, turns_2)
+                circles = _circle_distances(arm_1, links_1, turns_1, arm_2, links_2, turns_2)
             else:
-                quantity = envelope_quantities(one.blocks, own, two.blocks, other, arm_1, arm_2)
-            _add_where(quantity < -tau, tally, r * width + column)
-            _add_where(quantity <= tau, tally, (r + lanes) * width + column)
+                lines = _sign_products(links_1, links_2)
+            hits = (lines < -bounds.lines) | (circles < -bounds.circles)
+            near = (lines <= bounds.lines) | (circles <= bounds.circles)
+            _add_where(hits, tally, r * U(two.width) + column)
+            _add_where(near, tally, (r + lanes) * U(two.width) + column)
+
+
+@inlined
+def _links(base_x: Any, base_y: Any, x: Any, y: Any, tip_x: Any, tip_y: Any) -> tuple[Line, Line]:
+    return (base_x, base_y, x - base_x, y - base_y), (x, y, tip_x - x, tip_y - y)
+
+
+@inlined
+def _numbers(one: Population, at: np.uint64) -> Line:
+    """Return four rows of the outlines of one arm."""
+    rows, step = one.outlines, U(one.width)
+    return rows[at], rows[at + step], rows[at + U(2) * step], rows[at + U(3) * step]
+
+
+@inlined
+def _vectors(two: Population, at: np.uint64) -> Line:
+    """Return four rows of the outlines of eight arms."""
+    rows, step = two.outlines, U(two.width)
+    x, y = load(rows, at), load(rows, at + step)
+    return x, y, load(rows, at + U(2) * step), load(rows, at + U(3) * step)
+
+
+@inlined
+def _sign_products(one: tuple[Line, Line], two: tuple[Line, Line]) -> Vector:
+    """Return the least sign product of the four pairs of lines."""
+    (first, second), (third, fourth) = one, two
+    least = lower(sign_product(first, third), sign_product(first, fourth))
+    return lower(least, lower(sign_product(second, third), sign_product(second, fourth)))
+
+
+@inlined
+def _boundary_products(
+    arm_1: Arm,
+    one: tuple[Line, Line],
+    turns_1: Directions,
+    arm_2: Arm,
+    two: tuple[Line, Line],
+    turns_2: Directions,
+) -> Vector:
+    """Return the least sign product of the boundary lines of two arms, or of links without such."""
+    least, half_1, half_2 = spread(np.inf), arm_1.half_width, arm_2.half_width
+    for side_1 in range(2 if half_1 > 0.0 else 1):
+        first = _beside(one, turns_1, (2 * side_1 - 1) * half_1)
+        for side_2 in range(2 if half_2 > 0.0 else 1):
+            second = _beside(two, turns_2, (2 * side_2 - 1) * half_2)
+            least = lower(least, _sign_products(first, second))
+    return least
+
+
+@inlined
+def _beside(links: tuple[Line, Line], turns: Directions, shift: float) -> tuple[Line, Line]:
+    """Return lines parallel to links."""
+    (x, y, u, v), (elbow_x, elbow_y, w, z), (c, s, d, t) = links[0], links[1], turns
+    second = (elbow_x - shift * t, elbow_y + shift * d, w, z)
+    return (x - shift * s, y + shift * c, u, v), second
+
+
+@inlined
+def _circle_distances(
+    arm_1: Arm,
+    one: tuple[Line, Line],
+    turns_1: Directions,
+    arm_2: Arm,
+    two: tuple[Line, Line],
+    turns_2: Directions,
+) -> Vector:
+    """Return the least squared distance, less radius², of circles from lines and each other."""
+    (x_1, y_1, u, v), (x_2, y_2, w, z) = one[1], two[1]
+    x_1, y_1, x_2, y_2 = x_1 + u, y_1 + v, x_2 + w, y_2 + z  # the tips
+    both = arm_1.tcp_radius + arm_2.tcp_radius
+    between = (x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1) - both * both
+    of_second = _circle_distance(arm_1, one, turns_1, x_2, y_2, arm_2.tcp_radius)
+    of_first = _circle_distance(arm_2, two, turns_2, x_1, y_1, arm_1.tcp_radius)
+    return lower(between, lower(of_second, of_first))
+
+
+@inlined
+def _circle_distance(
+    arm: Arm, links: tuple[Line, Line], turns: Directions, x: Vector, y: Vector, radius: float
+) -> Vector:
+    """Return the squared distance, less radius², of a circle around (x, y) from an arm's lines."""
+    (elbow_x, elbow_y, _, _), (c, s, d, t), half = links[1], turns, arm.half_width
+    one = squared_from_link(x - links[0][0], y - links[0][1], c, s, arm.lengths[0], half)
+    two = squared_from_link(x - elbow_x, y - elbow_y, d, t, arm.lengths[1], half)
+    return lower(one, two) - radius * radius
 
 
 @inlined

@@ -9,6 +9,7 @@ Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, 
 Lines need the first four rows only.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,10 @@ from evoexp.robots.kinematics import U
 Point = tuple[float, float]
 
 POINT_ROWS, OUTLINE_ROWS = 4, 8
+
+_UNIT = 2.0**-53  # half a unit in the last place of 1
+_MARGIN = 2.0**-40
+"""Of the greatest distance, added to reaches, whose sums of at most six numbers are rounded."""
 
 
 class Arm(NamedTuple):
@@ -156,6 +161,47 @@ def _write_directions(
 def tolerance_of(arm_1: Arm, arm_2: Arm) -> float:
     """Return the `contact_tolerance` of two arms [length unit]."""
     return contact_tolerance(max(largest_coordinate(arm_1), largest_coordinate(arm_2)))
+
+
+class Bounds(NamedTuple):
+    """Bounds on rounding: what is nearer to 0 is left open."""
+
+    margin: float  # distance of reaches above which nothing touches [length unit]
+    lines: float  # of the sign products of lines [length unit⁴]
+    circles: float  # of squared distances [length unit²]
+
+
+@kernel
+def bounds_of(arm_1: Arm, arm_2: Arm, tolerance: float) -> Bounds:
+    """Return the bounds on rounding.
+
+    With bases d apart, links ≤ l, half widths and radii of sum h, D = d + 3 l + h is the greatest
+    distance. Let u = 2^-53.
+
+    Lines: a line function, the cross product of a link and a vector to an end of the other, is at
+    most V = l D. Its error is below 4 u V at the other's beginning: the vectors (2 u), their
+    products and the difference. At its end the links' own cross product is added, which is at most
+    V / 3: 7 u V. So the product of two errs by less than (4 + 7 + 1) u V² + 28 u² V²; taken are 16.
+
+    Circles: distances from a link err by less than 10 u D: the unit vectors' products (4 u), and
+    sums; a sum of two squares by less than 32 u D² (40 taken).
+
+    What counts as contact, or is lost in coordinates, moves distances by the tolerance t, and so
+    their products by 2 D t + t². What underflows is 0, and so left open.
+    """
+    (x_1, y_1), (x_2, y_2) = arm_1.base, arm_2.base
+    apart = math.sqrt((x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1))
+    reach = (arm_1.half_width + arm_2.half_width) + (arm_1.tcp_radius + arm_2.tcp_radius)
+    (first, second), (third, fourth) = arm_1.lengths, arm_2.lengths
+    longest = max(max(first, second), max(third, fourth)) + tolerance  # with rounded ends
+    most = apart + 3.0 * longest + reach
+    moved, square = tolerance * (2.0 * most + tolerance), _UNIT * most * most
+    return Bounds(
+        # twice: along x ± y, whose unit is sqrt 2
+        2.0 * (tolerance + reach) + _MARGIN * most,
+        longest * longest * (16.0 * square + moved),
+        40.0 * square + moved,
+    )
 
 
 @kernel

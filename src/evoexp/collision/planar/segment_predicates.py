@@ -6,7 +6,13 @@ is at most a tolerance apart as contact; `contact_tolerance` bounds that roundin
 of the sides in `meeting`: where a side is in doubt, an end is nearer to a line than the tolerance.
 """
 
-from evoexp.numeric.compilation import kernel
+from typing import Any
+
+from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.vectors import Vector, magnitude, spread, upper
+
+Line = tuple[Any, Any, Any, Any]
+"""Where lines begin, x and y, and from there to their ends: of one arm (numbers) or of eight."""
 
 ROUNDING = 2.0**-46
 """`contact_tolerance` of coordinates up to 1 [-]."""
@@ -86,3 +92,31 @@ def squared_distance(ax: float, ay: float, bx: float, by: float, x: float, y: fl
     t = min(max((ux * x + uy * y) / (squared if squared > 0.0 else 1.0), 0.0), 1.0)
     x, y = x - t * ux, y - t * uy
     return x * x + y * y
+
+
+@inlined
+def sign_product(one: Line, two: Line) -> Vector:
+    """Return a number < 0 if the ends of each line are on both sides of the other, else ≥ 0."""
+    (x, y, u, v), (x_2, y_2, w, z) = one, two
+    dx, dy, across = x_2 - x, y_2 - y, u * z - v * w
+    first, second = u * dy - v * dx, w * dy - z * dx
+    return upper(first * (first + across), second * (second + across))
+
+
+@inlined
+def squared_from_link(
+    x: Vector, y: Vector, c: Vector, s: Vector, length: float, half_width: float
+) -> Vector:
+    """Return the squared distance of points from the nearer of a link's boundary lines.
+
+    Args:
+        x: From the link's beginning.
+        y: Likewise.
+        c: Cosine of the link's direction.
+        s: Its sine.
+        length: Of the link.
+        half_width: Distance of both lines from the link.
+    """
+    along, off = c * x + s * y, magnitude(c * y - s * x) - half_width
+    out = upper(upper(0.0 - along, along - length), spread(0.0))
+    return off * off + out * out

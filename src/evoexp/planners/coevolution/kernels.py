@@ -242,7 +242,7 @@ def evaluate_lines(
         for b in range(a + 1, robots):
             one, two = line_arm(task.arms, a), line_arm(task.arms, b)
             first, second, near = points[a][1:last], points[b][1:last], tolerance_of(one, two)
-            count_pairs(one, first, two, second, near, None, collisions[pair], rows, columns)
+            count_pairs(one, first, two, second, near, collisions[pair], rows, columns)
             for k in range(count):
                 sums[a, k] += rows[k]
                 sums[b, k] += columns[k]

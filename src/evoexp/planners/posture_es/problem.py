@@ -7,8 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
-from evoexp.collision.covers.body_covers import Cover
-from evoexp.collision.covers.inner_balls import inner_balls
+from evoexp.collision.covers.body_covers import Cover, inner_balls
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE

@@ -32,13 +32,20 @@ class CoalDistance:
 
     def __init__(self, scene: Scene, motion: Motion, limit: int) -> None:
         self.scene, self.motion, self.limit, self.queries = scene, motion, limit, 0
-        self._data = scene.model.createData()
-        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
-        self._request.gjk_tolerance = GJK_TOLERANCE
-        self._request.gjk_max_iterations = GJK_ITERATIONS
         self._t = np.nan
         self._places: dict[int, Any] = {}  # body → coal's transform at t
         self._known: dict[tuple[int, float], float] = {}
+
+    @cached_property
+    def _data(self) -> Any:
+        return self.scene.model.createData()  # most motions need no distance of coal's
+
+    @cached_property
+    def _question(self) -> tuple[Any, Any]:
+        """Coal's request, and where it writes its answer."""
+        request = coal.DistanceRequest()
+        request.gjk_tolerance, request.gjk_max_iterations = GJK_TOLERANCE, GJK_ITERATIONS
+        return request, coal.DistanceResult()
 
     def __call__(self, pair: int, t: float) -> float:
         """Return the distance of a pair at t; negative where bodies overlap.
@@ -55,8 +62,9 @@ class CoalDistance:
             solids = []
             for body in self.scene.pairs[pair].tolist():
                 solids += [self.scene.shapes[body][0], self._transform(body)]
-            self._result.clear()
-            distance = float(coal.distance(*solids, self._request, self._result))
+            request, result = self._question
+            result.clear()
+            distance = float(coal.distance(*solids, request, result))
             self._known[pair, t] = distance
         return distance
 

@@ -37,6 +37,7 @@ class EdgeTest:
         """Begin with no query."""
         self._collision, self.resolution, self.queries = collision, resolution, 0
         self._test, self._proofs = collision.free_test, proofs
+        self._is_doubtful = False  # whether the last path was refuted
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
         """Whether an edge is free at the configurations tested; its first end is known to be."""
@@ -67,18 +68,22 @@ class EdgeTest:
     def unproven(self, path: FloatArray) -> FloatArray | None:
         """Return a node (1, nq) or an edge (2, nq) of a path that is not proven; None if all are.
 
-        All are where no proof is asked for. Nodes come first: a contact that the model does not
+        All are where no proof is asked for. A path is judged whole, but by pieces behind one that
+        was refuted: no piece is judged twice. Nodes come first: a contact that the model does not
         see, as of bodies whose covers always touch, mostly lasts longer than an edge, and a node
-        costs a fraction of one. What was judged before is not judged again.
+        costs a fraction of one.
 
         Args:
             path: (nodes, nq) [deg].
         """
-        if self._proofs is not None:
-            nodes = [path[k : k + 1] for k in range(1, len(path) - 1)]
-            for piece in (*nodes, *(path[k : k + 2] for k in range(len(path) - 1))):
-                if not self._proofs.is_proven(piece[[0, -1]].ravel()):
-                    return piece
+        if self._proofs is None or (not self._is_doubtful and self._proofs.is_proven(path.ravel())):
+            return None
+        self._is_doubtful = True
+        nodes = [path[k : k + 1] for k in range(1, len(path) - 1)]
+        for piece in (*nodes, *(path[k : k + 2] for k in range(len(path) - 1))):
+            if not self._proofs.is_proven(piece[[0, -1]].ravel()):
+                return piece
+        self._is_doubtful = False
         return None
 
     def certificates(self) -> dict[str, float]:

@@ -14,6 +14,7 @@ from composed import composed
 from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
 from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.bodies.contact_kernels import find_contacts
+from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -192,16 +193,17 @@ def test_touching_spheres_find_any_collision(experiment: str) -> None:
     hits = collision.clearance(q).least < 0.0
     assert 0 < hits.sum() < len(hits)
     assert np.array_equal(collision.collides(q), hits)
-    assert collision.num_free(q) == leading_free(hits)
+    general, q = collision.general, DEGREE * q
+    assert general.num_free(q) == leading_free(hits)
     free = q[:, ~hits]
-    assert collision.num_free(free) == free.shape[1]
+    assert general.num_free(free) == free.shape[1]
     for count in (1, 7, 8, 9, 20):
         few = q[:, :count]
-        assert collision.num_free(few) == leading_free(hits[:count])
+        assert general.num_free(few) == leading_free(hits[:count])
         mixed = np.hstack([free[:, :count], q[:, hits][:, :1]])
-        assert collision.num_free(mixed) == count // 8 * 8
+        assert general.num_free(mixed) == count // 8 * 8
     with pytest.raises(ValueError, match="q must have shape"):
-        collision.num_free(q[:2])
+        general.num_free(q[:2])
 
 
 PROGRAMME = """

@@ -25,6 +25,7 @@ from evoexp.planners.sampling_based.kernels import (
 from evoexp.planners.sampling_based.kernels import (
     tested_configurations as configurations_on,
 )
+from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
 from evoexp.records import generations
 from moveit_samples import COVERED, body, scene, write_problem, write_robot
 from references import rrt_connect_python
@@ -280,3 +281,55 @@ def test_smoothings_are_no_part_of_the_identity_unless_there_are_some() -> None:
     assert condition(PLANAR).id == condition(PLANAR, "planner.num_smoothings=0").id
     with pytest.raises(SettingError, match=r"planner\.num_smoothings: must be"):
         condition(PLANAR, "planner.num_smoothings=9")
+
+
+class RefusesOneNode:
+    """Proofs that refuse every motion through one configuration."""
+
+    def __init__(self, q: np.ndarray) -> None:
+        self._q, self.asked, self.num_certificates = q, list[int](), 0
+
+    def is_proven(self, solution: np.ndarray) -> bool:
+        nodes = solution.reshape(-1, len(self._q))
+        self.asked.append(len(nodes))
+        return not (nodes == self._q).all(axis=1).any()
+
+
+def test_a_path_is_proven_whole_and_by_pieces_behind_a_refuted_one() -> None:
+    planner, problem = condition(PLANAR).prepare()
+    path = np.random.default_rng(0).normal(size=(4, len(problem.start)))
+    proofs: Any = RefusesOneNode(path[2])
+    edges = EdgeTest(problem.collision, planner.resolution, proofs)
+    assert edges.unproven(path[:2]) is None
+    assert proofs.asked == [2]
+    piece = edges.unproven(path)
+    assert piece is not None and np.array_equal(piece, path[2:3])
+    assert proofs.asked == [2, 4, 2, 2]  # whole, then its nodes, each as a motion that stands
+    proofs.asked.clear()
+    assert edges.unproven(path[:2]) is None
+    assert proofs.asked == [2]  # by pieces: its one edge
+    last = edges.unproven(path[1:3])
+    assert last is not None and np.array_equal(last, path[1:3])
+
+
+def test_trees_lose_a_node_that_is_refuted_and_all_that_grew_from_it() -> None:
+    planner, problem = condition(PLANAR, "planner.num_shortcuts=0").prepare()
+    rng, (low, high) = np.random.default_rng(3), planner.box(problem)
+    edges = EdgeTest(problem.collision, planner.resolution)
+    pair, path = TreePair(problem.start, problem.goal, edges, planner.range), None
+    while path is None:
+        path = pair.iterate(low + rng.random(len(low)) * (high - low))
+    assert len(path) > 3
+    proofs: Any = RefusesOneNode(path[1])
+    edges = EdgeTest(problem.collision, planner.resolution, proofs)
+    pair, rng = (
+        TreePair(problem.start, problem.goal, edges, planner.range),
+        np.random.default_rng(3),
+    )
+    again = None
+    for _ in range(2000):
+        again = pair.iterate(low + rng.random(len(low)) * (high - low))
+        assert not (pair.nodes == path[1]).all(axis=1).any() or len(proofs.asked) == 0
+        if again is not None:
+            break
+    assert again is not None and not (again == path[1]).all(axis=1).any()

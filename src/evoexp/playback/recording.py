@@ -179,12 +179,7 @@ def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
 
 def joints_of(assembly: Assembly) -> tuple[Joint, ...]:
     """Return the joints in the order of their coordinates."""
-    table, names = assembly.table, assembly.model.names
-    own = np.flatnonzero(table.free)
-    return tuple(
-        Joint(str(names[int(k) + 1]), bool(table.prismatic[k]))
-        for k in own[np.argsort(table.index_q[own])]
-    )
+    return tuple(map(Joint, assembly.joint_names, assembly.table.slides.tolist()))
 
 
 def _velocity_limits(assembly: Assembly) -> FloatArray:

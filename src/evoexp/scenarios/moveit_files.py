@@ -9,7 +9,6 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
-from evoexp.scenarios.moveit_messages import check_message
 
 LARGEST = 1e7  # [m, rad] as of the numbers of robots and scenarios
 SLACK = 0.01  # [-] by which a quaternion's length may differ from 1: the numbers are rounded
@@ -68,24 +67,6 @@ def primitive_kind(value: Any) -> str:
     """Return the kind of a primitive, which is a number or, by robowflex, a name."""
     is_number = type(value) is int and 0 < value < len(KINDS)
     return KINDS[value] if is_number else str(value).lower()
-
-
-def read_document(content: bytes, field: str, message: str) -> "MessagePart":
-    """Read a message within limits.
-
-    Args:
-        content: Of a file.
-        field: The setting that names it, for errors.
-        message: Its type, of `moveit_messages.FIELDS`.
-
-    Raises:
-        SettingError: If it is no such message, or holds what evoexp does not know.
-    """
-    from evoexp.scenarios.moveit_yaml import read_message  # most tasks come out of no such file
-
-    root = read_message(content, field)
-    check_message(root, message, field)
-    return MessagePart(root, field, "")
 
 
 class MessagePart:

@@ -108,6 +108,11 @@ class MessagePart:
         """Return the error that the file must be something else."""
         return SettingError(self.field, must, was, hint)
 
+    def require(self, is_met: object, must: str, was: Any) -> None:
+        """Refuse the file, which must be something else, unless a condition is met."""
+        if not is_met:
+            raise self.refusal(must, was)
+
     @property
     def text(self) -> str:
         """A text; an absent one is empty."""
@@ -120,10 +125,10 @@ class MessagePart:
 
     def numbers(self, count: int | None = None) -> FloatArray:
         """Return a list of numbers, so many if a count is given."""
-        found = [item.number() for item in self]
-        if count is not None and len(found) != count:
-            raise self.refusal(f"{count} numbers at {self.where}", len(found))
-        return np.array(found, dtype=np.float64)
+        values = [item.number() for item in self]
+        is_full = count in (None, len(values))
+        self.require(is_full, f"{count} numbers at {self.where}", len(values))
+        return np.array(values, dtype=np.float64)
 
     def number(self, absent: float | None = None) -> float:
         """Return a number, or that of an absent part; YAML takes 1e-05 for a text."""
@@ -132,9 +137,9 @@ class MessagePart:
             number = float(value) if isinstance(value, int | float | str) else np.nan
         except (ValueError, OverflowError):
             number = np.nan
-        if isinstance(value, bool) or not abs(number) <= LARGEST:
-            must = f"finite numbers, at most {LARGEST:g}, at {self.where}"
-            raise self.refusal(must, str(value)[:40])
+        is_number = not isinstance(value, bool) and abs(number) <= LARGEST
+        must = f"finite numbers, at most {LARGEST:g}, at {self.where}"
+        self.require(is_number, must, str(value)[:40])
         return number + 0.0
 
     @property
@@ -161,9 +166,8 @@ class MessagePart:
         size = x * x + y * y + z * z + w * w
         if size == 0.0:  # ROS leaves an orientation that nobody set at 0
             return np.eye(3)
-        length = float(np.sqrt(size))
-        if abs(length - 1.0) > SLACK:
-            raise self.refusal(f"quaternions of length 1 at {self.where}", round(length, 6))
+        length, must = float(np.sqrt(size)), f"quaternions of length 1 at {self.where}"
+        self.require(abs(length - 1.0) <= SLACK, must, round(length, 6))
         s = 2.0 / size
         return np.array(
             [
@@ -176,6 +180,6 @@ class MessagePart:
     def _of_kind(self, kind: type, name: str) -> Any:
         if self.value is None:
             return kind()
-        if not isinstance(self.value, kind):
-            raise self.refusal(f"{name} at {self.where}", str(self.value)[:40])
+        was = str(self.value)[:40]
+        self.require(isinstance(self.value, kind), f"{name} at {self.where}", was)
         return self.value

@@ -105,14 +105,15 @@ def _fixed_transforms(scene: MessagePart) -> tuple[dict[str, Pose], str, bool]:
         name = frame_name(transform["header"]["frame_id"])
         target, pose = frame_name(transform["child_frame_id"]), transform["transform"].pose
         is_identity = pose.is_near(IDENTITY, SAME)
-        if not is_identity and (not name or name == target):
-            place = f"{transform.where}.header.frame_id"
-            raise scene.refusal(f"a frame other than '{target}' at {place}, or no transform", name)
-        if not target and name:
-            raise scene.refusal(f"the planning frame at {transform.where}.child_frame_id", "")
-        if planning and target and target != planning:
-            must = f"one planning frame for all of {transforms.where}, the child_frame_id"
-            raise scene.refusal(f"{must} '{planning}'", f"'{name}' in '{target}'")
+        must = (
+            f"a frame other than '{target}' at {transform.where}.header.frame_id, or no transform"
+        )
+        scene.require(is_identity or name not in ("", target), must, name)
+        must = f"the planning frame at {transform.where}.child_frame_id"
+        scene.require(target or not name, must, "")
+        must = f"one planning frame for all of {transforms.where}, the child_frame_id '{planning}'"
+        is_same = not planning or target in ("", planning)
+        scene.require(is_same, must, f"'{name}' in '{target}'")
         planning = target or planning
         is_certain |= bool(target) and name in ("", target)
         if name and not pose.is_near(named.setdefault(name, pose), SAME):

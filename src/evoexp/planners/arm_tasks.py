@@ -25,7 +25,6 @@ from evoexp.planners.moveit_tasks import (
     hull_notes,
     touching,
     with_allowed_pairs,
-    without_pairs,
 )
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
@@ -219,7 +218,10 @@ def _covered(
     ignored: tuple[tuple[int, int], ...] = ()
     bodies = scene(assembly, task.obstacles, self_pairs=True)
     if isinstance(given, MoveitTask):
-        bodies, ignored = without_pairs(bodies, given, assembly), touching(assembly, given)
+        ignored, first = touching(assembly, given), assembly.geometry.ngeoms
+        allowed = {(body, first + obstacle) for body, obstacle in ignored}
+        is_judged = [(int(a), int(b)) not in allowed for a, b in bodies.pairs]
+        bodies = bodies.of_pairs(np.array(is_judged, dtype=np.bool_))
     names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
     bodies = bodies._replace(names=(*bodies.names[: assembly.geometry.ngeoms], *names))
     check_limits(assembly, ends)

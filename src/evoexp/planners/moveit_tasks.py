@@ -6,7 +6,6 @@ from itertools import combinations
 
 import numpy as np
 
-from evoexp.collision.scene import Scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
@@ -113,19 +112,6 @@ def touching(assembly: Assembly, task: MoveitTask) -> tuple[tuple[int, int], ...
         for obstacle, name in enumerate(objects)
         if allowed.may_touch(link, name)
     )
-
-
-def without_pairs(bodies: Scene, task: MoveitTask, assembly: Assembly) -> Scene:
-    """Return a scene without the pairs of a body and an obstacle that may touch.
-
-    Args:
-        bodies: Of the robot first, then the obstacles.
-        task: Names the pairs.
-    """
-    num_bodies = assembly.geometry.ngeoms
-    allowed = {(body, num_bodies + k) for body, k in touching(assembly, task)}
-    is_judged = [(int(a), int(b)) not in allowed for a, b in bodies.pairs]
-    return bodies.of_pairs(np.array(is_judged, dtype=np.bool_)) if allowed else bodies
 
 
 def hull_notes(names: Sequence[str]) -> tuple[str, ...]:

@@ -96,11 +96,11 @@ class MoveitTask(Component):
             if message == SCENE and has_other_frames(document):
                 settings["frame_names"] = "header"
             if message == SCENE and (names := resources(document)):
-                place = Path(located(path))
+                place, own = Path(located(path)), f"{field}.{name}"
+                contents = [mesh_content(mesh, place, packages, own) for mesh in names]
                 settings["meshes"] = [
                     {"name": mesh, "file": {SHA256: keep(content)}}
-                    for mesh in names
-                    for content in [mesh_content(mesh, place, packages, f"{field}.{name}")]
+                    for mesh, content in zip(names, contents, strict=True)
                 ]
         return settings
 
@@ -146,17 +146,17 @@ class MoveitTask(Component):
         """
         name = getattr(robot, "robot_name", "")
         scene, request = (self._message(name).value for name in FILES)
-        found = []
+        notes = []
         if scene.get("is_diff"):
-            found.append("the scene is a change of another (is_diff): it is taken as it is")
+            notes.append("the scene is a change of another (is_diff): it is taken as it is")
         if name and (model := scene.get("robot_model_name") or name) != name:
-            found.append(f"the scene is of the robot '{model}', the robot is '{name}'")
+            notes.append(f"the scene is of the robot '{model}', the robot is '{name}'")
         scaled = ("max_velocity_scaling_factor", "max_acceleration_scaling_factor")
         left = [name for name in scaled if request.get(name) not in (None, 0, 1)]
         left += ["max_cartesian_speed"] if request.get("max_cartesian_speed") else []
         if left:
-            found.append(f"left out of the request: {', '.join(left)} (export has its own limits)")
-        return tuple(found)
+            notes.append(f"left out of the request: {', '.join(left)} (export has its own limits)")
+        return tuple(notes)
 
     def _message(self, name: str) -> MessagePart:
         file: File = getattr(self, name)

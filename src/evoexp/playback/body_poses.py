@@ -52,15 +52,6 @@ def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
     return np.concatenate([*pieces, [float(segments)]])
 
 
-def frames_of(model: Any, carried: list[str]) -> tuple[Frame, ...]:
-    """Return the frames of all joints of a model, then those of carried objects.
-
-    The frame of a carried object hangs on the world.
-    """
-    joints = [Frame(model.names[k], int(model.parents[k]) - 1) for k in range(1, model.njoints)]
-    return (*joints, *(Frame(f"object {name}", -1) for name in carried))
-
-
 def poses(
     model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
 ) -> Poses:

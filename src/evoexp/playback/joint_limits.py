@@ -78,15 +78,15 @@ def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
             f"was {printable(', '.join(known[:8])) or 'none'}{hint}"
         )
     return {
-        str(name): {kind: _limit(joint, kind, str(name)) for kind in KINDS if _has(joint, kind)}
+        str(name): {
+            kind: _limit(joint, kind, str(name))
+            for kind in KINDS
+            # a value without its flag counts, too
+            if joint.get(f"has_{kind}_limits", f"max_{kind}" in joint)
+        }
         for name, joint in joints.items()
         if str(name) in names
     }
-
-
-def _has(joint: dict[str, Any], kind: str) -> bool:
-    """Whether a joint's entry limits a rate; a value without its `has_` flag counts, too."""
-    return bool(joint.get(f"has_{kind}_limits", f"max_{kind}" in joint))
 
 
 def _limit(joint: dict[str, Any], kind: str, name: str) -> float:

@@ -135,7 +135,6 @@ def record_motion(
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
     places = _targets(condition.scenario, robot)
-    own_limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
     return Recording(
         heading=heading,
         condition_id=condition.id,
@@ -160,8 +159,7 @@ def record_motion(
         verdict=certificate(parts, motion, margin),
         view=_view(shapes, where.world, places),
         parts=tuple(parts),
-        # Pinocchio's default is no limit
-        velocity_limits=np.where((own_limits > 0.0) & (own_limits < 1e6), own_limits, np.inf),
+        velocity_limits=_velocity_limits(assembly),
     )
 
 
@@ -183,6 +181,12 @@ def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
 def joints_of(assembly: Assembly) -> tuple[Joint, ...]:
     """Return the joints in the order of their coordinates."""
     return tuple(map(Joint, assembly.joint_names, assembly.table.slides.tolist()))
+
+
+def _velocity_limits(assembly: Assembly) -> FloatArray:
+    """Return the limits that the robot's model has; Pinocchio's default is no limit."""
+    limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
+    return np.where((limits > 0.0) & (limits < 1e6), limits, np.inf)
 
 
 def _carried(parts: list[Part]) -> list[str]:

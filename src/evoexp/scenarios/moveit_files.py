@@ -137,9 +137,9 @@ class MessagePart:
             number = float(value) if isinstance(value, int | float | str) else np.nan
         except (ValueError, OverflowError):
             number = np.nan
-        is_number = not isinstance(value, bool) and abs(number) <= LARGEST
-        must = f"finite numbers, at most {LARGEST:g}, at {self.where}"
-        self.require(is_number, must, str(value)[:40])
+        if isinstance(value, bool) or not abs(number) <= LARGEST:
+            must = f"finite numbers, at most {LARGEST:g}, at {self.where}"
+            raise self.refusal(must, str(value)[:40])
         return number + 0.0
 
     @property
@@ -180,6 +180,6 @@ class MessagePart:
     def _of_kind(self, kind: type, name: str) -> Any:
         if self.value is None:
             return kind()
-        was = str(self.value)[:40]
-        self.require(isinstance(self.value, kind), f"{name} at {self.where}", was)
+        if not isinstance(self.value, kind):  # its text may be long: made for an error only
+            raise self.refusal(f"{name} at {self.where}", str(self.value)[:40])
         return self.value

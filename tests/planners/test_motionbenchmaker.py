@@ -14,7 +14,6 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners import arm_tasks as tasks
-from evoexp.planners.moveit_tasks import arm_motion, with_allowed_pairs
 from evoexp.testing.small_conditions import conditions
 
 ASSETS = Path(evoexp.__file__).parent / "assets" / "motionbenchmaker"
@@ -39,14 +38,11 @@ def test_starts_and_goals_are_free_on_exact_bodies(
     robot: str, shipped: dict[str, Condition]
 ) -> None:
     """By coal, without any of evoexp's tables; and a body moved to the hand is found."""
-    own = [each for label, each in shipped.items() if label.endswith(robot)]
-    built = own[0].robot.build()  # type: ignore[attr-defined]
-    for each in own:
-        assembly = with_allowed_pairs(built, each.scenario)  # type: ignore[arg-type]
-        task = arm_motion(assembly, each.scenario)  # type: ignore[arg-type]
-        ends = tasks.ends_of(assembly, task)
+    for each in (each for label, each in shipped.items() if label.endswith(robot)):
+        _, problem = each.prepare()
+        assembly, ends = problem.assembly, (problem.start, problem.goal)
+        bodies = problem.scene._replace(geometry=problem.scene.geometry.copy())
         tasks.check_limits(assembly, ends)
-        bodies = tasks.covered_scene(assembly, task, each.scenario)  # type: ignore[arg-type]
         assert len(bodies.pairs) > 50
         data, placed = bodies.model.createData(), bodies.geometry.createData()
         for q in ends:

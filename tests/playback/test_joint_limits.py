@@ -3,10 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp.playback.joint_limits import Defaults, LimitsFileError, joint_limits
+from evoexp.playback.joint_limits import LimitsFileError, joint_limits
 
 NAMES = ("shoulder", "elbow")
-DEFAULTS = Defaults(np.array([1.0, 2.0]), np.array([np.inf, 3.0]), 0.5)
+DEFAULTS = np.array([1.0, 2.0]), np.array([np.inf, 3.0]), 0.5  # command line, robot, ramp
 FILE = """
 default_velocity_scaling_factor: 0.1
 joint_limits:
@@ -25,10 +25,10 @@ def test_the_file_comes_before_the_robot_and_this_one_before_the_command_line(
 ) -> None:
     path = tmp_path / "joint_limits.yaml"
     path.write_text(FILE)
-    found = joint_limits(NAMES, path, DEFAULTS)
+    found = joint_limits(NAMES, path, *DEFAULTS)
     assert found.velocity.tolist() == [0.7, 3.0]
     assert found.acceleration.tolist() == [1.4, 4.0]
-    assert joint_limits(NAMES, None, DEFAULTS).velocity.tolist() == [1.0, 3.0]
+    assert joint_limits(NAMES, None, *DEFAULTS).velocity.tolist() == [1.0, 3.0]
 
 
 @pytest.mark.parametrize(
@@ -69,10 +69,10 @@ def test_bad_files_are_refused_in_one_line(text: str, line: str, tmp_path: Path)
     path = tmp_path / "joint_limits.yaml"
     path.write_text(text)
     with pytest.raises(LimitsFileError) as refused:
-        joint_limits(NAMES, path, DEFAULTS)
+        joint_limits(NAMES, path, *DEFAULTS)
     assert line in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(LimitsFileError, match="must be a file that can be read"):
-        joint_limits(NAMES, tmp_path / "none.yaml", DEFAULTS)
+        joint_limits(NAMES, tmp_path / "none.yaml", *DEFAULTS)

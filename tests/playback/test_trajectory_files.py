@@ -49,15 +49,8 @@ def test_columns_are_matched_by_name_and_unit(head: str, rows: Any, times: bool)
     assert motion.coefficients is None
     assert "straight lines between the points" in remarks
     unread = next((r.removeprefix("not read: ") for r in remarks if r.startswith("not")), "")
-    assert unread == (
-        "gripper"
-        if "gripper" in head
-        else "velocities"
-        if "vel" in head
-        else "turn_2_effort"
-        if "effort" in head
-        else ""
-    )
+    words = {"gripper": "gripper", "vel": "velocities", "effort": "turn_2_effort"}
+    assert unread == next((words[word] for word in words if word in head), "")
     assert any("without a unit" in r for r in remarks) is ("_rad" not in head and "deg" not in head)
 
 

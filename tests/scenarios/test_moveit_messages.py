@@ -14,7 +14,7 @@ from test_moveit import document, mesh
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
-from evoexp.planners.moveit_tasks import arm_motion, links_of_bodies
+from evoexp.planners.moveit_tasks import arm_motion, links_of_bodies, with_allowed_pairs
 from evoexp.scenarios.moveit_messages import FIELDS, REQUEST, SCENE
 from evoexp.scenarios.moveit_scene import read_allowed, read_state, read_world
 from evoexp.testing.small_conditions import conditions
@@ -216,7 +216,7 @@ def test_a_matrix_speaks_of_links_not_of_names_that_are_like_theirs(tmp_path: Pa
     (found,) = conditions(*words, f"robot.path={tmp_path / 'small.urdf'}").values()
     built = found.robot.build()  # type: ignore[attr-defined]
     assert links_of_bodies(built)["lower_1"] == "lower_1"
-    disabled = found.scenario.disabled(links_of_bodies(built), frozenset())  # type: ignore[attr-defined]
+    disabled = with_allowed_pairs(built, found.scenario).disabled  # type: ignore[arg-type]
     assert disabled == {frozenset(("base", "lower"))}
 
 

@@ -22,14 +22,13 @@ from evoexp.errors import (
     printable,
 )
 from evoexp.paths.motion import Motion
-from evoexp.playback.recording import Heading, Recording, joints_of, record_motion
-from evoexp.playback.stored import stored_recording
+from evoexp.playback.recording import Heading, Recording, joints_of, record, record_motion
 from evoexp.playback.timing import SpeedLimits
 from evoexp.playback.trajectory_files import Columns, JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
-from evoexp.store.log_reader import read_log
+from evoexp.store.log_reader import LogContents, read_log
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table
@@ -178,16 +177,30 @@ def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
 
 
 def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) -> Recording:
-    if run is None:
-        return stored_recording(log, log.name, limits)
-    origin = origin_of(run)
-    names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
+    """Return the motion of a log's best solution; the log alone is enough."""
+    contents, title = read_log(log), log.name
+    if run is not None:
+        origin = origin_of(run)
+        names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
+        title = " · ".join(dict.fromkeys(names)) or run.hash12
     try:
-        return stored_recording(log, " · ".join(dict.fromkeys(names)) or run.hash12, limits)
+        condition = _condition_of(contents)
     except RevisionMismatch as error:
+        if run is None:
+            raise
         raise RevisionMismatch(
             f"run {run.hash12}: {error}; run it anew with what is installed: {run.command}"
         ) from None
+    improvements = tuple((row.generation, row.cost) for row in contents.solutions)
+    heading = Heading(title, contents.replicate, improvements)
+    recording = record(condition, contents.solutions[-1].values, heading, limits)
+    return recording._replace(condition_id=contents.condition_id, config_json=contents.config_json)
+
+
+def _condition_of(log: LogContents) -> Condition:
+    """Return the condition that is attached to a log, whose files are kept for it."""
+    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
+    return Condition.from_json(log.config_json)
 
 
 def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], ending: str) -> Path:
@@ -271,10 +284,8 @@ def stored_motion(log: Path) -> FittingMotion:
         RevisionMismatch: If it was made by another revision of a component.
     """
     contents = read_log(log)
-    keep_all(data for name, data in contents.attachments.items() if name.startswith(PREFIX))
-    condition = Condition.from_json(contents.config_json)
     label = f"{contents.condition_id[:12]} #{contents.replicate}"
-    return _solved(label, condition, contents.solutions[-1].values)
+    return _solved(label, _condition_of(contents), contents.solutions[-1].values)
 
 
 def initial_motion(

@@ -15,7 +15,7 @@ from evoexp.commands.chosen_motions import (
 )
 from evoexp.commands.console import say
 from evoexp.errors import SettingError
-from evoexp.playback.joint_limits import Defaults, JointLimits, joint_limits
+from evoexp.playback.joint_limits import JointLimits, joint_limits
 from evoexp.playback.recording import Recording
 from evoexp.playback.trajectory import Trajectory, as_csv, as_json, as_ros, trajectory
 
@@ -77,8 +77,8 @@ def _limits(found: Recording, arguments: argparse.Namespace) -> JointLimits:
     """Return the limits that the file, the robot or the command line set."""
     prismatic = np.array([joint.prismatic for joint in found.joints])
     speeds = speed_limits(arguments).of(prismatic, found.size)
-    defaults = Defaults(speeds, found.velocity_limits, arguments.ramp)
-    return joint_limits(tuple(joint.name for joint in found.joints), arguments.limits, defaults)
+    names = tuple(joint.name for joint in found.joints)
+    return joint_limits(names, arguments.limits, speeds, found.velocity_limits, arguments.ramp)
 
 
 def _described(timed: Trajectory, limits: JointLimits) -> str:

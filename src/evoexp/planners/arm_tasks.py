@@ -23,10 +23,8 @@ from evoexp.planners.answers import CoverShape
 from evoexp.planners.moveit_tasks import (
     arm_motion,
     hull_notes,
-    moving_joints,
     touching,
     with_allowed_pairs,
-    without_pairs,
 )
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
@@ -91,7 +89,7 @@ def arm_problem(
         assembly = _within_floor(assembly, scenario)
     task = _arm_motion(assembly, scenario)
     # a metre of a sliding joint counts as a radian, 57.3 degrees
-    units = np.where(moving_joints(assembly).slides, 1.0 / DEGREE, 1.0)
+    units = np.where(assembly.table.slides, 1.0 / DEGREE, 1.0)
     start, goal = (q * units for q in task.ends(assembly.arm_slices))
     collision: SphereCollision | CoveredCollision
     if isinstance(model, CoveredBodies):
@@ -149,7 +147,7 @@ def _within_floor(assembly: Assembly, task: GridMotion) -> Assembly:
     Raises:
         SettingError: If the robot does not slide along each direction of the grid.
     """
-    slides = moving_joints(assembly).slides
+    slides = assembly.table.slides
     if len(slides) != len(task.size) or not slides.all():
         must = f"one that slides along the {len(task.size)} directions of the grid"
         named = [str(name) for name in list(assembly.model.names)[1:]]
@@ -192,14 +190,14 @@ def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> Non
     Raises:
         SettingError: Naming the joint.
     """
-    model, joints = assembly.model, moving_joints(assembly)
+    model, slides = assembly.model, assembly.table.slides
     for field, q in zip(FIELDS, ends, strict=True):
         low, high = model.lowerPositionLimit, model.upperPositionLimit
         beyond = (DEGREE * q < low - ROUNDING) | (DEGREE * q > high + ROUNDING)
         if beyond.any():
             k = int(np.argmax(beyond))
-            unit, name = (1.0 if joints.slides[k] else DEGREE), joints.names[k]
-            word = "m" if joints.slides[k] else "deg"
+            unit, word = (1.0, "m") if slides[k] else (DEGREE, "deg")
+            name = assembly.joint_names[k]
             limits = f"{low[k] / unit:g} to {high[k] / unit:g} {word}"
             must = f"within the limits of '{name}', {limits}"
             raise SettingError(field, must, float(DEGREE * q[k] / unit))
@@ -220,7 +218,10 @@ def _covered(
     ignored: tuple[tuple[int, int], ...] = ()
     bodies = scene(assembly, task.obstacles, self_pairs=True)
     if isinstance(given, MoveitTask):
-        bodies, ignored = without_pairs(bodies, given, assembly), touching(assembly, given)
+        ignored, first = touching(assembly, given), assembly.geometry.ngeoms
+        allowed = {(body, first + obstacle) for body, obstacle in ignored}
+        is_judged = [(int(a), int(b)) not in allowed for a, b in bodies.pairs]
+        bodies = bodies.of_pairs(np.array(is_judged, dtype=np.bool_))
     names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
     bodies = bodies._replace(names=(*bodies.names[: assembly.geometry.ngeoms], *names))
     check_limits(assembly, ends)

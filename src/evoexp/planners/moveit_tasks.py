@@ -2,33 +2,21 @@
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from itertools import combinations
 
 import numpy as np
 
-from evoexp.collision.scene import Scene
 from evoexp.errors import SettingError
+from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mesh_pieces import loaded_mesh
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit import Joints, MoveitTask
+from evoexp.scenarios.moveit import MoveitTask
 from evoexp.scenarios.moveit_files import Pose
-from evoexp.scenarios.moveit_scene import World
-
-if TYPE_CHECKING:
-    from evoexp.scenarios.posture_task import PostureTask
-
-
-def moving_joints(assembly: Assembly) -> Joints:
-    """Return the joints of a robot that move."""
-    model = assembly.model
-    own = [joint for joint in range(1, model.njoints) if model.nqs[joint] > 0]
-    own.sort(key=lambda joint: int(model.idx_qs[joint]))
-    slides = np.zeros(len(own), dtype=np.bool_)
-    slides[assembly.table.index_q[assembly.table.prismatic]] = True
-    return Joints(tuple(str(model.names[joint]) for joint in own), slides, assembly.arm_slices)
+from evoexp.scenarios.moveit_request import LinkGoal
+from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
 
 
 def links_of_bodies(assembly: Assembly) -> dict[str, str]:
@@ -40,8 +28,16 @@ def links_of_bodies(assembly: Assembly) -> dict[str, str]:
 
 
 def with_allowed_pairs(assembly: Assembly, task: MoveitTask) -> Assembly:
-    """Return a robot whose pairs that may touch are those of the task's matrix."""
-    return assembly._replace(disabled=task.disabled(links_of_bodies(assembly), assembly.disabled))
+    """Return a robot with the pairs of bodies that may touch by the task's matrix.
+
+    Of pairs that the robot itself names, the matrix has the last word.
+    """
+    allowed, disabled = task.allowed, set(assembly.disabled)
+    for (one, link), (two, other) in combinations(links_of_bodies(assembly).items(), 2):
+        may_touch = allowed.may_touch(link, other)
+        if may_touch is not None and link != other:
+            (disabled.add if may_touch else disabled.discard)(frozenset((one, two)))
+    return assembly._replace(disabled=frozenset(disabled))
 
 
 def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
@@ -52,10 +48,25 @@ def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
     """
     if isinstance(task, ArmMotion):
         return task
-    return task.arm_motion(moving_joints(assembly), _world(assembly, task))
+    q_goal = task.goal_configuration(assembly.joint_names)
+    if q_goal is None:
+        must = "a goal of joints for this planner (posture_es plans to poses)"
+        raise SettingError("scenario.request", must, f"a pose of '{task.plan_request.link}'")
+    world = task.world(assembly.frames, loaded_mesh)
+    start, goal = (
+        tuple(tuple(_typed(assembly, q)[a:b].tolist()) for a, b in assembly.arm_slices)
+        for q in (task.start_configuration(assembly.joint_names), q_goal)
+    )
+    return ArmMotion(
+        q_start=start,
+        q_goal=goal,
+        security_margin=task.security_margin,
+        length_unit=task.length_unit,
+        obstacles=world.obstacles,
+    )
 
 
-def posture_task(assembly: Assembly, task: "PostureTask | MoveitTask") -> "PostureTask":
+def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureTask:
     """Return a task as one of reaching a pose of the tool.
 
     Raises:
@@ -63,50 +74,62 @@ def posture_task(assembly: Assembly, task: "PostureTask | MoveitTask") -> "Postu
     """
     if not isinstance(task, MoveitTask):
         return task
-    world = _world(assembly, task)
+    world, names = task.world(assembly.frames, loaded_mesh), assembly.joint_names
     if pairs := touching(assembly, task):
         body = str(assembly.geometry.geometryObjects[pairs[0][0]].name)
         obstacle = world.objects[pairs[0][1]]
         must = "free of bodies that may touch objects, with this planner"
         raise SettingError("scenario.scene", must, f"'{body}' and '{obstacle}'")
-    joints = moving_joints(assembly)
-    goal = task.goal_configuration(joints)
-    return task.posture_task(joints, world, None if goal is None else _tool_pose(assembly, goal))
+    q_goal = task.goal_configuration(names)
+    if q_goal is None:
+        link = task.link_goal(world.frames)
+    else:
+        tool = _tool_pose(assembly, q_goal)
+        link = LinkGoal("", tool, task.position_tolerance, task.angle_tolerance)
+    x, y, z = link.pose.position.tolist()
+    goal: PoseGoal | PointGoal = PointGoal(kind="point", point=(x, y, z))
+    if link.angle is not None:
+        goal = PoseGoal(kind="pose", point=(x, y, z), rotation=link.pose.angles)
+    # a goal that is a point only is rated without the term of the orientation
+    terms = () if link.angle is not None else ("goal_distance", "limit_margin", "collision")
+    return PostureTask(
+        q_start=tuple(_typed(assembly, task.start_configuration(names)).tolist()),
+        phases=(Phase(name="goal", goal=goal, terms=terms),),
+        position_tolerance=link.distance,
+        angle_tolerance=task.angle_tolerance if link.angle is None else link.angle,
+        security_margin=task.security_margin,
+        length_unit=task.length_unit,
+        obstacles=world.obstacles,
+    )
 
 
 def touching(assembly: Assembly, task: MoveitTask) -> tuple[tuple[int, int], ...]:
     """Return the pairs (body, obstacle) that may touch, by their numbers."""
-    return task.touching(links_of_bodies(assembly), _world(assembly, task))
-
-
-def without_pairs(found: Scene, task: MoveitTask, assembly: Assembly) -> Scene:
-    """Return a scene without the pairs of a body and an obstacle that may touch.
-
-    Args:
-        found: Bodies first, then the obstacles.
-        task: Names the pairs.
-    """
-    num_bodies = assembly.geometry.ngeoms
-    allowed = {(body, num_bodies + k) for body, k in touching(assembly, task)}
-    kept = [(int(a), int(b)) not in allowed for a, b in found.pairs]
-    return found.of_pairs(np.array(kept, dtype=np.bool_)) if allowed else found
+    allowed, objects = task.allowed, task.world(assembly.frames, loaded_mesh).objects
+    return tuple(
+        (body, obstacle)
+        for body, link in enumerate(links_of_bodies(assembly).values())
+        for obstacle, name in enumerate(objects)
+        if allowed.may_touch(link, name)
+    )
 
 
 def hull_notes(names: Sequence[str]) -> tuple[str, ...]:
     """Say that a search takes obstacles to be larger than they are, if there are such."""
     if not names:
         return ()
-    told = "meshes, cones and hulls: the search tests the boxes around them, the verdict is of the"
-    return (f"{told} convex hulls: {', '.join(names)}",)
+    note = "meshes, cones and hulls: the search tests the boxes around them, the verdict is of the"
+    return (f"{note} convex hulls: {', '.join(names)}",)
 
 
-def _world(assembly: Assembly, task: MoveitTask) -> World:
-    return task.world(assembly.frames, loaded_mesh)
+def _typed(assembly: Assembly, q: FloatArray) -> FloatArray:
+    """Return q (nq,) [rad, m] as scenarios give it [deg, m]."""
+    return np.where(assembly.table.slides, q, q / DEGREE)
 
 
 def _tool_pose(assembly: Assembly, q: FloatArray) -> Pose:
     """Return the pose of the first arm's tool at q (nq,) [rad, m]."""
     tool = assembly.tools[0]
     local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
-    found = frame_pose(assembly.table, tool.joint - 1, local, q)
-    return Pose(found[:9].reshape(3, 3), found[9:])
+    pose = frame_pose(assembly.table, tool.joint - 1, local, q)
+    return Pose(pose[:9].reshape(3, 3), pose[9:])

@@ -15,9 +15,6 @@ MIN_TICKS, MAX_TICKS = 240, 600  # of a whole motion
 TURN = np.radians(2.0)  # [rad] of a joint between two ticks, where there may be so many
 SLIDE = 0.01  # [-] of the scene's size, of a sliding joint
 
-Place = tuple[int, Any]
-"""Index of a joint of the model, and a placement in its frame."""
-
 
 class Frame(NamedTuple):
     """A frame that moves bodies: of a joint, or of an object that is carried."""
@@ -55,15 +52,6 @@ def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
     return np.concatenate([*pieces, [float(segments)]])
 
 
-def frames_of(model: Any, carried: list[str]) -> tuple[Frame, ...]:
-    """Return the frames of all joints of a model, then those of carried objects.
-
-    The frame of a carried object hangs on the world.
-    """
-    joints = [Frame(model.names[k], int(model.parents[k]) - 1) for k in range(1, model.njoints)]
-    return (*joints, *(Frame(f"object {name}", -1) for name in carried))
-
-
 def poses(
     model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
 ) -> Poses:
@@ -77,7 +65,10 @@ def poses(
     """
     data, count = model.createData(), model.njoints - 1 + len(carried)
     world, local = np.empty((2, len(times), count, 7))
-    places = {id(part): [_place(part, name) for name in carried] for part in parts}
+    places = {  # of each carried object: its joint, and its placement in the joint's frame
+        id(part): [part.scene.shapes[part.scene.names.index(name)][1:] for name in carried]
+        for part in parts
+    }
     for k, t in enumerate(times):
         pin.forwardKinematics(model, data, motion.at(float(t)))
         for joint in range(1, model.njoints):
@@ -105,11 +96,6 @@ def points(world: FloatArray, frame: int, point: FloatArray) -> FloatArray:
     vector = np.stack([x, y, z], axis=1)
     twice = 2.0 * np.cross(vector, rows)
     return np.asarray(world[:, frame, :3] + rows + w[:, None] * twice + np.cross(vector, twice))
-
-
-def _place(part: Part, name: str) -> Place:
-    _, joint, placement = part.scene.shapes[part.scene.names.index(name)]
-    return joint, placement
 
 
 def _continuous(rows: FloatArray) -> FloatArray:

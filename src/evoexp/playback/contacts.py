@@ -1,5 +1,6 @@
 """Distances of the bodies over a motion, and every stretch of it in which bodies touch."""
 
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -49,19 +50,22 @@ def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance
         parts: Pieces of the motion, from `Planner.parts`.
         times: (ticks,) from 0 to the end [instants].
     """
-    least, pairs, contacts = [], [], []
+    least, pairs, contacts = [], [], list[Contact]()
     watches = {id(part): _Watch(part.scene, motion) for part in parts}
     for t in times:
-        watch = watches[id(part_at(parts, t))]
-        distance, pair = watch.nearest(t)
+        distance, pair = watches[id(part_at(parts, t))].nearest(t)
         least.append(max(distance, 0.0))
-        pairs.append(watch.name(pair))
+        pairs.append(pair)
     for part in parts:
         inside = times[(times > part.first) & (times < part.last)]
-        contacts += _contacts(
-            watches[id(part)], part, motion, np.array([*inside, float(part.last)])
-        )
-    return Clearance(np.array(least), tuple(pairs), _joined(contacts))
+        for contact in _contacts(watches[id(part)], part, motion, np.append(inside, part.last)):
+            # join contacts of which one begins where the other ends
+            if contacts and contact.begin <= contacts[-1].end + END_RESOLUTION:
+                end = max(contact.end, contacts[-1].end)
+                contacts[-1] = contacts[-1]._replace(end=end)
+            else:
+                contacts.append(contact)
+    return Clearance(np.array(least), tuple(pairs), tuple(contacts))
 
 
 class _Watch:
@@ -70,19 +74,16 @@ class _Watch:
     def __init__(self, scene: Scene, motion: Motion) -> None:
         self.scene, self._distance = scene, CoalDistance(scene, motion, UNLIMITED)
 
-    def nearest(self, t: float) -> tuple[float, int]:
-        """Return the least distance and its pair; inf and −1 without pairs."""
+    def nearest(self, t: float) -> tuple[float, str]:
+        """Return the least distance and the names of its pair; inf and nothing without pairs."""
         best: tuple[float, int] = np.inf, -1
         least = self._least(t)
         for pair in np.argsort(least, kind="stable"):
             if least[pair] > best[0]:
                 break
             best = min(best, (self._distance(int(pair), t), int(pair)))
-        return best
-
-    def name(self, pair: int) -> str:
-        """Return the names of a pair."""
-        return PAIR.join(self.scene.pair_names(pair)) if pair >= 0 else ""
+        distance, pair = best
+        return distance, PAIR.join(self.scene.pair_names(pair)) if pair >= 0 else ""
 
     def touching(self, t: float) -> bool:
         """Return whether any pair is in contact."""
@@ -101,33 +102,27 @@ def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> l
 
     The certifier finds the begin of a contact; ticks and bisection find its end.
     """
-    found: list[Contact] = []
+    contacts: list[Contact] = []
     t = float(part.first)
-    while t < part.last or (t == part.last == part.first and not found):
+    while t < part.last or (t == part.last == part.first and not contacts):
         rest = remainder(motion, t, part.last)
         verdict = certify(watch.scene, rest)
         if verdict.status != "refuted":
             break
         begin = at_instant(verdict.refuted_at, t)
         pair = PAIR.join(verdict.refuted_pair or ())
-        touching, free = begin, float(part.last)
-        for tick in ticks[ticks > begin]:
-            if not watch.touching(float(tick)):
-                free = float(tick)
-                break
-            touching = float(tick)
+        later = ticks[ticks > begin].tolist()
+        in_contact = [begin, *takewhile(watch.touching, later)]
+        touching = in_contact[-1]
         if touching == part.last:
-            found.append(Contact(begin, touching, pair))
+            contacts.append(Contact(begin, touching, pair))
             break
-        t = free
+        t = free = later[len(in_contact) - 1]
         while free - touching > END_RESOLUTION:
             middle = 0.5 * (free + touching)
-            if watch.touching(middle):
-                touching = middle
-            else:
-                free = middle
-        found.append(Contact(begin, max(touching, begin), pair))
-    return found
+            touching, free = (middle, free) if watch.touching(middle) else (touching, middle)
+        contacts.append(Contact(begin, touching, pair))
+    return contacts
 
 
 def remainder(motion: Motion, t: float, last: int) -> Motion:
@@ -156,14 +151,3 @@ def at_instant(t: float, begin: float) -> float:
     """Return the instant of the whole motion for instant t of its rest from `begin` on."""
     segment = int(begin)
     return begin + t * (segment + 1 - begin) if t < 1.0 else segment + t
-
-
-def _joined(contacts: list[Contact]) -> tuple[Contact, ...]:
-    """Join contacts of which one begins where the other ends."""
-    joined: list[Contact] = []
-    for contact in contacts:
-        if joined and contact.begin <= joined[-1].end + END_RESOLUTION:
-            joined[-1] = joined[-1]._replace(end=max(contact.end, joined[-1].end))
-        else:
-            joined.append(contact)
-    return tuple(joined)

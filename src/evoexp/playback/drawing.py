@@ -5,18 +5,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from foxglove_schemas_protobuf.Color_pb2 import Color
-from foxglove_schemas_protobuf.CubePrimitive_pb2 import CubePrimitive
-from foxglove_schemas_protobuf.CylinderPrimitive_pb2 import CylinderPrimitive
-from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
-from foxglove_schemas_protobuf.Point3_pb2 import Point3
-from foxglove_schemas_protobuf.Pose_pb2 import Pose
-from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
-from foxglove_schemas_protobuf.SpherePrimitive_pb2 import SpherePrimitive
-from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
-from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
-from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 
 from evoexp.playback.colours import OBJECT, OBSTACLE, arm_colour, rgb
 from evoexp.playback.recording import Recording
@@ -25,74 +14,57 @@ from evoexp.records import FloatArray
 
 WORLD = "world"
 LINE_WIDTH, WAY_WIDTH = 5.0, 2.0  # [px] of links that have no thickness, and of the tools' ways
+TARGET = "#882255"
 SLAB = 0.01  # [-] of the view's radius: thickness of half-spaces, which have no end
 FAR = 6.0  # [-] of the view's radius: their edges
 OPACITY = {"arm": 1.0, "object": 0.9, "obstacle": 0.45, "start": 0.2, "end": 0.35}
 
+Fields = dict[str, Any]
+"""Fields of a protobuf message, by their names."""
+
 
 def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
-    """Return one entity per body, in the frame that moves it."""
-    chosen, names = set(roles), frame_names(recording)
+    """Return one entity per body of some roles, in the frame that moves it."""
+    names, radius = frame_names(recording), recording.view.radius
     return [
-        entity(
-            shape,
-            names[shape.frame],
-            shape.pose,
-            OPACITY[shape.role],
-            recording.view.radius,
-            shape.name,
-        )
+        _body(shape.name, names[shape.frame], shape, shape.pose, OPACITY[shape.role], radius)
         for shape in recording.shapes
-        if shape.role in chosen
+        if shape.role in roles
     ]
 
 
 def ghosts(recording: Recording) -> list[Any]:
     """Return translucent copies of all moving bodies at the start and at the end."""
-    found = []
+    entities = []
     for when, tick in (("start", 0), ("end", -1)):
         for shape in (shape for shape in recording.shapes if shape.frame >= 0):
             frame = pin.XYZQUATToSE3(recording.poses.world[tick, shape.frame])
             pose = pin.SE3ToXYZQUAT(frame * pin.XYZQUATToSE3(shape.pose))
-            name = f"{when} of {shape.name}"
-            found.append(entity(shape, WORLD, pose, OPACITY[when], recording.view.radius, name))
-    return found
+            name, radius = f"{when} of {shape.name}", recording.view.radius
+            entities.append(_body(name, WORLD, shape, pose, OPACITY[when], radius))
+    return entities
 
 
 def marks(recording: Recording) -> list[Any]:
     """Return the paths of the tools, and the targets of the task."""
-    found = []
+    entities = []
     for arm, way in enumerate(recording.traces):
-        line = LinePrimitive(
-            type=LinePrimitive.LINE_STRIP,
-            pose=_pose(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
-            thickness=WAY_WIDTH,
-            scale_invariant=True,
-            points=[_point(point) for point in way],
-            color=_colour(arm_colour(arm), 1.0),
-        )
-        found.append(
-            SceneEntity(frame_id=WORLD, id=f"way of arm {arm + 1}", frame_locked=True, lines=[line])
-        )
-    size = 0.02 * recording.view.radius
+        line = _line(way, WAY_WIDTH, _colour(arm_colour(arm), 1.0))
+        entities.append(_entity(f"way of arm {arm + 1}", WORLD, lines=[line]))
+    colour, across = _colour(TARGET, 1.0), 0.02 * recording.view.radius
     for target in recording.targets:
-        pose = _pose(np.array([*target.point, 0.0, 0.0, 0.0, 1.0]))
-        ball = SpherePrimitive(
-            pose=pose, size=_vector(np.full(3, size)), color=_colour("#882255", 1.0)
-        )
-        text = TextPrimitive(
-            pose=pose,
-            billboard=True,
-            font_size=14.0,
-            scale_invariant=True,
-            color=_colour("#882255", 1.0),
-            text=f" {target.name}",
-        )
-        name = f"target {target.name}"
-        found.append(
-            SceneEntity(frame_id=WORLD, id=name, frame_locked=True, spheres=[ball], texts=[text])
-        )
-    return found
+        place = pin.SE3(np.eye(3), target.point)
+        text = {
+            "pose": _pose(place),
+            "billboard": True,
+            "font_size": 14.0,
+            "scale_invariant": True,
+            "color": colour,
+            "text": f" {target.name}",
+        }
+        ball = _solid(place, (across,) * 3, colour)
+        entities.append(_entity(f"target {target.name}", WORLD, spheres=[ball], texts=[text]))
+    return entities
 
 
 def frame_names(recording: Recording) -> list[str]:
@@ -100,8 +72,8 @@ def frame_names(recording: Recording) -> list[str]:
     return [*(frame.name for frame in recording.frames), WORLD]
 
 
-def entity(
-    shape: Shape, frame: str, pose: FloatArray, opacity: float, radius: float, name: str
+def _body(
+    name: str, frame: str, shape: Shape, pose: FloatArray, opacity: float, radius: float
 ) -> Any:
     """Return a body as one entity.
 
@@ -110,92 +82,75 @@ def entity(
         pose: (7,) in that frame.
         opacity: From 0 to 1.
         radius: Radius of the view, for half-spaces [length unit].
-        name: Name of the entity.
     """
-    own = (
-        arm_colour(shape.arm)
-        if shape.role == "arm"
-        else OBJECT
-        if shape.role == "object"
-        else OBSTACLE
+    colours = {"arm": arm_colour(shape.arm), "object": OBJECT, "obstacle": OBSTACLE}
+    colour = _colour(colours[shape.role], opacity)
+    return _entity(
+        name, frame, **_primitives(shape.outline, pin.XYZQUATToSE3(pose), colour, radius)
     )
-    primitives = _primitives(shape.outline, pin.XYZQUATToSE3(pose), _colour(own, opacity), radius)
+
+
+def _entity(name: str, frame: str, **primitives: Any) -> Any:
     return SceneEntity(frame_id=frame, id=name, frame_locked=True, **primitives)
 
 
-def _primitives(outline: Outline, place: Any, colour: Any, radius: float) -> dict[str, list[Any]]:
+def _primitives(
+    outline: Outline, place: Any, colour: Fields, radius: float
+) -> dict[str, list[Fields]]:
     kind, size = outline.kind, outline.size
     if outline.is_line:
         ends = [place * np.array([0.0, 0.0, z]) for z in (-0.5 * size[1], 0.5 * size[1])]
-        line = LinePrimitive(
-            type=LinePrimitive.LINE_STRIP,
-            pose=_pose(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
-            thickness=LINE_WIDTH,
-            scale_invariant=True,
-            points=[_point(end) for end in ends],
-            color=colour,
-        )
-        return {"lines": [line]}
+        return {"lines": [_line(ends, LINE_WIDTH, colour)]}
     if kind == "box":
-        return {"cubes": [_solid(CubePrimitive, place, size, colour)]}
+        return {"cubes": [_solid(place, size, colour)]}
     if kind in ("sphere", "ellipsoid"):
         axes = size * 3 if kind == "sphere" else size
-        return {
-            "spheres": [_solid(SpherePrimitive, place, tuple(2.0 * axis for axis in axes), colour)]
-        }
+        return {"spheres": [_solid(place, [2.0 * axis for axis in axes], colour)]}
     if kind == "half_space":
         depth, edge = SLAB * radius, FAR * radius
-        below = place * pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.5 * depth]))
-        return {"cubes": [_solid(CubePrimitive, below, (edge, edge, depth), colour)]}
-    if kind == "mesh":
-        assert outline.points is not None
-        assert outline.triangles is not None
-        points = [_point(point) for point in outline.points]
-        indices = outline.triangles.ravel().tolist()
-        return {
-            "triangles": [
-                TriangleListPrimitive(
-                    pose=_placed(place), points=points, color=colour, indices=indices
-                )
-            ]
-        }
+        return {"cubes": [_solid(_along_z(place, -0.5 * depth), (edge, edge, depth), colour)]}
+    if outline.points is not None and outline.triangles is not None:
+        points, indices = map(_vector, outline.points), outline.triangles.ravel().tolist()
+        mesh = {"pose": _pose(place), "points": [*points], "color": colour, "indices": indices}
+        return {"triangles": [mesh]}
     across, length = 2.0 * size[0], size[1]
-    scale = {"bottom_scale": 1.0, "top_scale": 0.0 if kind == "cone" else 1.0}
-    found: dict[str, list[Any]] = {
-        "cylinders": [_solid(CylinderPrimitive, place, (across, across, length), colour, **scale)]
+    cylinder = _solid(place, (across, across, length), colour)
+    cylinder |= {"bottom_scale": 1.0, "top_scale": 0.0 if kind == "cone" else 1.0}
+    if kind != "capsule":
+        return {"cylinders": [cylinder]}
+    ends = [_along_z(place, z) for z in (-0.5 * length, 0.5 * length)]
+    balls = [_solid(end, (across,) * 3, colour) for end in ends]
+    return {"cylinders": [cylinder], "spheres": balls}
+
+
+def _line(points: Iterable[FloatArray], width: float, colour: Fields) -> Fields:
+    """Return a strip of lines of a width [px]."""
+    return {
+        "type": "LINE_STRIP",
+        "pose": _pose(pin.SE3.Identity()),
+        "thickness": width,
+        "scale_invariant": True,
+        "points": [_vector(point) for point in points],
+        "color": colour,
     }
-    if kind == "capsule":
-        ends = [
-            place * pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
-            for z in (-0.5 * length, 0.5 * length)
-        ]
-        found["spheres"] = [_solid(SpherePrimitive, end, (across,) * 3, colour) for end in ends]
-    return found
 
 
-def _solid(kind: Any, place: Any, size: tuple[float, ...], colour: Any, **more: float) -> Any:
-    return kind(pose=_placed(place), size=_vector(np.array(size)), color=colour, **more)
+def _solid(place: Any, size: Iterable[float], colour: Fields) -> Fields:
+    return {"pose": _pose(place), "size": _vector(size), "color": colour}
 
 
-def _placed(place: Any) -> Any:
-    return _pose(np.asarray(pin.SE3ToXYZQUAT(place)))
+def _along_z(place: Any, z: float) -> Any:
+    return place * pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
 
 
-def _pose(row: FloatArray) -> Any:
-    x, y, z, w = map(float, row[3:])
-    return Pose(position=_vector(row[:3]), orientation=Quaternion(x=x, y=y, z=z, w=w))
+def _pose(place: Any) -> Fields:
+    row = pin.SE3ToXYZQUAT(place).tolist()
+    return {"position": _vector(row[:3]), "orientation": dict(zip("xyzw", row[3:], strict=True))}
 
 
-def _vector(values: FloatArray) -> Any:
-    x, y, z = map(float, values)
-    return Vector3(x=x, y=y, z=z)
+def _vector(values: Iterable[float]) -> dict[str, float]:
+    return dict(zip("xyz", map(float, values), strict=True))
 
 
-def _point(values: FloatArray) -> Any:
-    x, y, z = map(float, values)
-    return Point3(x=x, y=y, z=z)
-
-
-def _colour(colour: str, opacity: float) -> Any:
-    red, green, blue = rgb(colour)
-    return Color(r=red, g=green, b=blue, a=opacity)
+def _colour(colour: str, opacity: float) -> Fields:
+    return dict(zip("rgba", (*rgb(colour), opacity), strict=True))

@@ -31,54 +31,45 @@ class JointLimits(NamedTuple):
     acceleration: FloatArray  # (nq,) [rad/s² or length unit/s²]
 
 
-class Defaults(NamedTuple):
-    """Limits of the joints that neither the file nor the robot limits."""
-
-    velocity: FloatArray  # (nq,) greatest |dq/dt| [rad/s or length unit/s]
-    robot: FloatArray  # (nq,) the robot's own velocity limits; inf where it has none
-    ramp: float  # time from rest to the greatest speed [s], which limits accelerations
-
-
-def joint_limits(names: tuple[str, ...], path: Path | None, defaults: Defaults) -> JointLimits:
+def joint_limits(
+    names: tuple[str, ...], path: Path | None, speeds: FloatArray, robot: FloatArray, ramp: float
+) -> JointLimits:
     """Collect the limits of joints.
 
     Args:
         names: Names of the joints, (nq).
         path: MoveIt's `joint_limits.yaml`; None: there is none.
-        defaults: Limits where the file has none.
+        speeds: (nq,) greatest |dq/dt| where nothing else limits it [rad/s or length unit/s].
+        robot: (nq,) the robot's own velocity limits; inf where it has none.
+        ramp: Time from rest to the greatest speed [s], where the file limits no acceleration.
 
     Raises:
         LimitsFileError: If the file cannot be read, is no such file, or names none of the joints.
     """
-    given = _read(path, names) if path is not None else {}
-    found = np.array(
-        [[given.get(name, {}).get(kind, math.nan) for kind in KINDS] for name in names]
-    )
-    velocity, acceleration = found.T
-    from_robot = np.where(np.isfinite(defaults.robot), defaults.robot, defaults.velocity)
-    velocity = np.where(np.isnan(velocity), from_robot, velocity)
-    acceleration = np.where(np.isnan(acceleration), velocity / defaults.ramp, acceleration)
-    return JointLimits(velocity, acceleration)
+    limits = _read(path, names) if path is not None else {}
+    rows = [[limits.get(name, {}).get(kind, math.nan) for kind in KINDS] for name in names]
+    velocity, acceleration = np.array(rows).T
+    velocity = np.where(np.isnan(velocity), np.where(np.isfinite(robot), robot, speeds), velocity)
+    return JointLimits(velocity, np.where(np.isnan(acceleration), velocity / ramp, acceleration))
 
 
 def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
     """Read the limits that a file sets, per joint and kind."""
-    shown = printable(str(path))
+    was = printable(str(path))
+    must, data = "map joints under 'joint_limits', as MoveIt's file", None
     try:
         data = yaml.safe_load(read_bounded(path, LARGEST_FILE))
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise LimitsFileError(
-            f"--limits: must be a file that can be read, was {shown} ({reason})"
-        ) from None
+        must = "be a file that can be read"
+        was += f" ({(error.strerror or str(error)).lower()})"
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        first = printable(str(error).splitlines()[0])
-        raise LimitsFileError(f"--limits: must be YAML, was {shown} ({first})") from None
+        must = "be YAML"
+        was += f" ({printable(str(error).splitlines()[0])})"
     joints = data.get("joint_limits") if isinstance(data, dict) else None
-    if not isinstance(joints, dict) or not all(isinstance(each, dict) for each in joints.values()):
-        raise LimitsFileError(
-            f"--limits: must map joints under 'joint_limits', as MoveIt's file, was {shown}"
-        )
+    if not isinstance(joints, dict) or not all(
+        isinstance(joint, dict) for joint in joints.values()
+    ):
+        raise LimitsFileError(f"--limits: must {must}, was {was}")
     known = [str(name) for name in joints]
     if not set(known) & set(names):
         hint = nearest(known[0], list(names)) if known else ""
@@ -87,15 +78,15 @@ def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
             f"was {printable(', '.join(known[:8])) or 'none'}{hint}"
         )
     return {
-        str(name): {kind: _limit(each, kind, str(name)) for kind in KINDS if _has(each, kind)}
-        for name, each in joints.items()
+        str(name): {
+            kind: _limit(joint, kind, str(name))
+            for kind in KINDS
+            # a value without its flag counts, too
+            if joint.get(f"has_{kind}_limits", f"max_{kind}" in joint)
+        }
+        for name, joint in joints.items()
         if str(name) in names
     }
-
-
-def _has(joint: dict[str, Any], kind: str) -> bool:
-    """Whether a joint's entry limits a rate; a value without its `has_` flag counts, too."""
-    return bool(joint.get(f"has_{kind}_limits", f"max_{kind}" in joint))
 
 
 def _limit(joint: dict[str, Any], kind: str, name: str) -> float:

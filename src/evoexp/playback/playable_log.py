@@ -11,15 +11,10 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.Log_pb2 import Log
-from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
-from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
@@ -31,21 +26,13 @@ MOTION = "evoexp.motion"  # name of the metadata record
 LAYOUT = "foxglove_layout.json"
 SECOND = 1_000_000_000  # [ns]
 CHUNK_SIZE = 56 * 1024  # [B]
-NUMBER, NUMBERS, TEXT = (
-    {"type": "number"},
-    {"type": "array", "items": {"type": "number"}},
-    {"type": "string"},
-)
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+NUMBERS = {"type": "array", "items": NUMBER}
 CLEARANCE = {
     "title": "evoexp.Clearance",
     "type": "object",
-    "properties": {
-        "instant": NUMBER,
-        "clearance": NUMBER,
-        "required": NUMBER,
-        "contact": NUMBER,
-        "pair": TEXT,
-    },
+    "properties": dict.fromkeys(("instant", "clearance", "required", "contact"), NUMBER)
+    | {"pair": TEXT},
 }
 IMPROVEMENTS = {
     "title": "evoexp.Improvements",
@@ -58,24 +45,16 @@ def playable_log(recording: Recording) -> bytes:
     """Return a motion as an MCAP; the same motion gives the same bytes."""
     out = _Playable()
     out.writer.add_metadata(MOTION, _metadata(recording))
-    for name, kind, data in (
-        ("config.json", "application/json", recording.config_json),
-        (LAYOUT, "application/json", layout()),
-    ):
-        out.writer.add_attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data)
+    for name, data in (("config.json", recording.config_json), (LAYOUT, layout())):
+        out.writer.add_attachment(0, 0, name, "application/json", data)
     out.scene("/scene/robot", bodies(recording, ("arm", "object")))
     out.scene("/scene/obstacles", bodies(recording, ("obstacle",)))
     out.scene("/scene/ghosts", ghosts(recording))
     out.scene("/scene/ways", marks(recording))
-    found = [row for row in recording.heading.improvements if np.isfinite(row[1])]
-    if found:
-        generations, costs = zip(*found, strict=True)
-        out.json(
-            "/improvements",
-            IMPROVEMENTS,
-            0,
-            {"generation": list(generations), "best_cost": list(costs)},
-        )
+    rows = [row for row in recording.heading.improvements if np.isfinite(row[1])]
+    if rows:
+        columns = dict(zip(("generation", "best_cost"), zip(*rows, strict=True), strict=True))
+        out.json("/improvements", IMPROVEMENTS, 0, columns)
     waiting = _log_messages(recording)
     for k, instant in enumerate(recording.times):
         now = nanoseconds(recording, instant)
@@ -136,88 +115,79 @@ class _Playable:
 
     def _add(self, topic: str, encoding: str, schema: str, moment: int, data: bytes) -> None:
         if topic not in self._channels:
-            self._channels[topic] = [
-                self.writer.register_channel(topic, encoding, self._schemas[schema]),
-                0,
-            ]
+            number = self.writer.register_channel(topic, encoding, self._schemas[schema])
+            self._channels[topic] = [number, 0]
         channel = self._channels[topic]
         self.writer.add_message(channel[0], moment, data, moment, channel[1])
         channel[1] += 1
 
 
-def _stamp(now: int) -> Any:
-    return Timestamp(seconds=now // SECOND, nanos=now % SECOND)
+def _stamp(now: int) -> dict[str, int]:
+    return {"seconds": now // SECOND, "nanos": now % SECOND}
 
 
 def _transforms(recording: Recording, k: int, now: int) -> Any:
     """Return the pose of every frame in the frame of its parent, one transform per link."""
-    names, rows = frame_names(recording), []
-    for frame, row in zip(recording.frames, recording.poses.local[k].tolist(), strict=True):
-        x, y, z, qx, qy, qz, qw = row
-        rows.append(
-            FrameTransform(
-                timestamp=_stamp(now),
-                parent_frame_id=names[frame.parent],
-                child_frame_id=frame.name,
-                translation=Vector3(x=x, y=y, z=z),
-                rotation=Quaternion(x=qx, y=qy, z=qz, w=qw),
-            )
-        )
-    return FrameTransforms(transforms=rows)
+    names, rows = frame_names(recording), recording.poses.local[k].tolist()
+    transforms: list[Any] = [
+        {
+            "timestamp": _stamp(now),
+            "parent_frame_id": names[frame.parent],
+            "child_frame_id": frame.name,
+            "translation": dict(zip("xyz", row[:3], strict=True)),
+            "rotation": dict(zip("xyzw", row[3:], strict=True)),
+        }
+        for frame, row in zip(recording.frames, rows, strict=True)
+    ]
+    return FrameTransforms(transforms=transforms)
 
 
 def _joints(recording: Recording, k: int, now: int) -> Any:
     rows = zip(recording.joints, recording.q[k].tolist(), recording.dq[k].tolist(), strict=True)
-    states = [JointState(name=joint.name, position=q, velocity=dq) for joint, q, dq in rows]
+    states: list[Any] = [
+        {"name": joint.name, "position": q, "velocity": dq} for joint, q, dq in rows
+    ]
     return JointStates(timestamp=_stamp(now), joints=states)
 
 
 def _clearance(recording: Recording, k: int) -> dict[str, Any]:
-    least, instant = float(recording.clearance.least[k]), float(recording.times[k])
-    touching = any(
-        contact.begin <= instant <= contact.end for contact in recording.clearance.contacts
-    )
+    clearance, instant = recording.clearance, float(recording.times[k])
+    touching = any(contact.begin <= instant <= contact.end for contact in clearance.contacts)
     values: dict[str, Any] = {
         "instant": instant,
         "required": recording.margin,
         "contact": float(touching),
+        "pair": clearance.pairs[k],
     }
-    values["pair"] = recording.clearance.pairs[k]
+    least = float(clearance.least[k])
     return values | ({"clearance": least} if np.isfinite(least) else {})
 
 
 def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
     """Return verdict, least clearance and contacts as messages, in the order of time."""
-    verdict, unit, rows = recording.verdict, recording.length_unit, []
+    verdict, unit = recording.verdict, recording.length_unit
     answer = {
         True: "certified: no two bodies ever touch",
         False: "refuted: bodies touch",
         None: "undecided",
     }
-    rows.append((0.0, Log.INFO, f"{recording.heading.title}: {answer[verdict.certified]}"))
+    rows = [(0.0, Log.INFO, f"{recording.heading.title}: {answer[verdict.certified]}")]
     if verdict.certified is not False and verdict.clearance_at is not None:
-        kept = verdict.certified_margin is not False
+        is_kept = verdict.certified_margin is not False
         text = f"least clearance {verdict.clearance:.6g} {unit}: {verdict.clearance_pair}"
-        text += "" if kept else f", less than the required {recording.margin:g} {unit}"
-        rows.append((verdict.clearance_at, Log.INFO if kept else Log.WARNING, text))
+        text += "" if is_kept else f", less than the required {recording.margin:g} {unit}"
+        rows.append((verdict.clearance_at, Log.INFO if is_kept else Log.WARNING, text))
     if verdict.allowed_contacts:
         depth = f"deepest overlap {verdict.penetration or 0.0:.6g} {unit}"
         rows.append((0.0, Log.INFO, f"may touch: {verdict.allowed_contacts}; {depth}"))
-    for contact in recording.clearance.contacts:
-        rows.append(
-            (
-                contact.begin,
-                Log.ERROR,
-                f"refuted at instant {contact.begin:.9g}: {contact.pair} touch",
-            )
-        )
-        rows.append((contact.end, Log.INFO, f"free again at instant {contact.end:.6g}"))
+    for begin, end, pair in recording.clearance.contacts:
+        rows.append((begin, Log.ERROR, f"refuted at instant {begin:.9g}: {pair} touch"))
+        rows.append((end, Log.INFO, f"free again at instant {end:.6g}"))
     messages = []
     for instant, level, text in sorted(rows, key=lambda row: row[0]):
         now = nanoseconds(recording, instant)
-        messages.append(
-            (now, Log(timestamp=_stamp(now), level=level, message=text, name="certifier"))
-        )
+        log = Log(timestamp=_stamp(now), level=level, message=text, name="certifier")
+        messages.append((now, log))
     return messages
 
 

@@ -17,8 +17,12 @@ from evoexp.playback.shapes import Shape
 from evoexp.records import FloatArray
 
 DIGITS = 6  # significant, of distances
-PARTS = {"style": "css", "geometry": "js", "script": "js"}
-FILES = {"style": "motion_page", "geometry": "motion_geometry", "script": "motion_page"}
+MARGIN = {True: "kept", False: "not kept", None: "undecided"}
+FILES = {
+    "style": "motion_page.css",
+    "geometry": "motion_geometry.js",
+    "script": "motion_page.js",
+}
 
 
 def page(recordings: Sequence[Recording]) -> bytes:
@@ -32,10 +36,7 @@ def page(recordings: Sequence[Recording]) -> bytes:
     data = json.dumps(
         [_motion(recording) for recording in recordings], separators=(",", ":"), allow_nan=False
     )
-    values = {
-        name: (assets / f"{FILES[name]}.{kind}").read_text(encoding="utf-8")
-        for name, kind in PARTS.items()
-    }
+    values = {name: (assets / file).read_text(encoding="utf-8") for name, file in FILES.items()}
     values["title"] = html.escape(" | ".join(recording.heading.title for recording in recordings))
     values["motions"] = data.replace("<", "\\u003c")  # nothing in it can end the script element
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], text).encode()
@@ -134,28 +135,27 @@ def _margin(recording: Recording) -> dict[str, str]:
     """
     if recording.margin <= 0.0 or recording.verdict.certified is False:
         return {}
-    kind, word = {True: ("kept", "kept"), False: ("broken", "not kept"), None: ("", "undecided")}[
-        recording.verdict.certified_margin
-    ]
-    return {"margin_kind": kind or "unsure", "margin_text": f"required margin {word}"}
+    answer = recording.verdict.certified_margin
+    kind = {True: "kept", False: "broken", None: "unsure"}[answer]
+    return {"margin_kind": kind, "margin_text": f"required margin {MARGIN[answer]}"}
 
 
 def _facts(recording: Recording) -> list[tuple[str, str]]:
-    verdict, heading = recording.verdict, recording.heading
-    margin = {True: "kept", False: "not kept", None: "undecided"}[verdict.certified_margin]
+    verdict, heading, unit = recording.verdict, recording.heading, recording.length_unit
     rows = [("condition", recording.condition_id[:12])]
     if heading.replicate >= 0:
         rows.append(("replicate", str(heading.replicate)))
     if heading.improvements:
         generation, cost = heading.improvements[-1]
         rows.append(("best cost", f"{cost:.6g}, of generation {generation}"))
-    rows.append(("least clearance", f"{_shown(verdict.clearance)} {recording.length_unit}"))
+    rows.append(("least clearance", f"{_shown(verdict.clearance)} {unit}"))
     if verdict.clearance_pair:
         rows.append(("nearest", verdict.clearance_pair))
     if recording.margin > 0.0:
-        rows.append(("required", f"{recording.margin:g} {recording.length_unit}: {margin}"))
+        margin = MARGIN[verdict.certified_margin]
+        rows.append(("required", f"{recording.margin:g} {unit}: {margin}"))
     if verdict.allowed_contacts:
-        depth = f"{_shown(verdict.penetration or 0.0)} {recording.length_unit}"
+        depth = f"{_shown(verdict.penetration or 0.0)} {unit}"
         rows += [("may touch", verdict.allowed_contacts), ("deepest overlap of these", depth)]
     rows += [
         (f"contact {k + 1}", f"{contact.begin:.4g} to {contact.end:.4g}: {contact.pair}")
@@ -165,7 +165,7 @@ def _facts(recording: Recording) -> list[tuple[str, str]]:
     rows += [
         ("instants", str(recording.motion.num_segments + 1)),
         ("curve", "straight" if recording.motion.coefficients is None else "cubic"),
-        ("tools’ ways", f"{length:.4g} {recording.length_unit}"),
+        ("tools’ ways", f"{length:.4g} {unit}"),
         ("bodies", f"{len(recording.shapes)}, as coal judges them"),
     ]
     return rows

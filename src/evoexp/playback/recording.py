@@ -11,7 +11,7 @@ from evoexp.collision.scene import Part, Scene
 from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
-from evoexp.playback.body_poses import Frame, Poses, frames_of, points, poses, ticks
+from evoexp.playback.body_poses import Frame, Poses, points, poses, ticks
 from evoexp.playback.contacts import Clearance, clearance
 from evoexp.playback.shapes import Role, Shape, outline, pose
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
@@ -128,7 +128,8 @@ def record_motion(
     model, size = parts[0].scene.model, parts[0].scene.size
     joints = joints_of(assembly)
     prismatic = np.array([joint.prismatic for joint in joints])
-    carried = _carried(parts)
+    frames = [Frame(model.names[k], int(model.parents[k]) - 1) for k in range(1, model.njoints)]
+    carried = _carried(parts)  # their frames hang on the world
     times = ticks(motion, prismatic, size)
     where = poses(model, motion, times, parts, carried)
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
@@ -146,7 +147,7 @@ def record_motion(
         dq=velocities(motion, times, seconds),
         seconds=seconds,
         size=size,
-        frames=frames_of(model, carried),
+        frames=(*frames, *(Frame(f"object {name}", -1) for name in carried)),
         poses=where,
         shapes=shapes,
         traces=np.array(
@@ -179,12 +180,7 @@ def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
 
 def joints_of(assembly: Assembly) -> tuple[Joint, ...]:
     """Return the joints in the order of their coordinates."""
-    table, names = assembly.table, assembly.model.names
-    own = np.flatnonzero(table.free)
-    return tuple(
-        Joint(str(names[int(k) + 1]), bool(table.prismatic[k]))
-        for k in own[np.argsort(table.index_q[own])]
-    )
+    return tuple(map(Joint, assembly.joint_names, assembly.table.slides.tolist()))
 
 
 def _velocity_limits(assembly: Assembly) -> FloatArray:
@@ -195,31 +191,26 @@ def _velocity_limits(assembly: Assembly) -> FloatArray:
 
 def _carried(parts: list[Part]) -> list[str]:
     """Return the names of bodies that change their joint, or their place on it, on the way."""
-    first, found = parts[0].scene, []
+    first, carried = parts[0].scene, []
     for name, (_, joint, placement) in zip(first.names, first.shapes, strict=True):
-        for part in parts[1:]:
-            _, other, there = part.scene.shapes[part.scene.names.index(name)]
-            if other != joint or not there.isApprox(placement, 1e-12):
-                found.append(name)
-                break
-    return found
+        later = [part.scene.shapes[part.scene.names.index(name)] for part in parts[1:]]
+        if any(j != joint or not place.isApprox(placement, 1e-12) for _, j, place in later):
+            carried.append(name)
+    return carried
 
 
 def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape, ...]:
-    arms = assembly.body_arms
-    joints = assembly.model.njoints - 1
-    found = []
-    for k, (name, (shape, joint, placement)) in enumerate(
-        zip(scene.names, scene.shapes, strict=True)
-    ):
+    arms, joints, shapes = assembly.body_arms, assembly.model.njoints - 1, []
+    bodies = zip(scene.names, scene.shapes, strict=True)
+    for k, (name, (shape, joint, placement)) in enumerate(bodies):
         drawn, shift = outline(shape)
         frame, where = int(joint) - 1, placement * shift
         if name in carried:
             frame, where = joints + carried.index(name), shift
         of_robot = k < len(arms)
         role: Role = "arm" if of_robot else "object" if name in carried else "obstacle"
-        found.append(Shape(name, frame, pose(where), drawn, role, arms[k] if of_robot else -1))
-    return tuple(found)
+        shapes.append(Shape(name, frame, pose(where), drawn, role, arms[k] if of_robot else -1))
+    return tuple(shapes)
 
 
 def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ...]) -> View:

@@ -101,19 +101,11 @@ def fastest(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Ti
             "--timing optimal needs toppra: pip install 'evoexp[timing]'; --timing uniform does not"
         ) from None
     toppra.setup_logging("ERROR")
-    limits = [
-        toppra.constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
-        toppra.constraint.JointAccelerationConstraint(
-            np.stack([-accelerations, accelerations], axis=1),
-            # limits are kept between the points of the grid, too
-            toppra.constraint.DiscretizationType.Interpolation,
-        ),
-    ]
     polynomials = motion.polynomials[motion.polynomials[:, 1:].any(axis=(1, 2))]
     if not len(polynomials):  # it stands still
         return TimedPoints(np.array([0.0, 1.0]), motion.q[[0, 0]], 0.0 * motion.q[[0, 0]])
     sections = [
-        within(_section(toppra, polynomials[first:last], limits), speeds, accelerations)
+        _section(toppra, polynomials[first:last], speeds, accelerations)
         for first, last in pairwise([0, *_stops(polynomials), len(polynomials)])
     ]
     begins = np.concatenate([[0.0], np.cumsum([section.times[-1] for section in sections])])
@@ -133,14 +125,23 @@ def _stops(polynomials: FloatArray) -> Sequence[int]:
     return [int(k) + 1 for k in np.flatnonzero(jumps > SMOOTH * np.abs(c1).max())]
 
 
-def _section(toppra: Any, polynomials: FloatArray, limits: list[Any]) -> TimedPoints:
+def _section(
+    toppra: Any, polynomials: FloatArray, speeds: FloatArray, accelerations: FloatArray
+) -> TimedPoints:
     """Time cubics without a stop between them from rest to rest.
 
     Args:
         polynomials: (segments, 4, nq), lowest power first.
-        limits: Constraints of toppra.
     """
-    count = len(polynomials)
+    count, constraint = len(polynomials), toppra.constraint
+    limits = [
+        constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
+        constraint.JointAccelerationConstraint(
+            np.stack([-accelerations, accelerations], axis=1),
+            # limits are kept between the points of the grid, too
+            constraint.DiscretizationType.Interpolation,
+        ),
+    ]
     c0, c1, c2, c3 = polynomials.transpose(1, 0, 2)
     ends = np.vstack([c0, polynomials[-1].sum(axis=0)])
     slopes = np.vstack([c1, c1[-1] + 2.0 * c2[-1] + 3.0 * c3[-1]])
@@ -157,18 +158,12 @@ def _section(toppra: Any, polynomials: FloatArray, limits: list[Any]) -> TimedPo
     times = np.linspace(0.0, duration, points + 1)
     positions, rates = np.asarray(timed(times)), np.asarray(timed(times, 1))
     positions[[0, -1]], rates[[0, -1]] = ends[[0, -1]], 0.0
-    return TimedPoints(times, positions, rates)
-
-
-def within(timed: TimedPoints, speeds: FloatArray, accelerations: FloatArray) -> TimedPoints:
-    """Stretch a timing until the cubics between its points keep the limits, too."""
-    speed, acceleration = greatest_rates(hermite_motion(*timed), np.diff(timed.times))
-    stretch = max(
-        1.0,
-        float((speed / speeds).max()),
-        float(np.sqrt((acceleration / accelerations).max())),
-    )
-    return TimedPoints(timed.times * stretch, timed.positions, timed.velocities / stretch)
+    # stretched until the cubics between the points keep the limits, too
+    executed = hermite_motion(times, positions, rates)
+    speed, acceleration = greatest_rates(executed, np.diff(times))
+    excess = (speed / speeds).max(), np.sqrt((acceleration / accelerations).max())
+    stretch = max(1.0, *map(float, excess))
+    return TimedPoints(times * stretch, positions, rates / stretch)
 
 
 def hermite_motion(times: FloatArray, positions: FloatArray, velocities: FloatArray) -> Motion:

@@ -68,25 +68,19 @@ def trajectory(recording: Recording, timing: Timing, limits: JointLimits) -> Tra
     Raises:
         BadTiming: If the timing needs a package that is not installed.
     """
-    motion = recording.motion
+    motion, verdict = recording.motion, recording.verdict
     names = tuple(joint.name for joint in recording.joints)
     units = tuple(recording.length_unit if joint.prismatic else "rad" for joint in recording.joints)
     straight = motion.coefficients is None or motion.num_segments == 0
     if timing == "uniform":
-        times, positions, rates = _uniform(motion, limits.velocity)
-        cubic_rates = None if straight else rates
-        return Trajectory(names, units, times, positions, cubic_rates, recording.verdict)
+        instants = np.arange(float(motion.num_segments + 1))
+        seconds = seconds_per_instant(motion, limits.velocity)
+        rates = None if straight else velocities(motion, instants, seconds)
+        return Trajectory(names, units, seconds * instants, motion.q, rates, verdict)
     timed = fastest(motion, limits.velocity, limits.acceleration)
-    # cubics between points of a line stay on it
-    verdict = recording.verdict if straight else _executed_verdict(timed, recording)
+    if not straight:  # cubics between points of a line stay on it
+        verdict = _executed_verdict(timed, recording)
     return Trajectory(names, units, *timed, verdict)
-
-
-def _uniform(motion: Motion, speeds: FloatArray) -> TimedPoints:
-    """Time a motion by equal times from instant to instant."""
-    instants = np.arange(float(motion.num_segments + 1))
-    seconds = seconds_per_instant(motion, speeds)
-    return TimedPoints(seconds * instants, motion.q, velocities(motion, instants, seconds))
 
 
 def _executed_verdict(timed: TimedPoints, recording: Recording) -> Certificate:

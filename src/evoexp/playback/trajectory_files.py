@@ -178,21 +178,20 @@ def fitted(
         raise ValueError(f"times must grow from point to point: {times[k]:g} s at point {k + 1}")
     if any(not given.positions[joint.name].unit for joint in joints):
         remarks.append(f"values without a unit are read in rad and {length_unit}")
-    names = [joint.name for joint in joints]
+    names, motion = [joint.name for joint in joints], Motion(q)
     unread = [*given.unread, *(name for name in given.positions if name not in names)]
     if times is not None and all(name in given.velocities for name in names):
         rates = [_scaled(given.velocities[joint.name], joint, length_unit) for joint in joints]
         if np.any(rates):
-            remarks.append("cubics between the points, by their velocities")
-            return hermite_motion(times, q, np.array(rates).T), _told(remarks, unread)
+            motion = hermite_motion(times, q, np.array(rates).T)
     elif given.velocities:
         unread.append("velocities")  # of some joints, or without times
-    remarks.append("straight lines between the points")
-    return Motion(q), _told(remarks, unread)
-
-
-def _told(remarks: list[str], unread: list[str]) -> tuple[str, ...]:
-    return (*remarks, *([f"not read: {printable(', '.join(unread))}"] if unread else []))
+    is_straight = motion.coefficients is None
+    curves = "straight lines between the points", "cubics between the points, by their velocities"
+    remarks.append(curves[0] if is_straight else curves[1])
+    if unread:
+        remarks.append(f"not read: {printable(', '.join(unread))}")
+    return motion, tuple(remarks)
 
 
 def _by_joint(table: Columns, joints: Sequence[Joint], length_unit: str) -> JointTrajectory:

@@ -72,6 +72,13 @@ class Assembly(NamedTuple):
         """Number of arms."""
         return len(self.arm_slices)
 
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """(nq) names of the joints that move, in the order of q."""
+        own = np.flatnonzero(self.table.free)
+        own = own[np.argsort(self.table.index_q[own])]
+        return tuple(str(self.model.names[k + 1]) for k in own.tolist())
+
 
 class Follower(NamedTuple):
     """A joint that follows another: its coordinate is multiplier · q of the source + offset."""

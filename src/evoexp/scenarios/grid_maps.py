@@ -36,8 +36,7 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
     layers = rows if rows.ndim == 3 else rows[None]
     blocked = layers[:, ::-1, :].transpose(2, 1, 0)  # (x, y, z)
     blocked = blocked[:, :, 0] if len(size) == 2 and blocked.shape[2] == 1 else blocked
-    if blocked.shape != tuple(size):
-        raise _wrong_size(size, blocked.shape, field)
+    _check_size(size, blocked.shape, field)
     return np.ascontiguousarray(blocked)
 
 
@@ -55,11 +54,8 @@ def _read_text(content: bytes, field: str) -> np.ndarray:
     for number, line in enumerate(lines, 1):
         row = "".join(line.split())
         if wrong := next((letter for letter in row if letter not in BLOCKED + FREE), ""):
-            raise SettingError(
-                field,
-                f"a map of {' or '.join(BLOCKED)} (blocked) and {' or '.join(FREE)} (free)",
-                f"{wrong} in row {number}",
-            )
+            must = f"a map of {' or '.join(BLOCKED)} (blocked) and {' or '.join(FREE)} (free)"
+            raise SettingError(field, must, f"{wrong} in row {number}")
         if row:
             blocks[-1].append(row)
         elif blocks[-1]:
@@ -77,22 +73,18 @@ def _read_png(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
 
     try:
         opened: Any = Image.open(io.BytesIO(content), formats=("PNG",))
-        if len(size) != 2 or opened.size != tuple(size):
-            raise _wrong_size(size, opened.size, field)
+        _check_size(size, opened.size, field)
         picture: Any = opened.convert("L")
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise SettingError(field, "a PNG that can be read", str(error)) from None
     pixels = np.asarray(picture)
     if wrong := sorted({int(value) for value in np.unique(pixels)} - {0, 255}):
-        raise SettingError(
-            field, "a PNG of black (blocked) and white (free) pixels", f"grey {wrong[0]}"
-        )
+        must = "a PNG of black (blocked) and white (free) pixels"
+        raise SettingError(field, must, f"grey {wrong[0]}")
     return np.asarray(pixels == 0)
 
 
-def _wrong_size(size: tuple[int, ...], was: tuple[int, ...], field: str) -> SettingError:
-    return SettingError(field, f"a map of {_text(size)} nodes, as scenario.size says", _text(was))
-
-
-def _text(size: tuple[int, ...]) -> str:
-    return " × ".join(map(str, size))
+def _check_size(size: tuple[int, ...], was: tuple[int, ...], field: str) -> None:
+    if was != tuple(size):
+        expected, counts = (" × ".join(map(str, shape)) for shape in (size, was))
+        raise SettingError(field, f"a map of {expected} nodes, as scenario.size says", counts)

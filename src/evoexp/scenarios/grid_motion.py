@@ -1,6 +1,7 @@
 """A start and a goal on an occupancy grid."""
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -41,31 +42,24 @@ class GridMotion(Component):
         if math.prod(self.size) > MOST_NODES:
             raise SettingError("size", f"of at most {MOST_NODES:,} nodes", list(self.size))
         for name in ("start", "goal"):
-            self._check_node(name, getattr(self, name))
+            node = getattr(self, name)
+            if len(node) != len(self.size) or not self._are_nodes(node, node):
+                raise SettingError(name, f"a node inside the grid ({self.inside})", list(node))
         if self.start == self.goal:
             raise SettingError("goal", "another node than start", list(self.goal))
+        half = len(self.size)
         for k, corners in enumerate(self.obstacles):
-            half = len(self.size)
+            must = f"from a lower to an upper corner inside the grid ({self.inside})"
             if len(corners) != 2 * half:
-                raise SettingError(
-                    f"obstacles[{k}]", f"two corners, {2 * half} numbers", list(corners)
-                )
-            if any(
-                not 0 <= a <= b < n
-                for a, b, n in zip(corners[:half], corners[half:], self.size, strict=True)
-            ):
-                raise SettingError(
-                    f"obstacles[{k}]",
-                    f"from a lower to an upper corner inside the grid ({self.inside})",
-                    list(corners),
-                )
+                must = f"two corners, {2 * half} numbers"
+            elif self._are_nodes(corners[:half], corners[half:]):
+                continue
+            raise SettingError(f"obstacles[{k}]", must, list(corners))
         return self
 
-    def _check_node(self, name: str, node: tuple[int, ...]) -> None:
-        if len(node) != len(self.size) or any(
-            not 0 <= a < n for a, n in zip(node, self.size, strict=True)
-        ):
-            raise SettingError(name, f"a node inside the grid ({self.inside})", list(node))
+    def _are_nodes(self, low: tuple[int, ...], high: tuple[int, ...]) -> bool:
+        """Return whether two nodes are inside the grid, the first nowhere above the second."""
+        return all(0 <= a <= b < n for a, b, n in zip(low, high, self.size, strict=True))
 
     @property
     def inside(self) -> str:
@@ -79,17 +73,16 @@ class GridMotion(Component):
             SettingError: If the map does not fit, or start or goal lies inside an obstacle.
             MissingFile: If the content of the map is nowhere.
         """
-        nodes = np.zeros(self.size, dtype=bool)
+        nodes, half = np.zeros(self.size, dtype=bool), len(self.size)
         if self.map is not None:
             nodes |= read_map(self.map.content, self.size, "scenario.map")
         for corners in self.obstacles:
-            nodes[self._slices(corners)] = True
+            nodes[_block(corners[:half], corners[half:])] = True
         for name in ("start", "goal"):
             node = getattr(self, name)
             if nodes[node]:
-                raise SettingError(
-                    f"scenario.{name}", "a free node; an obstacle is there", list(node)
-                )
+                must = "a free node; an obstacle is there"
+                raise SettingError(f"scenario.{name}", must, list(node))
         return nodes
 
     def bodies(self) -> tuple[BoxObstacle, ...]:
@@ -99,23 +92,21 @@ class GridMotion(Component):
         would touch the moves past their corners, which are permitted.
         """
         half = len(self.size)
-        found = [(corners[:half], corners[half:]) for corners in self.obstacles]
+        corners = [(each[:half], each[half:]) for each in self.obstacles]
         if self.map is not None:
-            found += blocks(read_map(self.map.content, self.size, "scenario.map"))
-        return tuple(
-            self._box(np.array(low, dtype=float), np.array(high, dtype=float))
-            for low, high in found
-        )
+            corners += blocks(read_map(self.map.content, self.size, "scenario.map"))
+        boxes = []
+        for low, high in np.array(corners, dtype=float).reshape(-1, 2, half):
+            size, center = np.maximum(high - low, POST).tolist(), (0.5 * (low + high)).tolist()
+            if half == 2:
+                size, center = [*size, self.obstacle_height], [*center, 0.5 * self.obstacle_height]
+            boxes.append(BoxObstacle(shape="box", center=tuple(center), size=tuple(size)))
+        return tuple(boxes)
 
-    def _box(self, low: np.ndarray, high: np.ndarray) -> BoxObstacle:
-        size, center = np.maximum(high - low, POST).tolist(), (0.5 * (low + high)).tolist()
-        if len(self.size) == 2:
-            size, center = [*size, self.obstacle_height], [*center, 0.5 * self.obstacle_height]
-        return BoxObstacle(shape="box", center=tuple(center), size=tuple(size))
 
-    def _slices(self, corners: tuple[int, ...]) -> tuple[slice, ...]:
-        half = len(self.size)
-        return tuple(slice(a, b + 1) for a, b in zip(corners[:half], corners[half:], strict=True))
+def _block(low: Sequence[int], high: Sequence[int]) -> tuple[slice, ...]:
+    """Return the nodes from a lower to an upper corner, both included, as an index."""
+    return tuple(slice(a, b + 1) for a, b in zip(low, high, strict=True))
 
 
 def blocks(nodes: np.ndarray) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
@@ -127,23 +118,20 @@ def blocks(nodes: np.ndarray) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     Args:
         nodes: (nodes along x, along y[, along z]).
     """
-    found = []
+    corners = []
     for axis in range(nodes.ndim):  # the longest run along an axis, then as wide as it stays full
         order = [axis, *(other for other in range(nodes.ndim) if other != axis)]
         covered = np.zeros(nodes.shape, dtype=bool)
-        for node in np.argwhere(nodes):
+        for node in np.argwhere(nodes).tolist():
             if covered[tuple(node)]:
                 continue
-            low, high = node.copy(), node.copy()
+            high = list(node)
             for along in order:
                 while high[along] + 1 < nodes.shape[along]:
-                    wider = high.copy()
-                    wider[along] += 1
-                    if not nodes[
-                        tuple(slice(a, b + 1) for a, b in zip(low, wider, strict=True))
-                    ].all():
+                    high[along] += 1
+                    if not nodes[_block(node, high)].all():
+                        high[along] -= 1
                         break
-                    high = wider
-            covered[tuple(slice(a, b + 1) for a, b in zip(low, high, strict=True))] = True
-            found.append((tuple(map(int, low)), tuple(map(int, high))))
-    return list(dict.fromkeys(found))
+            covered[_block(node, high)] = True
+            corners.append((tuple(node), tuple(high)))
+    return list(dict.fromkeys(corners))

@@ -54,21 +54,12 @@ class Posture(Settings):
         if self.angles is not None:
             angles = np.array(self.angles)
         else:
-            assert self.tip is not None
-            angles = _reach(
-                f"{field}.tip",
-                np.array(self.tip),
-                base,
-                lengths,
-                1.0 if self.elbow == "left" else -1.0,
-            )
+            side = 1.0 if self.elbow == "left" else -1.0
+            angles = _reach(f"{field}.tip", np.array(self.tip) - base, lengths, side)
         for k, angle in enumerate(angles):
             if not 0.0 <= angle <= HALF_TURN:
-                raise SettingError(
-                    f"{field}.angles[{k}]",
-                    "within [0, 180] deg, where the genes live",
-                    float(angle),
-                )
+                must = "within [0, 180] deg, where the genes live"
+                raise SettingError(f"{field}.angles[{k}]", must, float(angle))
         return angles
 
 
@@ -96,34 +87,36 @@ class LinkMotion(Component):
         Raises:
             SettingError: If their number is not the robots', or a posture cannot be.
         """
-        found = []
+        ends = []
         for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
             if len(postures) != len(bases):
-                raise SettingError(
-                    f"scenario.{name}", f"one posture per robot ({len(bases)})", len(postures)
-                )
-            rows = [
-                p.link_angles(f"scenario.{name}[{r}]", bases[r], lengths[r])
-                for r, p in enumerate(postures)
+                must = f"one posture per robot ({len(bases)})"
+                raise SettingError(f"scenario.{name}", must, len(postures))
+            rows = zip(postures, bases, lengths, strict=True)
+            angles = [
+                posture.link_angles(f"scenario.{name}[{robot}]", base, links)
+                for robot, (posture, base, links) in enumerate(rows)
             ]
-            found.append(np.array(rows))
+            ends.append(np.array(angles))
+        start, goal = ends
         for robot in self.stationary:
             if not 0 <= robot < len(bases):
                 raise SettingError("scenario.stationary", f"robots 0 … {len(bases) - 1}", robot)
-            if not np.array_equal(found[0][robot], found[1][robot]):
-                raise SettingError(
-                    f"scenario.q_goal[{robot}]",
-                    "the same as its start, since the robot is stationary",
-                    list(found[1][robot]),
-                )
-        return found[0], found[1]
+            if not np.array_equal(start[robot], goal[robot]):
+                must = "the same as its start, since the robot is stationary"
+                raise SettingError(f"scenario.q_goal[{robot}]", must, list(goal[robot]))
+        return start, goal
 
 
-def _reach(
-    field: str, tip: FloatArray, base: FloatArray, lengths: FloatArray, side: float
-) -> FloatArray:
-    """Return the link angles (2,) [deg] in [−180, 360) that bring the end-effector to a place."""
-    x, y = tip - base
+def _reach(field: str, tip: FloatArray, lengths: FloatArray, side: float) -> FloatArray:
+    """Return the link angles (2,) [deg] in [−180, 360) that bring the end-effector to a place.
+
+    Args:
+        tip: (2,) the place, from the robot's base.
+        lengths: (2,) of the links.
+        side: On which the elbow is, seen from the base: 1 on the left, −1 on the right.
+    """
+    x, y = tip
     squared = float(x * x + y * y)
     first, second = (float(length) for length in lengths)
     cosine = (squared - first * first - second * second) / (2.0 * first * second)
@@ -133,11 +126,8 @@ def _reach(
         cosine = 1.0 if cosine > 0.0 else -1.0
     if not -1.0 <= cosine <= 1.0:
         least, most = abs(first - second), first + second
-        raise SettingError(
-            field,
-            f"{least:g} to {most:g} away from the robot's base",
-            f"{float(np.sqrt(squared)):g} away",
-        )
+        must = f"{least:g} to {most:g} away from the robot's base"
+        raise SettingError(field, must, f"{float(np.sqrt(squared)):g} away")
     # of the second link against the first: an elbow on the left bends to the right
     bend = -side * acos(cosine)
     sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))

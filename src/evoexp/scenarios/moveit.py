@@ -1,25 +1,21 @@
 """A task that MoveIt wrote: a planning scene, and a motion plan request in it, as YAML.
 
-The files are read at the door and travel with the condition as contents. `arm_motion` and
-`posture_task` say the same task in the words of the planners: from a configuration to another one,
-or to a pose of the tool.
+The files are read at the door and travel with the condition as contents. `planners.moveit_tasks`
+says the same task in the words of the planners: from a configuration to another one, or to a pose
+of the tool.
 """
 
 import functools
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from evoexp.attachments import SHA256, File, file_content, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import mesh_content, package_folders
-from evoexp.numeric.elementary import DEGREE
-from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit_files import MessagePart, Pose, read_document
-from evoexp.scenarios.moveit_frames import has_other_frames
+from evoexp.records import FloatArray
+from evoexp.scenarios.moveit_files import MessagePart
+from evoexp.scenarios.moveit_frames import Frames, has_other_frames
 from evoexp.scenarios.moveit_meshes import Mesh, resources
 from evoexp.scenarios.moveit_messages import MAX_SCENE, REQUEST, SCENE
 from evoexp.scenarios.moveit_request import (
@@ -37,14 +33,13 @@ from evoexp.scenarios.moveit_scene import (
     read_state,
     read_world,
 )
+from evoexp.scenarios.moveit_yaml import read_document
 from evoexp.validation import Component, NonNegative, Positive, Settings
 
 if TYPE_CHECKING:
     from evoexp.robots.assembly import LinkFrames
-    from evoexp.scenarios.posture_task import PostureTask
 
 FILES = {"scene": SCENE, "request": REQUEST}  # settings → messages
-UP = (0.0, 0.0, 1.0)  # as MoveIt's planning frames have it
 LoadMesh = Callable[[bytes, str, str], Mesh]
 """Reads a mesh out of a file's content, the ending of its name, and a field for errors."""
 
@@ -56,18 +51,6 @@ class SceneMesh(Settings):
 
     name: str  # as the scene names it
     file: File  # its content
-
-
-class Joints(NamedTuple):
-    """The joints of a robot that move."""
-
-    names: tuple[str, ...]  # in the order of q
-    slides: BoolArray  # (nq,) whether each slides
-    slices: IntArray  # (arms, 2) of q
-
-    def typed(self, q: FloatArray) -> FloatArray:
-        """Return q (nq,) [rad, m] as scenarios give it [deg, m]."""
-        return np.where(self.slides, q, q / DEGREE)
 
 
 class MoveitTask(Component):
@@ -113,11 +96,11 @@ class MoveitTask(Component):
             if message == SCENE and has_other_frames(document):
                 settings["frame_names"] = "header"
             if message == SCENE and (names := resources(document)):
-                place = Path(located(path))
+                place, own = Path(located(path)), f"{field}.{name}"
+                contents = [mesh_content(mesh, place, packages, own) for mesh in names]
                 settings["meshes"] = [
                     {"name": mesh, "file": {SHA256: keep(content)}}
-                    for mesh in names
-                    for content in [mesh_content(mesh, place, packages, f"{field}.{name}")]
+                    for mesh, content in zip(names, contents, strict=True)
                 ]
         return settings
 
@@ -144,13 +127,16 @@ class MoveitTask(Component):
             load: Reads meshes that the scene names.
 
         Raises:
-            SettingError: If the scene holds what evoexp does not know.
+            SettingError: If the scene holds what evoexp does not know, or the robot stands
+                elsewhere than its root.
         """
         scene = self._message("scene")
         if self.frame_names == "child" and has_other_frames(scene):
             must = "header, as MoveIt names frames: give the scene again and run it again"
             raise SettingError("scenario.frame_names", must, self.frame_names)
-        return _world(scene, links, self.meshes, load)
+        world = _world(scene, links, self.meshes, load)
+        check_robot_place(self._message("request")["start_state"], world.frames)
+        return world
 
     def notes(self, robot: Any) -> tuple[str, ...]:
         """Name the parts of the messages that are left out and may matter.
@@ -160,17 +146,17 @@ class MoveitTask(Component):
         """
         name = getattr(robot, "robot_name", "")
         scene, request = (self._message(name).value for name in FILES)
-        found = []
+        notes = []
         if scene.get("is_diff"):
-            found.append("the scene is a change of another (is_diff): it is taken as it is")
+            notes.append("the scene is a change of another (is_diff): it is taken as it is")
         if name and (model := scene.get("robot_model_name") or name) != name:
-            found.append(f"the scene is of the robot '{model}', the robot is '{name}'")
+            notes.append(f"the scene is of the robot '{model}', the robot is '{name}'")
         scaled = ("max_velocity_scaling_factor", "max_acceleration_scaling_factor")
         left = [name for name in scaled if request.get(name) not in (None, 0, 1)]
         left += ["max_cartesian_speed"] if request.get("max_cartesian_speed") else []
         if left:
-            found.append(f"left out of the request: {', '.join(left)} (export has its own limits)")
-        return tuple(found)
+            notes.append(f"left out of the request: {', '.join(left)} (export has its own limits)")
+        return tuple(notes)
 
     def _message(self, name: str) -> MessagePart:
         file: File = getattr(self, name)
@@ -178,65 +164,16 @@ class MoveitTask(Component):
         field = f"scenario.{name}" if path is None else f"scenario.{name}: {path}"
         return _document(file.content, field, FILES[name])
 
-    def disabled(
-        self, links: dict[str, str], given: frozenset[frozenset[str]]
-    ) -> frozenset[frozenset[str]]:
-        """Return the pairs of a robot's bodies that are never judged.
-
-        Args:
-            links: Names of the bodies → their links.
-            given: Pairs that the robot itself names; the scene's matrix has the last word.
-        """
-        allowed, found = self.allowed, set(given)
-        for a, one in enumerate(links):
-            for two in list(links)[:a]:
-                known = allowed.may_touch(links[one], links[two])
-                if known is not None and links[one] != links[two]:
-                    (found.add if known else found.discard)(frozenset((one, two)))
-        return frozenset(found)
-
-    def touching(self, links: dict[str, str], world: World) -> tuple[tuple[int, int], ...]:
-        """Return the pairs (body, obstacle) that may touch.
-
-        Args:
-            links: Names of the bodies → their links.
-            world: Of this task.
-        """
-        return tuple(
-            (k, n)
-            for k, link in enumerate(links.values())
-            for n, name in enumerate(world.objects)
-            if self.allowed.may_touch(link, name)
-        )
-
-    def arm_motion(self, joints: Joints, world: World) -> ArmMotion:
-        """Return the task as a motion from a configuration to another.
-
-        Args:
-            world: Of this task.
+    def start_configuration(self, joints: tuple[str, ...]) -> FloatArray:
+        """Return the start of joints, (nq,) [rad, m].
 
         Raises:
-            SettingError: If the goal is a pose, or is silent about a joint.
+            SettingError: If the files are silent about one.
         """
-        q_goal = self.goal_configuration(joints)
-        if q_goal is None:
-            must = "a goal of joints for this planner (posture_es plans to poses)"
-            raise SettingError("scenario.request", must, f"a pose of '{self.plan_request.link}'")
-        check_robot_place(self._message("request")["start_state"], world.frames)
-        ends = [joints.typed(q) for q in (state_of(joints.names, self.state), q_goal)]
-        start, end = (
-            tuple(tuple(float(value) for value in q[a:b]) for a, b in joints.slices) for q in ends
-        )
-        return ArmMotion(
-            q_start=start,
-            q_goal=end,
-            security_margin=self.security_margin,
-            length_unit=self.length_unit,
-            obstacles=world.obstacles,
-        )
+        return state_of(joints, self.state)
 
-    def goal_configuration(self, joints: Joints) -> FloatArray | None:
-        """Return the goal (nq,) [rad, m]; None: it is a pose.
+    def goal_configuration(self, joints: tuple[str, ...]) -> FloatArray | None:
+        """Return the goal of the joints that move, (nq,) [rad, m]; None: it is a pose.
 
         Raises:
             SettingError: If it names a joint that does not move, or is silent about one that does
@@ -244,48 +181,21 @@ class MoveitTask(Component):
         """
         goal = self.plan_request.joint_goal
         for name in goal:
-            if name not in joints.names:
-                must = f"a goal for joints that move ({', '.join(joints.names)})"
-                hint = nearest(name, joints.names)
-                raise SettingError("scenario.request", must, name, hint)
-        return state_of(joints.names, goal, self.state) if goal else None
+            if name not in joints:
+                must = f"a goal for joints that move ({', '.join(joints)})"
+                raise SettingError("scenario.request", must, name, nearest(name, joints))
+        return state_of(joints, goal, self.state) if goal else None
 
-    def posture_task(
-        self, joints: Joints, world: World, tool_at_goal: Pose | None
-    ) -> "PostureTask":
-        """Return the task as one of reaching a pose.
+    def link_goal(self, frames: Frames) -> LinkGoal:
+        """Return the goal, a pose of a link.
 
         Args:
-            world: Of this task.
-            tool_at_goal: The tool's pose in the goal's configuration; None: the goal is a pose.
-        """
-        from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
+            frames: Of the world.
 
-        request = self._message("request")
-        check_robot_place(request["start_state"], world.frames)
-        if tool_at_goal is not None:
-            link = LinkGoal("", tool_at_goal, self.position_tolerance, self.angle_tolerance)
-        else:
-            link = read_link_goal(request, world.frames)
-        start = joints.typed(state_of(joints.names, self.state))
-        x, y, z = (float(value) for value in link.pose.position)
-        goal: PoseGoal | PointGoal = PointGoal(kind="point", point=(x, y, z))
-        if link.angle is not None:
-            goal = PoseGoal(kind="pose", point=(x, y, z), rotation=link.pose.angles)
-        # a goal that is a point only is rated without the term of the orientation
-        terms = () if link.angle is not None else ("goal_distance", "limit_margin", "collision")
-        return PostureTask(
-            q_start=tuple(float(value) for value in start),
-            phases=(Phase(name="goal", goal=goal, terms=terms),),
-            subgoals=(),
-            position_tolerance=link.distance,
-            angle_tolerance=self.angle_tolerance if link.angle is None else link.angle,
-            up=UP,
-            security_margin=self.security_margin,
-            length_unit=self.length_unit,
-            check_reach=True,
-            obstacles=world.obstacles,
-        )
+        Raises:
+            SettingError: If it holds what evoexp does not know.
+        """
+        return read_link_goal(self._message("request"), frames)
 
 
 _document = functools.lru_cache(maxsize=64)(read_document)

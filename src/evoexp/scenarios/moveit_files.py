@@ -9,7 +9,6 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, atan2
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
-from evoexp.scenarios.moveit_messages import check_message
 
 LARGEST = 1e7  # [m, rad] as of the numbers of robots and scenarios
 SLACK = 0.01  # [-] by which a quaternion's length may differ from 1: the numbers are rounded
@@ -70,24 +69,6 @@ def primitive_kind(value: Any) -> str:
     return KINDS[value] if is_number else str(value).lower()
 
 
-def read_document(content: bytes, field: str, message: str) -> "MessagePart":
-    """Read a message within limits.
-
-    Args:
-        content: Of a file.
-        field: The setting that names it, for errors.
-        message: Its type, of `moveit_messages.FIELDS`.
-
-    Raises:
-        SettingError: If it is no such message, or holds what evoexp does not know.
-    """
-    from evoexp.scenarios.moveit_yaml import read_message  # most tasks come out of no such file
-
-    root = read_message(content, field)
-    check_message(root, message, field)
-    return MessagePart(root, field, "")
-
-
 class MessagePart:
     """A part of a message, with its place in the file; false if it is absent.
 
@@ -127,6 +108,11 @@ class MessagePart:
         """Return the error that the file must be something else."""
         return SettingError(self.field, must, was, hint)
 
+    def require(self, is_met: object, must: str, was: Any) -> None:
+        """Refuse the file, which must be something else, unless a condition is met."""
+        if not is_met:
+            raise self.refusal(must, was)
+
     @property
     def text(self) -> str:
         """A text; an absent one is empty."""
@@ -139,10 +125,10 @@ class MessagePart:
 
     def numbers(self, count: int | None = None) -> FloatArray:
         """Return a list of numbers, so many if a count is given."""
-        found = [item.number() for item in self]
-        if count is not None and len(found) != count:
-            raise self.refusal(f"{count} numbers at {self.where}", len(found))
-        return np.array(found, dtype=np.float64)
+        values = [item.number() for item in self]
+        is_full = count in (None, len(values))
+        self.require(is_full, f"{count} numbers at {self.where}", len(values))
+        return np.array(values, dtype=np.float64)
 
     def number(self, absent: float | None = None) -> float:
         """Return a number, or that of an absent part; YAML takes 1e-05 for a text."""
@@ -180,9 +166,8 @@ class MessagePart:
         size = x * x + y * y + z * z + w * w
         if size == 0.0:  # ROS leaves an orientation that nobody set at 0
             return np.eye(3)
-        length = float(np.sqrt(size))
-        if abs(length - 1.0) > SLACK:
-            raise self.refusal(f"quaternions of length 1 at {self.where}", round(length, 6))
+        length, must = float(np.sqrt(size)), f"quaternions of length 1 at {self.where}"
+        self.require(abs(length - 1.0) <= SLACK, must, round(length, 6))
         s = 2.0 / size
         return np.array(
             [
@@ -195,6 +180,6 @@ class MessagePart:
     def _of_kind(self, kind: type, name: str) -> Any:
         if self.value is None:
             return kind()
-        if not isinstance(self.value, kind):
+        if not isinstance(self.value, kind):  # its text may be long: made for an error only
             raise self.refusal(f"{name} at {self.where}", str(self.value)[:40])
         return self.value

@@ -57,28 +57,26 @@ def read_frames(scene: MessagePart, links: "LinkFrames | None") -> Frames:
         SettingError: If transforms do not lead to one planning frame, or contradict each other or
             the robot.
     """
-    standing = {} if links is None else dict(links.standing)
-    moving = frozenset[str]() if links is None else links.moving
-    ground = "" if links is None else links.ground
+    root, standing, moving, ground = links or ("", (), frozenset[str](), "")
     named, planning, is_certain = _fixed_transforms(scene)
-    known = dict.fromkeys(filter(None, (ground, links and links.root, WORLD)))
+    known = dict.fromkeys(filter(None, (ground, root, WORLD)))
     if planning in moving or (planning and not is_certain and planning not in known):
         must = f"of transforms whose child_frame_id is the planning frame ({', '.join(known)})"
         hint = "; header.frame_id names the frame that a transform places"
         raise scene.refusal(must, planning, hint)
-    poses = {name: _link_pose(pose) for name, pose in standing.items()}
-    origin = poses.get(planning or ground or WORLD, IDENTITY)
-    poses.setdefault(planning or ground or WORLD, origin)
+    planning = planning or ground or WORLD
+    poses = {}
+    for name, numbers in standing:  # the rotation row by row, then the position
+        poses[name] = Pose(np.array(numbers[:9]).reshape(3, 3), np.array(numbers[9:]))
+    origin = poses.setdefault(planning, IDENTITY)
     if ground:
         poses.setdefault(ground, IDENTITY)
-    for name, local in named.items():
-        if name in moving:
-            continue
-        pose = origin.times(local)
+    for name in (name for name in named if name not in moving):
+        pose = origin.times(named[name])
         if not pose.is_near(poses.setdefault(name, pose), SAME):
             must = f"a scene whose transform of '{name}' is that of the robot's link"
             raise scene.refusal(must, pose.text, f"; the link stands {poses[name].text}")
-    return Frames(planning or ground or WORLD, poses, moving)
+    return Frames(planning, poses, moving)
 
 
 def has_other_frames(scene: MessagePart) -> bool:
@@ -105,22 +103,18 @@ def _fixed_transforms(scene: MessagePart) -> tuple[dict[str, Pose], str, bool]:
         name = frame_name(transform["header"]["frame_id"])
         target, pose = frame_name(transform["child_frame_id"]), transform["transform"].pose
         is_identity = pose.is_near(IDENTITY, SAME)
-        if not is_identity and (not name or name == target):
-            place = f"{transform.where}.header.frame_id"
-            raise scene.refusal(f"a frame other than '{target}' at {place}, or no transform", name)
-        if not target and name:
-            raise scene.refusal(f"the planning frame at {transform.where}.child_frame_id", "")
-        if planning and target and target != planning:
-            must = f"one planning frame for all of {transforms.where}, the child_frame_id"
-            raise scene.refusal(f"{must} '{planning}'", f"'{name}' in '{target}'")
+        must = (
+            f"a frame other than '{target}' at {transform.where}.header.frame_id, or no transform"
+        )
+        scene.require(is_identity or name not in ("", target), must, name)
+        must = f"the planning frame at {transform.where}.child_frame_id"
+        scene.require(target or not name, must, "")
+        must = f"one planning frame for all of {transforms.where}, the child_frame_id '{planning}'"
+        is_same = not planning or target in ("", planning)
+        scene.require(is_same, must, f"'{name}' in '{target}'")
         planning = target or planning
         is_certain |= bool(target) and name in ("", target)
         if name and not pose.is_near(named.setdefault(name, pose), SAME):
             must = f"one transform of '{name}' in {transforms.where}"
             raise scene.refusal(must, f"{named[name].text} and {pose.text}")
     return named, planning, is_certain
-
-
-def _link_pose(pose: tuple[float, ...]) -> Pose:
-    """Return the pose of 12 numbers: the rotation row by row, then the position."""
-    return Pose(np.array(pose[:9]).reshape(3, 3), np.array(pose[9:]))

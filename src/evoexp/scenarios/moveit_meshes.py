@@ -38,8 +38,8 @@ def mesh_hulls(
         SettingError: If it is no mesh, or a part of it has no inside.
     """
     if resource := mesh["resource"].text:
-        if mesh["vertices"].value or mesh["triangles"].value:
-            raise mesh.refusal(f"a resource or triangles at {mesh.where}, not both", name)
+        has_own = mesh["vertices"].value or mesh["triangles"].value
+        mesh.require(not has_own, f"a resource or triangles at {mesh.where}, not both", name)
         corners, triangles = loaded[resource]
         if mesh["dimensions"]:
             corners = corners * mesh["dimensions"].numbers(3)
@@ -58,8 +58,8 @@ def mesh_hulls(
 
 def _own_triangles(mesh: MessagePart, name: str) -> Mesh:
     """Read the corners and triangles that a message holds."""
-    if mesh["dimensions"].value:
-        raise mesh.refusal(f"a mesh whose dimensions scale a resource at {mesh.where}", name)
+    must = f"a mesh whose dimensions scale a resource at {mesh.where}"
+    mesh.require(not mesh["dimensions"].value, must, name)
     corners = np.array([vertex.point for vertex in mesh["vertices"]])
     faces = [
         # robowflex writes the list alone
@@ -69,9 +69,9 @@ def _own_triangles(mesh: MessagePart, name: str) -> Mesh:
     triangles, count = np.array(faces).reshape(-1, 3), len(corners)
     is_corner = (triangles == np.floor(triangles)) & (triangles >= 0.0) & (triangles < count)
     wrong = triangles[~is_corner.all(axis=1)]
-    if len(wrong) or not len(triangles):
-        must = f"triangles of three of the {count} vertices of '{name}', counted from 0"
-        raise mesh.refusal(must, ", ".join(f"{k:g}" for k in wrong[0]) if len(wrong) else "none")
+    must = f"triangles of three of the {count} vertices of '{name}', counted from 0"
+    was = ", ".join(f"{k:g}" for k in wrong[0]) if len(wrong) else "none"
+    mesh.require(len(triangles) and not len(wrong), must, was)
     return corners, triangles.astype(np.int64)
 
 

@@ -40,17 +40,14 @@ def read_request(request: MessagePart) -> Request:
     goal, joints = _goal(request), dict[str, float]()
     for constraint in goal["joint_constraints"]:
         name = constraint["joint_name"].text
-        if name in joints:
-            raise request.refusal("one goal per joint", name)
+        request.require(name not in joints, "one goal per joint", name)
         joints[name] = constraint["position"].called(f"the goal of '{name}'").number()
     places, turns = list(goal["position_constraints"]), list(goal["orientation_constraints"])
-    if joints and (places or turns):
-        raise request.refusal("a goal of joints or of a link", "both")
-    if not joints and len(places) != 1:
-        raise request.refusal("a goal of joints, or of one position", f"{len(places)} positions")
+    request.require(not joints or not (places or turns), "a goal of joints or of a link", "both")
+    must = "a goal of joints, or of one position"
+    request.require(joints or len(places) == 1, must, f"{len(places)} positions")
     link = places[0]["link_name"].text if places else ""
-    if places and not link:
-        raise request.refusal("a goal of a link (link_name)", link)
+    request.require(link or not places, "a goal of a link (link_name)", link)
     start = read_state(request["start_state"])
     return Request(request["group_name"].text, start, joints, link)
 
@@ -58,8 +55,8 @@ def read_request(request: MessagePart) -> Request:
 def _goal(request: MessagePart) -> MessagePart:
     """Return the only goal."""
     goals = list(request["goal_constraints"])
-    if len(goals) != 1:
-        raise request.refusal("a request with one goal (goal_constraints)", len(goals))
+    must = "a request with one goal (goal_constraints)"
+    request.require(len(goals) == 1, must, len(goals))
     return goals[0]
 
 
@@ -77,25 +74,23 @@ def read_link_goal(request: MessagePart, frames: Frames) -> LinkGoal:
     (place,), turns = goal["position_constraints"], list(goal["orientation_constraints"])
     link, region = place["link_name"].text, place["constraint_region"]
     bodies, poses = list(region["primitives"]), list(region["primitive_poses"])
-    if len(bodies) != 1 or len(poses) != 1:
-        raise request.refusal(f"one sphere or box around the goal of '{link}'", len(bodies))
+    must = f"one sphere or box around the goal of '{link}'"
+    request.require(len(bodies) == len(poses) == 1, must, len(bodies))
     sizes, kind = bodies[0]["dimensions"].numbers(), primitive_kind(bodies[0]["type"].value)
-    if (kind, len(sizes)) not in (("box", 3), ("sphere", 1)) or not sizes.min() > 0.0:
-        must = f"a sphere or box around the goal of '{link}'"
-        raise request.refusal(must, f"{kind} {sizes.tolist()}")
+    is_known = (kind, len(sizes)) in (("box", 3), ("sphere", 1)) and sizes.min() > 0.0
+    must = f"a sphere or box around the goal of '{link}'"
+    request.require(is_known, must, f"{kind} {sizes.tolist()}")
     # the greatest ball in the box: a goal that is met by it is met by the box
     distance = float(sizes.min()) * (0.5 if kind == "box" else 1.0)
     frame = frames.of_header(place.called(f"the goal of '{link}'"))
     pose, angle = frame.times(poses[0].pose), None
     shift = place["target_point_offset"]
     offset = shift.point if shift else np.zeros(3)
-    if len(turns) > 1:
-        raise request.refusal(f"one orientation of '{link}'", len(turns))
+    request.require(len(turns) <= 1, f"one orientation of '{link}'", len(turns))
+    must = f"a goal of '{link}' without target_point_offset, or with an orientation"
+    request.require(turns or not offset.any(), must, offset.tolist())
     if turns:
         angle, pose = _orientation(turns[0], link, pose, frames)
-    elif offset.any():
-        must = f"a goal of '{link}' without target_point_offset, or with an orientation"
-        raise request.refusal(must, offset.tolist())
     return LinkGoal(link, pose._replace(position=pose.of_point(-offset)), distance, angle)
 
 
@@ -103,13 +98,11 @@ def _orientation(
     turn: MessagePart, link: str, pose: Pose, frames: Frames
 ) -> tuple[float | None, Pose]:
     """Return the tolerance [deg] of an orientation, and the pose with it."""
-    if turn["link_name"].text != link:
-        must = f"an orientation of '{link}', whose position is the goal"
-        raise turn.refusal(must, turn["link_name"].text)
+    must, name = f"an orientation of '{link}', whose position is the goal", turn["link_name"].text
+    turn.require(name == link, must, name)
     turned = frames.of_header(turn.called(f"the orientation of '{link}'")).times(turn.pose)
     least = min(turn[f"absolute_{axis}_axis_tolerance"].number(0.0) for axis in "xyz")
-    if not least > 0.0:
-        raise turn.refusal(f"tolerances above 0 of '{link}'", least)
+    turn.require(least > 0.0, f"tolerances above 0 of '{link}'", least)
     angle = float(least / DEGREE)
     pose = Pose(turned.rotation, pose.position)
     return (angle, pose) if angle < HALF_TURN else (None, pose)
@@ -121,12 +114,10 @@ def state_of(names: tuple[str, ...], *states: dict[str, float]) -> np.ndarray:
     Raises:
         SettingError: If none names one.
     """
-    found = []
+    positions = {name: q for state in reversed(states) for name, q in state.items()}
     for name in names:
-        known = [state[name] for state in states if name in state]
-        if not known:
-            given = ", ".join(dict.fromkeys(each for state in states for each in state))
+        if name not in positions:
+            known = ", ".join(dict.fromkeys(joint for state in states for joint in state))
             must = f"a start or goal for joint '{name}'"
-            raise SettingError("scenario.request", must, f"joints {given or 'none'}")
-        found.append(known[0])
-    return np.array(found, dtype=np.float64)
+            raise SettingError("scenario.request", must, f"joints {known or 'none'}")
+    return np.array([positions[name] for name in names], dtype=np.float64)

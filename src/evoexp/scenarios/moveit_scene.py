@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 
 MOST_OBJECTS = 2000  # bodies: every one is tested against every body of the robot
 SINGULAR = {"primitives": "primitive", "planes": "plane", "meshes": "mesh"}
-SIZES = {
-    "box": 3,
-    "sphere": 1,
-    "cylinder": 2,
-    "cone": 2,
-}  # numbers of a primitive that evoexp knows
+SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "cone": 2}  # numbers of a primitive
 # CollisionObject.operation, a byte: as ROS 1 writes it, ROS 2, and robowflex
 OPERATIONS = {
     form: name
@@ -41,11 +36,6 @@ class AllowedPairs(NamedTuple):
 
     entries: dict[frozenset[str], bool]  # pairs of names → whether they may touch
     defaults: dict[str, bool]  # names → whether they may touch whatever no entry names
-
-    @property
-    def names(self) -> set[str]:
-        """All names that the matrix knows."""
-        return {name for pair in self.entries for name in pair} | set(self.defaults)
 
     def may_touch(self, one: str, two: str) -> bool | None:
         """Return whether two things may touch; None: the matrix does not say."""
@@ -77,22 +67,21 @@ def read_world(scene: MessagePart, links: "LinkFrames | None", meshes: Mapping[s
     """
     for name, size, neutral in (("link_padding", "padding", 0.0), ("link_scale", "scale", 1.0)):
         for link in scene[name]:
-            if link[size].number(neutral) != neutral:
-                must = f"free of {name}, which evoexp does not know"
-                raise link.refusal(must, link["link_name"].text)
+            is_neutral = link[size].number(neutral) == neutral
+            must = f"free of {name}, which evoexp does not know"
+            link.require(is_neutral, must, link["link_name"].text)
     frames = read_frames(scene, links)
     check_robot_place(scene["robot_state"], frames)
     obstacles: list[Obstacle] = []
     owners: list[str] = []
     for thing in scene["world"]["collision_objects"]:
         name = thing["id"].text or f"object_{len(set(owners)) + 1}"
-        if name in owners:
-            raise thing.refusal("objects whose ids differ", name)
+        thing.require(name not in owners, "objects whose ids differ", name)
         bodies = _bodies(thing.called(f"'{name}'"), name, frames, meshes)
         obstacles += bodies
         owners += [name] * len(bodies)
-    if len(obstacles) > MOST_OBJECTS:
-        raise scene.refusal(f"a scene of at most {MOST_OBJECTS} bodies", len(obstacles))
+    must = f"a scene of at most {MOST_OBJECTS} bodies"
+    scene.require(len(obstacles) <= MOST_OBJECTS, must, len(obstacles))
     return World(tuple(obstacles), tuple(owners), frames)
 
 
@@ -106,10 +95,8 @@ def read_state(state: MessagePart) -> dict[str, float]:
     names = joints["name"].names
     positions: dict[str, float] = {}
     for name, value in zip(names, joints["position"].numbers(len(names)), strict=True):
-        position = float(value)
-        if positions.setdefault(name, position) != position:
-            must = f"one position of '{name}' at {joints.where}"
-            raise joints.refusal(must, [positions[name], position])
+        both = [positions.setdefault(name, float(value)), float(value)]
+        joints.require(both[0] == both[1], f"one position of '{name}' at {joints.where}", both)
     return positions
 
 
@@ -121,16 +108,15 @@ def check_robot_place(state: MessagePart, frames: Frames) -> None:
     """
     joints = state["multi_dof_joint_state"]
     names, transforms = joints["joint_names"].names, list(joints["transforms"])
-    if names and len(transforms) != len(names):
-        raise joints.refusal(f"a transform per joint of {joints.where}", len(transforms))
+    is_complete = not names or len(transforms) == len(names)
+    joints.require(is_complete, f"a transform per joint of {joints.where}", len(transforms))
     planning = frames.poses[frames.planning]
     for transform in transforms:
         # MoveIt takes the transform to lead from the frame of the header
         frame = planning.inverse.times(frames.of_header(joints))
         pose = transform.pose.times(frame.inverse)
-        if not pose.is_near(IDENTITY, 1e-9):
-            must = "a robot at the origin (robot.base_position moves it elsewhere)"
-            raise joints.refusal(must, f"one {pose.text} by {joints.where}")
+        must = "a robot at the origin (robot.base_position moves it elsewhere)"
+        joints.require(pose.is_near(IDENTITY, 1e-9), must, f"one {pose.text} by {joints.where}")
 
 
 def _bodies(
@@ -139,27 +125,24 @@ def _bodies(
     """Return the bodies of a collision object."""
     number = thing["operation"].value
     operation = OPERATIONS.get(str(number).lower(), number)
-    if operation not in (None, "ADD"):
-        must = f"a scene whose objects are there, '{name}'.operation ADD (0)"
-        raise thing.refusal(must, operation)
+    must = f"a scene whose objects are there, '{name}'.operation ADD (0)"
+    thing.require(operation in (None, "ADD"), must, operation)
     own = frames.of_header(thing).times(thing["pose"].pose)
-    found: list[Obstacle] = []
+    obstacles: list[Obstacle] = []
     for kind, singular in SINGULAR.items():
         bodies, poses = list(thing[kind]), list(thing[f"{singular}_poses"])
-        if len(poses) != len(bodies):
-            must = f"a pose per {singular} of '{name}' ({len(bodies)})"
-            raise thing.refusal(must, len(poses))
+        must = f"a pose per {singular} of '{name}' ({len(bodies)})"
+        thing.require(len(poses) == len(bodies), must, len(poses))
         for body, pose in zip(bodies, poses, strict=True):
-            label = f"{name}_{len(found) + 1}" if len(bodies) > 1 else name
+            label = f"{name}_{len(obstacles) + 1}" if len(bodies) > 1 else name
             placed = own.times(pose.pose)
             if kind == "meshes":
-                found += mesh_hulls(body, meshes, placed, label)
+                obstacles += mesh_hulls(body, meshes, placed, label)
             else:
                 make = _primitive if kind == "primitives" else _plane
-                found.append(make(body, placed, label))
-    if not found:
-        raise thing.refusal("objects with a body each", f"'{name}' without one")
-    return found
+                obstacles.append(make(body, placed, label))
+    thing.require(obstacles, "objects with a body each", f"'{name}' without one")
+    return obstacles
 
 
 def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
@@ -169,8 +152,7 @@ def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
         must = f"primitives that are {', '.join(SIZES)}"
         raise primitive.refusal(must, f"'{name}', a {kind}", nearest(kind, SIZES))
     sizes = primitive["dimensions"].numbers(SIZES[kind])
-    if not sizes.min() > 0.0:
-        raise primitive.refusal(f"dimensions above 0 of '{name}'", sizes.tolist())
+    primitive.require(sizes.min() > 0.0, f"dimensions above 0 of '{name}'", sizes.tolist())
     center = _three(pose.position)
     if kind == "box":
         size, angles = _three(sizes), pose.angles
@@ -193,8 +175,7 @@ def _plane(plane: MessagePart, pose: Pose, name: str) -> Obstacle:
     a, b, c, d = plane["coef"].numbers(4)
     normal = np.array([a, b, c])
     size = float(a * a + b * b + c * c)
-    if size == 0.0:
-        raise plane.refusal(f"a normal other than 0 of '{name}'", normal.tolist())
+    plane.require(size, f"a normal other than 0 of '{name}'", normal.tolist())
     point = pose.of_point(-d / size * normal)
     direction = Pose(pose.rotation, np.zeros(3)).of_point(normal)
     return HalfSpaceObstacle(
@@ -210,24 +191,26 @@ def read_allowed(scene: MessagePart) -> AllowedPairs:
     """
     matrix = scene["allowed_collision_matrix"]
     names, rows = matrix["entry_names"].names, list(matrix["entry_values"])
-    if len(rows) != len(names):
-        raise matrix.refusal(f"a row per name of {matrix.where} ({len(names)})", len(rows))
+    must = f"a row per name of {matrix.where} ({len(names)})"
+    matrix.require(len(rows) == len(names), must, len(rows))
     entries: dict[frozenset[str], bool] = {}
     for one, row in zip(names, rows, strict=True):
         values = [item.value for item in (row["enabled"] if isinstance(row.value, dict) else row)]
-        if len(values) != len(names) or not all(isinstance(value, bool) for value in values):
-            must = f"{len(names)} truth values in every row of {matrix.where}"
-            raise matrix.refusal(must, f"the row of '{one}'")
+        must = f"{len(names)} truth values in every row of {matrix.where}"
+        matrix.require(_are_truths(values, len(names)), must, f"the row of '{one}'")
         for two, value in zip(names, values, strict=True):
             if one != two and entries.setdefault(frozenset((one, two)), value) != value:
                 must = f"a symmetric {matrix.where}"
                 raise matrix.refusal(must, f"two values of '{one}' and '{two}'")
     known = matrix["default_entry_names"].names
     values = [item.value for item in matrix["default_entry_values"]]
-    if len(known) != len(values) or not all(isinstance(value, bool) for value in values):
-        must = f"a truth value per name of {matrix.where}.default_entry_names"
-        raise matrix.refusal(must, len(values))
+    must = f"a truth value per name of {matrix.where}.default_entry_names"
+    matrix.require(_are_truths(values, len(known)), must, len(values))
     return AllowedPairs(entries, dict(zip(known, values, strict=True)))
+
+
+def _are_truths(values: list[Any], count: int) -> bool:
+    return len(values) == count and all(isinstance(value, bool) for value in values)
 
 
 def _three(values: Any) -> tuple[float, float, float]:

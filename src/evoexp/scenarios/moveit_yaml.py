@@ -7,7 +7,8 @@ import yaml
 
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
-from evoexp.scenarios.moveit_messages import MAX_SCENE
+from evoexp.scenarios.moveit_files import MessagePart
+from evoexp.scenarios.moveit_messages import MAX_SCENE, check_message
 
 MOST_NESTED, MOST_VALUES = 30, 200_000
 MUST = "YAML as MoveIt writes it"
@@ -42,15 +43,18 @@ class _Loader(yaml.CSafeLoader):  # type: ignore[misc]  # PyYAML's C part has no
         return super().construct_mapping(node, deep)
 
 
-def read_message(content: bytes, field: str) -> dict[str, Any]:
-    """Read the only message of a file, a mapping.
+def read_document(content: bytes, field: str, message: str) -> MessagePart:
+    """Read the only message of a file.
 
     Args:
+        content: Of a file.
         field: The setting that names it, for errors.
+        message: Its type, of `moveit_messages.FIELDS`.
 
     Raises:
-        SettingError: If it is of another format, too large or too deep, or refers to parts of
-            itself; or holds no message, several, or lists that were cut off.
+        SettingError: If the file is of another format, too large or too deep, or refers to parts of
+            itself; if it holds no message, several, another one, lists that were cut off, or what
+            evoexp does not know.
     """
     if len(content) > MAX_SCENE:
         must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
@@ -72,7 +76,8 @@ def read_message(content: bytes, field: str) -> dict[str, Any]:
     root = roots[0] if roots else None
     if not isinstance(root, dict):
         raise SettingError(field, MUST, "nothing" if root is None else type(root).__name__)
-    return root
+    check_message(root, message, field)
+    return MessagePart(root, field, "")
 
 
 def _check(content: bytes, field: str) -> None:

@@ -137,11 +137,8 @@ class ObstacleTable(NamedTuple):
             SettingError: If there is one.
         """
         if ELLIPSE in self.kind:
-            raise SettingError(
-                f"scenario.obstacles[{int(np.argmax(self.kind == ELLIPSE))}].shape",
-                "any but an ellipse with this collision model",
-                "ellipse",
-            )
+            field = f"scenario.obstacles[{int(np.argmax(self.kind == ELLIPSE))}].shape"
+            raise SettingError(field, "any but an ellipse with this collision model", "ellipse")
         return self
 
 

@@ -115,41 +115,33 @@ class PostureTask(Component):
     def _holds_one_thing_at_a_time(self) -> Self:
         for k, name in enumerate(self.all_names):
             if name in self.all_names[:k]:
-                raise SettingError(
-                    f"obstacles[{k}].name", "a name that no other obstacle has", name
-                )
+                must = "a name that no other obstacle has"
+                raise SettingError(f"obstacles[{k}].name", must, name)
         held = ""
         for k, phase in enumerate(self.phases):
-            field = f"phases[{k}]"
-            if (phase.then == "attach") != bool(phase.object):
-                raise SettingError(
-                    f"{field}.object",
-                    "given with then: attach, and only then",
-                    phase.object or None,
-                )
-            if phase.then == "attach" and held:
-                raise SettingError(
-                    f"{field}.then",
-                    f"detach before anything else is taken ({held} is held)",
-                    "attach",
-                )
+            field, is_grasp = f"phases[{k}]", phase.then == "attach"
+            if is_grasp != bool(phase.object):
+                must = "given with then: attach, and only then"
+                raise SettingError(f"{field}.object", must, phase.object or None)
+            if is_grasp and held:
+                must = f"detach before anything else is taken ({held} is held)"
+                raise SettingError(f"{field}.then", must, "attach")
             if phase.then == "detach" and not held:
                 raise SettingError(f"{field}.then", "attach in a phase before", "detach")
-            if isinstance(phase.goal, SurfaceGoal) and phase.goal.object == held:
-                raise SettingError(f"{field}.goal.object", "another object than the one held", held)
             if isinstance(phase.goal, SurfaceGoal):
+                if phase.goal.object == held:
+                    must = "another object than the one held"
+                    raise SettingError(f"{field}.goal.object", must, held)
                 self.index_of(phase.goal.object, f"{field}.goal.object")
-            if phase.then == "attach":
+            if is_grasp:
                 shape = self.objects[self.index_of(phase.object, f"{field}.object")].shape
                 if shape in ("half_space", "ellipse", "hull"):
-                    raise SettingError(
-                        f"{field}.object", "a sphere, box, capsule or cylinder", f"a {shape}"
-                    )
+                    must = "a sphere, box, capsule or cylinder"
+                    raise SettingError(f"{field}.object", must, f"a {shape}")
             held = {"attach": phase.object, "detach": ""}.get(phase.then, held)
-            if bool(phase.contacts) and self.allowed_penetration is None:
-                raise SettingError(
-                    "allowed_penetration", f"given: {field}.contacts allows contacts", None
-                )
+            if phase.contacts and self.allowed_penetration is None:
+                must = f"given: {field}.contacts allows contacts"
+                raise SettingError("allowed_penetration", must, None)
         if not any(self.up):
             raise SettingError("up", "a direction, not (0, 0, 0)", list(self.up))
         return self
@@ -184,12 +176,8 @@ class PostureTask(Component):
             SettingError: If none has this name.
         """
         if name not in self.names:
-            raise SettingError(
-                field,
-                f"the name of an obstacle ({', '.join(self.names) or 'there is none'})",
-                name,
-                nearest(name, self.names),
-            )
+            must = f"the name of an obstacle ({', '.join(self.names) or 'there is none'})"
+            raise SettingError(field, must, name, nearest(name, self.names))
         return self.names.index(name)
 
     @property

@@ -12,7 +12,7 @@ from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, UPRIGHT, PostureCost
-from evoexp.planners.moveit_tasks import moving_joints, posture_task, with_allowed_pairs
+from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
@@ -87,7 +87,7 @@ def prepare(
     problem = replace(problem, scene=problem.scene_of(stage))
     goal = None
     if isinstance(scenario, MoveitTask):
-        goal = scenario.goal_configuration(moving_joints(assembly))
+        goal = scenario.goal_configuration(assembly.joint_names)
     return _started(problem, goal)
 
 

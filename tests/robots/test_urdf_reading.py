@@ -54,6 +54,7 @@ REFUSED = {
     "an attribute misspelt": (collision('<box size="1 1 1"/>', '<origin xzy="1 0 0"/>'), "'xyz'?"),
     "an element misspelt": (collision('<box size="1 1 1"/>', "<orgin/>"), "did you mean 'origin'?"),
     "a collision misspelt": (BOX.replace("collision", "Collision"), "did you mean 'collision'?"),
+    "a mesh without a name": (collision('<mesh filename=""/>'), "a missing mesh ''"),
     "a quaternion": (collision('<box size="1 1 1"/>', '<origin quat_xyzw="0 0 0 1"/>'), "rpy in"),
     "NaN": (collision('<box size="1 1 1"/>', '<origin xyz="nan 0 0"/>'), "finite numbers"),
     "infinity": (collision('<sphere radius="inf"/>'), "finite numbers"),
@@ -97,6 +98,7 @@ TAKEN = {
     "an inertia of NaN": f'<inertial><mass value="nan"/><inertia ixx="nan"/></inertial>{BOX}',
     "a visual that cannot be": f'<visual><origin xyz="1"/><geometry/></visual>{BOX}',
     "an unknown material": f'<visual><material name="none"/></visual>{BOX}',
+    "a box with a file": collision('<box size="0.1 0.2 0.3" filename="none.obj"/>'),
     "elements of others": f"<sensor/>{BOX.replace('<geo', '<drake:proximity_properties/><geo')}",
 }
 
@@ -184,6 +186,26 @@ def test_what_is_wrong_with_a_file_is_told_with_its_name(
         robot(tmp_path, text)
     told = str(refusal.value)
     assert message in told and str(tmp_path / "r.urdf") in told and "\n" not in told
+
+
+@pytest.mark.parametrize(
+    ("root", "base"), [("base_ground", "planar"), ("base_x_link", "floating"), ("k_x_link", "free")]
+)
+def test_links_that_the_base_adds_have_other_names(tmp_path: Path, root: str, base: str) -> None:
+    text = arm(more=LINK + join("k", "b", "c", "planar")).replace('"a"', f'"{root}"')
+    assert robot(tmp_path, text).build().model.nq == 1
+    with pytest.raises(SettingError, match=f"that robot.base adds, was '{root}'"):
+        robot(tmp_path, text, base=base).build()
+
+
+def test_groups_that_hold_each_other_twice_are_looked_up_once(tmp_path: Path) -> None:
+    groups = "".join(
+        f'<group name="g{k}"><group name="g{k + 1}"/><group name="g{k + 1}"/></group>'
+        for k in range(60)
+    )
+    srdf = tmp_path / "r.srdf"
+    srdf.write_text(f'<robot>{groups}<group name="g60"><joint name="j"/></group></robot>')
+    assert robot(tmp_path, arm(), srdf=str(srdf), group="g0").build().model.nq == 1
 
 
 def test_a_joint_without_room_names_the_setting_of_a_limit(tmp_path: Path) -> None:

@@ -30,6 +30,8 @@ class Srdf:
         self._joints = joints
         self._above = {joint.child: joint for joint in joints.values()}
         self._groups = {str(group.get("name")): group for group in self._root.iterfind("group")}
+        # joints of the groups that were looked up: one may be in many others
+        self._joints_of: dict[str, set[str]] = {}
 
     def group_joints(self, group: str, field: str) -> set[str]:
         """Find the joints of a group: of its chains, joints, links and groups.
@@ -104,6 +106,8 @@ class Srdf:
             raise SettingError(field, must, group, nearest(group, names))
         if group in above or len(above) > MOST_GROUPS:
             raise SettingError(field, "a group that does not contain itself", group)
+        if group in self._joints_of:
+            return self._joints_of[group]
         found: set[str] = set()
         for part in self._groups[group]:
             match part.tag:
@@ -115,6 +119,7 @@ class Srdf:
                     found.add(above_it.name)
                 case "group":
                     found |= self._members(str(part.get("name")), field, (*above, group))
+        self._joints_of[group] = found
         return found
 
     def _joint(self, name: str, group: str) -> set[str]:

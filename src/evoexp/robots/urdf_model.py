@@ -15,7 +15,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
-from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfFile, UrdfJoint
+from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfFile, UrdfJoint, repeated
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 # the coordinates of planar and floating joints, and their axes in the joint's frame
@@ -72,8 +72,9 @@ def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
         root = f"{BASE}_ground"
         base = UrdfJoint(BASE, rules.base, root, file.root, axis=Z)
         joints += _parts(base, rules)
-    for what, names in (("joint", [j.name for j in joints]), ("link", [j.child for j in joints])):
-        if double := [name for name in names if names.count(name) > 1]:
+    links = [root, *(joint.child for joint in joints)]
+    for what, names in {"joint": [joint.name for joint in joints], "link": links}.items():
+        if double := repeated(names):
             must = f"a URDF whose {what}s have other names than those that robot.base adds"
             raise SettingError("robot.path", must, double[0])
     on_link: dict[str, list[UrdfJoint]] = {}
@@ -180,7 +181,7 @@ def placed_bodies(
                 reach = np.abs(body.placement.translation).max() + shape.aabb_radius
                 if not 0.0 <= reach <= LARGEST:
                     must = f"a URDF whose bodies end within {LARGEST:g} m (link '{frame.name}')"
-                    raise SettingError(field, must, f"{body.kind} {body.mesh} to {reach:.3g}")
+                    raise SettingError(field, must, f"{body.kind} {body.mesh or ''} to {reach:.3g}")
                 place = frame.placement * body.placement
                 yield PlacedBody(str(frame.name), int(frame.parentJoint), place, shape)
 

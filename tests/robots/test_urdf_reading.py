@@ -233,6 +233,32 @@ def test_limits_that_are_none_are_the_setting(
     assert np.isinf(model.velocityLimit).all()
 
 
+@pytest.mark.parametrize("limit", ['lower="2" upper="inf"', 'lower="-1e9" upper="-2"'])
+def test_a_joint_with_one_limit_has_room_to_the_other_side(tmp_path: Path, limit: str) -> None:
+    one_sided = arm(limit=f"<limit {limit}/>")
+    assert robot(tmp_path, one_sided).build().model.nq == 1
+    with pytest.raises(SettingError, match=r"room within robot\.turn_limit, was \"joint 'j': "):
+        robot(tmp_path, one_sided, turn_limit=90.0).build()
+
+
+def test_bodies_have_different_names(tmp_path: Path) -> None:
+    text = arm(more=join("k", "b", "b_0") + f'<link name="b_0">{BOX}</link>')
+    assert list(bodies(tmp_path, text)) == ["a", "b", "b_0"]
+    several = text.replace(f'"b">{BOX}', f'"b">{BOX}{BOX}')
+    assert list(bodies(tmp_path, several)) == ["a_0", "b_0", "b_1", "b_0_0"]
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "1e400", "1_0", "x"])
+def test_states_of_an_srdf_are_finite_numbers(tmp_path: Path, value: str) -> None:
+    srdf = tmp_path / "r.srdf"
+    state = f'<group_state name="s" group="g"><joint name="j" value="{value}"/></group_state>'
+    srdf.write_text(f"<robot>{state}</robot>")
+    with pytest.raises(
+        SettingError, match=f"finite numbers, at most 1e.07, was \"'{value}' of 'j'"
+    ):
+        robot(tmp_path, arm(), srdf=str(srdf)).states()
+
+
 def test_notes_name_links_without_a_body_and_limits_that_are_not_given(tmp_path: Path) -> None:
     tool = '<link name="tool"/>' + join("k", "b", "tool")
     note = "links that move and have no body: tool"

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_reading import UrdfJoint
+from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint
 from evoexp.robots.xml_files import parsed_xml
 
 MOST_GROUPS = 300  # nested in one another
@@ -67,20 +67,20 @@ class Srdf:
         """Read the named states.
 
         Raises:
-            SettingError: If a value is no number.
+            SettingError: If a value is no finite number.
         """
         found = []
         for state in self._root.iterfind("group_state"):
             values = {}
             for joint in state.iterfind("joint"):
-                name, text = str(joint.get("name")), str(joint.get("value"))
-                try:
-                    values[name] = float(text.split()[0]) if len(text.split()) == 1 else None
-                except ValueError:
-                    must = "an SRDF whose states are numbers"
-                    raise SettingError("robot.srdf", must, f"'{text}' of '{name}'") from None
-            own = {name: value for name, value in values.items() if value is not None}
-            found.append(NamedState(str(state.get("name")), str(state.get("group")), own))
+                name, words = str(joint.get("name")), str(joint.get("value")).split()
+                if len(words) != 1:
+                    continue  # of a joint of several coordinates
+                if not NUMBER.fullmatch(words[0]) or abs(float(words[0])) > LARGEST:
+                    must = f"an SRDF whose states are finite numbers, at most {LARGEST:g}"
+                    raise SettingError("robot.srdf", must, f"'{words[0]}' of '{name}'")
+                values[name] = float(words[0])
+            found.append(NamedState(str(state.get("name")), str(state.get("group")), values))
         return found
 
     def ground(self) -> str:

@@ -64,7 +64,8 @@ def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
     """Build the `pin.Model` of all joints of a URDF, one coordinate each, or none.
 
     Raises:
-        SettingError: If the names of two joints or links are the same once joints are parted.
+        SettingError: If the names of two joints or links are the same once joints are parted, or a
+            joint without one limit has no room on that side.
     """
     joints = [part for joint in file.joints.values() for part in _parts(joint, rules)]
     root = file.root
@@ -122,15 +123,18 @@ def _parts(joint: UrdfJoint, rules: JointRules) -> list[UrdfJoint]:
 
 def _limited(joint: UrdfJoint, rules: JointRules) -> UrdfJoint:
     """Give a joint limits to either side, if it has none or is continuous."""
-    most = {
-        "continuous": 360.0 * DEGREE * rules.continuous_turns,
-        "revolute": rules.turn_limit * DEGREE,
-        "prismatic": rules.slide_limit,
+    setting, most = {
+        "continuous": ("continuous_turns", 360.0 * DEGREE * rules.continuous_turns),
+        "revolute": ("turn_limit", rules.turn_limit * DEGREE),
+        "prismatic": ("slide_limit", rules.slide_limit),
     }[joint.kind]
     low, high = (0.0 if limit is None else limit for limit in joint.limits)
     if joint.kind == "continuous" or joint.limits == (None, None):
         low, high = -most, most
     elif max(abs(low), abs(high)) >= UNLIMITED:
+        if low >= most or high <= -most:
+            must = f"a URDF whose joints have room within robot.{setting}"
+            raise SettingError("robot.path", must, f"joint '{joint.name}': {low:g} to {high:g}")
         low, high = max(low, -most), min(high, most)
     kind = "prismatic" if joint.kind == "prismatic" else "revolute"
     return joint._replace(kind=kind, limits=(low, high))

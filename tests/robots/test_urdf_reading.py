@@ -5,6 +5,7 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from evoexp.errors import SettingError
@@ -206,6 +207,18 @@ def test_groups_that_hold_each_other_twice_are_looked_up_once(tmp_path: Path) ->
     srdf = tmp_path / "r.srdf"
     srdf.write_text(f'<robot>{groups}<group name="g60"><joint name="j"/></group></robot>')
     assert robot(tmp_path, arm(), srdf=str(srdf), group="g0").build().model.nq == 1
+
+
+@pytest.mark.parametrize("axis", ["1 -5.6e-17 0", "0 1e-13 1", "1e-11 1 0", "0 0 2", "0 -1 0"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_joints_are_aligned_where_pinocchio_aligns_them(
+    tmp_path: Path, axis: str, kind: str
+) -> None:
+    text = arm().replace("revolute", kind).replace('"0 0 1"', f'"{axis}"')
+    (_, own), (_, reference) = (
+        model.joints for model in (robot(tmp_path, text).build().model, pin.buildModelFromXML(text))
+    )
+    assert own.shortname() == reference.shortname()
 
 
 def test_a_joint_without_room_names_the_setting_of_a_limit(tmp_path: Path) -> None:

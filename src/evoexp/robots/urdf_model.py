@@ -22,6 +22,7 @@ X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 PLANAR = {"x": X, "y": Y, "yaw": Z}
 FLOATING = {"x": X, "y": Y, "z": Z, "yaw": Z, "pitch": Y, "roll": X}
 COORDINATES = {"planar": PLANAR, "floating": FLOATING}
+ALIGNED = 1e-12  # [-] axes as near as that to x, y or z are these
 UNLIMITED = 1e6  # [rad, m] limits as large as this are none
 BASE = "base"  # what the coordinates of a base that moves are called: base_x, base_y, …
 # Pinocchio's joints of one coordinate by kind: along or about x, y, z, and any other axis
@@ -153,9 +154,11 @@ def _across(normal: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
 
 
 def _joint_model(joint: UrdfJoint) -> Any:
-    if joint.axis in (X, Y, Z):
-        return JOINT_MODELS[joint.kind][(X, Y, Z).index(joint.axis)]()
     axis = np.array(joint.axis)
+    for unit, aligned in zip(np.eye(3), JOINT_MODELS[joint.kind], strict=True):
+        # Pinocchio's isApprox: exporters write 1 -5.6e-17 0
+        if length(axis - unit) <= ALIGNED * min(length(axis), 1.0):
+            return aligned()
     return UNALIGNED[joint.kind](axis / length(axis))
 
 

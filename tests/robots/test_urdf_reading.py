@@ -5,6 +5,7 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from evoexp.errors import SettingError
@@ -54,6 +55,7 @@ REFUSED = {
     "an attribute misspelt": (collision('<box size="1 1 1"/>', '<origin xzy="1 0 0"/>'), "'xyz'?"),
     "an element misspelt": (collision('<box size="1 1 1"/>', "<orgin/>"), "did you mean 'origin'?"),
     "a collision misspelt": (BOX.replace("collision", "Collision"), "did you mean 'collision'?"),
+    "a mesh without a name": (collision('<mesh filename=""/>'), "a missing mesh ''"),
     "a quaternion": (collision('<box size="1 1 1"/>', '<origin quat_xyzw="0 0 0 1"/>'), "rpy in"),
     "NaN": (collision('<box size="1 1 1"/>', '<origin xyz="nan 0 0"/>'), "finite numbers"),
     "infinity": (collision('<sphere radius="inf"/>'), "finite numbers"),
@@ -97,6 +99,7 @@ TAKEN = {
     "an inertia of NaN": f'<inertial><mass value="nan"/><inertia ixx="nan"/></inertial>{BOX}',
     "a visual that cannot be": f'<visual><origin xyz="1"/><geometry/></visual>{BOX}',
     "an unknown material": f'<visual><material name="none"/></visual>{BOX}',
+    "a box with a file": collision('<box size="0.1 0.2 0.3" filename="none.obj"/>'),
     "elements of others": f"<sensor/>{BOX.replace('<geo', '<drake:proximity_properties/><geo')}",
 }
 
@@ -186,6 +189,38 @@ def test_what_is_wrong_with_a_file_is_told_with_its_name(
     assert message in told and str(tmp_path / "r.urdf") in told and "\n" not in told
 
 
+@pytest.mark.parametrize(
+    ("root", "base"), [("base_ground", "planar"), ("base_x_link", "floating"), ("k_x_link", "free")]
+)
+def test_links_that_the_base_adds_have_other_names(tmp_path: Path, root: str, base: str) -> None:
+    text = arm(more=LINK + join("k", "b", "c", "planar")).replace('"a"', f'"{root}"')
+    assert robot(tmp_path, text).build().model.nq == 1
+    with pytest.raises(SettingError, match=f"that robot.base adds, was '{root}'"):
+        robot(tmp_path, text, base=base).build()
+
+
+def test_groups_that_hold_each_other_twice_are_looked_up_once(tmp_path: Path) -> None:
+    groups = "".join(
+        f'<group name="g{k}"><group name="g{k + 1}"/><group name="g{k + 1}"/></group>'
+        for k in range(60)
+    )
+    srdf = tmp_path / "r.srdf"
+    srdf.write_text(f'<robot>{groups}<group name="g60"><joint name="j"/></group></robot>')
+    assert robot(tmp_path, arm(), srdf=str(srdf), group="g0").build().model.nq == 1
+
+
+@pytest.mark.parametrize("axis", ["1 -5.6e-17 0", "0 1e-13 1", "1e-11 1 0", "0 0 2", "0 -1 0"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_joints_are_aligned_where_pinocchio_aligns_them(
+    tmp_path: Path, axis: str, kind: str
+) -> None:
+    text = arm().replace("revolute", kind).replace('"0 0 1"', f'"{axis}"')
+    (_, own), (_, reference) = (
+        model.joints for model in (robot(tmp_path, text).build().model, pin.buildModelFromXML(text))
+    )
+    assert own.shortname() == reference.shortname()
+
+
 def test_a_joint_without_room_names_the_setting_of_a_limit(tmp_path: Path) -> None:
     locked = robot(tmp_path, arm(limit='<limit lower="0" upper="0" velocity="1"/>'))
     with pytest.raises(SettingError, match=r"joint 'j': 0 to 0.*robot\.turn_limit"):
@@ -209,6 +244,32 @@ def test_limits_that_are_none_are_the_setting(
     assert np.degrees(model.lowerPositionLimit) == pytest.approx([low])
     assert np.degrees(model.upperPositionLimit) == pytest.approx([high])
     assert np.isinf(model.velocityLimit).all()
+
+
+@pytest.mark.parametrize("limit", ['lower="2" upper="inf"', 'lower="-1e9" upper="-2"'])
+def test_a_joint_with_one_limit_has_room_to_the_other_side(tmp_path: Path, limit: str) -> None:
+    one_sided = arm(limit=f"<limit {limit}/>")
+    assert robot(tmp_path, one_sided).build().model.nq == 1
+    with pytest.raises(SettingError, match=r"room within robot\.turn_limit, was \"joint 'j': "):
+        robot(tmp_path, one_sided, turn_limit=90.0).build()
+
+
+def test_bodies_have_different_names(tmp_path: Path) -> None:
+    text = arm(more=join("k", "b", "b_0") + f'<link name="b_0">{BOX}</link>')
+    assert list(bodies(tmp_path, text)) == ["a", "b", "b_0"]
+    several = text.replace(f'"b">{BOX}', f'"b">{BOX}{BOX}')
+    assert list(bodies(tmp_path, several)) == ["a_0", "b_0", "b_1", "b_0_0"]
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "1e400", "1_0", "x"])
+def test_states_of_an_srdf_are_finite_numbers(tmp_path: Path, value: str) -> None:
+    srdf = tmp_path / "r.srdf"
+    state = f'<group_state name="s" group="g"><joint name="j" value="{value}"/></group_state>'
+    srdf.write_text(f"<robot>{state}</robot>")
+    with pytest.raises(
+        SettingError, match=f"finite numbers, at most 1e.07, was \"'{value}' of 'j'"
+    ):
+        robot(tmp_path, arm(), srdf=str(srdf)).states()
 
 
 def test_notes_name_links_without_a_body_and_limits_that_are_not_given(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_reading import UrdfJoint
+from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint
 from evoexp.robots.xml_files import parsed_xml
 
 MOST_GROUPS = 300  # nested in one another
@@ -30,6 +30,8 @@ class Srdf:
         self._joints = joints
         self._above = {joint.child: joint for joint in joints.values()}
         self._groups = {str(group.get("name")): group for group in self._root.iterfind("group")}
+        # joints of the groups that were looked up: one may be in many others
+        self._joints_of: dict[str, set[str]] = {}
 
     def group_joints(self, group: str, field: str) -> set[str]:
         """Find the joints of a group: of its chains, joints, links and groups.
@@ -65,20 +67,20 @@ class Srdf:
         """Read the named states.
 
         Raises:
-            SettingError: If a value is no number.
+            SettingError: If a value is no finite number.
         """
         found = []
         for state in self._root.iterfind("group_state"):
             values = {}
             for joint in state.iterfind("joint"):
-                name, text = str(joint.get("name")), str(joint.get("value"))
-                try:
-                    values[name] = float(text.split()[0]) if len(text.split()) == 1 else None
-                except ValueError:
-                    must = "an SRDF whose states are numbers"
-                    raise SettingError("robot.srdf", must, f"'{text}' of '{name}'") from None
-            own = {name: value for name, value in values.items() if value is not None}
-            found.append(NamedState(str(state.get("name")), str(state.get("group")), own))
+                name, words = str(joint.get("name")), str(joint.get("value")).split()
+                if len(words) != 1:
+                    continue  # of a joint of several coordinates
+                if not NUMBER.fullmatch(words[0]) or abs(float(words[0])) > LARGEST:
+                    must = f"an SRDF whose states are finite numbers, at most {LARGEST:g}"
+                    raise SettingError("robot.srdf", must, f"'{words[0]}' of '{name}'")
+                values[name] = float(words[0])
+            found.append(NamedState(str(state.get("name")), str(state.get("group")), values))
         return found
 
     def ground(self) -> str:
@@ -104,6 +106,8 @@ class Srdf:
             raise SettingError(field, must, group, nearest(group, names))
         if group in above or len(above) > MOST_GROUPS:
             raise SettingError(field, "a group that does not contain itself", group)
+        if group in self._joints_of:
+            return self._joints_of[group]
         found: set[str] = set()
         for part in self._groups[group]:
             match part.tag:
@@ -115,6 +119,7 @@ class Srdf:
                     found.add(above_it.name)
                 case "group":
                     found |= self._members(str(part.get("name")), field, (*above, group))
+        self._joints_of[group] = found
         return found
 
     def _joint(self, name: str, group: str) -> set[str]:

@@ -164,7 +164,7 @@ class Urdf(Chain):
         found: dict[str, bytes] = {}
         for link, bodies in links.items():
             for name in (body.mesh for body in bodies):
-                if name and name not in found:
+                if name is not None and name not in found:
                     with _named(f"link '{link}' of {file}"):
                         data = mesh_content(name, file, packages, f"{field}.path")
                         found[name] = whole_mesh(data, name, f"{field}.path")
@@ -241,7 +241,7 @@ class Urdf(Chain):
         files = {mesh.name: (mesh, f"robot.meshes[{k}]") for k, mesh in meshes}
 
         def shapes(body: UrdfBody) -> list[Any]:
-            if not body.mesh:
+            if body.mesh is None:
                 return [primitive_shape(body)]
             if body.mesh not in files:
                 must = "those that the URDF names"

@@ -234,12 +234,16 @@ class UrdfTree:
 
 
 def _body_names(bodies: list[PlacedBody]) -> list[str]:
-    """Return the names of bodies: those of their links, with a number where a link has several."""
+    """Return the names of bodies: those of their links, with a number where a link has several.
+
+    All are numbered if one of these were the name of another link.
+    """
     links = [body.link for body in bodies]
-    return [
-        link if links.count(link) == 1 else f"{link}_{links[:k].count(link)}"
-        for k, link in enumerate(links)
+    numbered = [f"{link}_{links[:k].count(link)}" for k, link in enumerate(links)]
+    names = [
+        link if links.count(link) == 1 else name for link, name in zip(links, numbered, strict=True)
     ]
+    return names if len(set(names)) == len(names) else numbered
 
 
 class UrdfArm(Arm):

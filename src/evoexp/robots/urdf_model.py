@@ -15,13 +15,14 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
-from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfFile, UrdfJoint
+from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfFile, UrdfJoint, repeated
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 # the coordinates of planar and floating joints, and their axes in the joint's frame
 PLANAR = {"x": X, "y": Y, "yaw": Z}
 FLOATING = {"x": X, "y": Y, "z": Z, "yaw": Z, "pitch": Y, "roll": X}
 COORDINATES = {"planar": PLANAR, "floating": FLOATING}
+ALIGNED = 1e-12  # [-] axes as near as that to x, y or z are these
 UNLIMITED = 1e6  # [rad, m] limits as large as this are none
 BASE = "base"  # what the coordinates of a base that moves are called: base_x, base_y, …
 # Pinocchio's joints of one coordinate by kind: along or about x, y, z, and any other axis
@@ -64,7 +65,8 @@ def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
     """Build the `pin.Model` of all joints of a URDF, one coordinate each, or none.
 
     Raises:
-        SettingError: If the names of two joints or links are the same once joints are parted.
+        SettingError: If the names of two joints or links are the same once joints are parted, or a
+            joint without one limit has no room on that side.
     """
     joints = [part for joint in file.joints.values() for part in _parts(joint, rules)]
     root = file.root
@@ -72,8 +74,9 @@ def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
         root = f"{BASE}_ground"
         base = UrdfJoint(BASE, rules.base, root, file.root, axis=Z)
         joints += _parts(base, rules)
-    for what, names in (("joint", [j.name for j in joints]), ("link", [j.child for j in joints])):
-        if double := [name for name in names if names.count(name) > 1]:
+    links = [root, *(joint.child for joint in joints)]
+    for what, names in {"joint": [joint.name for joint in joints], "link": links}.items():
+        if double := repeated(names):
             must = f"a URDF whose {what}s have other names than those that robot.base adds"
             raise SettingError("robot.path", must, double[0])
     on_link: dict[str, list[UrdfJoint]] = {}
@@ -121,15 +124,18 @@ def _parts(joint: UrdfJoint, rules: JointRules) -> list[UrdfJoint]:
 
 def _limited(joint: UrdfJoint, rules: JointRules) -> UrdfJoint:
     """Give a joint limits to either side, if it has none or is continuous."""
-    most = {
-        "continuous": 360.0 * DEGREE * rules.continuous_turns,
-        "revolute": rules.turn_limit * DEGREE,
-        "prismatic": rules.slide_limit,
+    setting, most = {
+        "continuous": ("continuous_turns", 360.0 * DEGREE * rules.continuous_turns),
+        "revolute": ("turn_limit", rules.turn_limit * DEGREE),
+        "prismatic": ("slide_limit", rules.slide_limit),
     }[joint.kind]
     low, high = (0.0 if limit is None else limit for limit in joint.limits)
     if joint.kind == "continuous" or joint.limits == (None, None):
         low, high = -most, most
     elif max(abs(low), abs(high)) >= UNLIMITED:
+        if low >= most or high <= -most:
+            must = f"a URDF whose joints have room within robot.{setting}"
+            raise SettingError("robot.path", must, f"joint '{joint.name}': {low:g} to {high:g}")
         low, high = max(low, -most), min(high, most)
     kind = "prismatic" if joint.kind == "prismatic" else "revolute"
     return joint._replace(kind=kind, limits=(low, high))
@@ -148,9 +154,11 @@ def _across(normal: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
 
 
 def _joint_model(joint: UrdfJoint) -> Any:
-    if joint.axis in (X, Y, Z):
-        return JOINT_MODELS[joint.kind][(X, Y, Z).index(joint.axis)]()
     axis = np.array(joint.axis)
+    for unit, aligned in zip(np.eye(3), JOINT_MODELS[joint.kind], strict=True):
+        # Pinocchio's isApprox: exporters write 1 -5.6e-17 0
+        if length(axis - unit) <= ALIGNED * min(length(axis), 1.0):
+            return aligned()
     return UNALIGNED[joint.kind](axis / length(axis))
 
 
@@ -180,7 +188,7 @@ def placed_bodies(
                 reach = np.abs(body.placement.translation).max() + shape.aabb_radius
                 if not 0.0 <= reach <= LARGEST:
                     must = f"a URDF whose bodies end within {LARGEST:g} m (link '{frame.name}')"
-                    raise SettingError(field, must, f"{body.kind} {body.mesh} to {reach:.3g}")
+                    raise SettingError(field, must, f"{body.kind} {body.mesh or ''} to {reach:.3g}")
                 place = frame.placement * body.placement
                 yield PlacedBody(str(frame.name), int(frame.parentJoint), place, shape)
 

@@ -7,6 +7,8 @@ of the link. Here nothing is passed over: what cannot be is refused, by link or 
 import functools
 import math
 import re
+from collections import Counter
+from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
@@ -92,7 +94,7 @@ class UrdfBody(NamedTuple):
     kind: str  # one of `SHAPES`, or convex: the hull of a mesh
     sizes: tuple[float, ...]  # edges | radius | radius, length | scale of a mesh
     placement: Any  # pin.SE3 in the frame of its link
-    mesh: str = ""  # the name of its file
+    mesh: str | None = None  # the name of its file, as the URDF has it; None: it is no mesh
 
 
 class UrdfFile(NamedTuple):
@@ -142,8 +144,7 @@ def read_urdf(content: bytes, field: str) -> UrdfFile:
         if (count := len(root.findall(path))) > MOST_LINKS:
             raise SettingError(field, f"a URDF of at most {MOST_LINKS} {what}", count)
     for kind in ("link", "joint"):
-        names = [element.get("name") for element in root.iterfind(kind)]
-        if double := [name for name in names if names.count(name) > 1]:
+        if double := repeated(element.get("name") for element in root.iterfind(kind)):
             must = f"a URDF whose {kind}s have different names"
             raise SettingError(field, must, f"two {kind}s '{double[0]}'")
     links = {
@@ -152,6 +153,11 @@ def read_urdf(content: bytes, field: str) -> UrdfFile:
     }
     joints = (_joint(joint, field) for joint in root.iterfind("joint"))
     return UrdfFile(str(root.get("name", "")), links, {joint.name: joint for joint in joints})
+
+
+def repeated(names: Iterable[str]) -> list[str]:
+    """List the names that are given more than once, the first first."""
+    return [name for name, count in Counter(names).items() if count > 1]
 
 
 def _numbers(element: Any, name: str, default: str) -> tuple[float, ...]:
@@ -184,7 +190,8 @@ def _body(link: Any, collision: Any) -> UrdfBody:
             kind = other
     attributes = {"box": ("size",), "sphere": ("radius",), "mesh": ("scale",)}
     sizes = [_numbers(shape, n, "1 1 1") for n in attributes.get(shape.tag, ("radius", "length"))]
-    return UrdfBody(kind, sum(sizes, ()), _placement(collision), shape.get("filename", ""))
+    mesh = shape.get("filename") if shape.tag == "mesh" else None
+    return UrdfBody(kind, sum(sizes, ()), _placement(collision), mesh)
 
 
 def _joint(joint: Any, field: str) -> UrdfJoint:
@@ -312,7 +319,7 @@ class _Check:
                 names.append(child.tag)
             else:
                 self._check_left_out(child, tag, where)
-        if tag in SINGLE and (double := [name for name in names if names.count(name) > 1]):
+        if tag in SINGLE and (double := repeated(names)):
             self._refuse(f"one <{double[0]}> in a <{tag}>", where, "several")
         if tag == "geometry" and len(names) != 1:
             shapes = f"one of {', '.join(SHAPES)} in a <geometry>"

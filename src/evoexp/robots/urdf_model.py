@@ -188,7 +188,7 @@ def placed_bodies(
                 reach = np.abs(body.placement.translation).max() + shape.aabb_radius
                 if not 0.0 <= reach <= LARGEST:
                     must = f"a URDF whose bodies end within {LARGEST:g} m (link '{frame.name}')"
-                    raise SettingError(field, must, f"{body.kind} {body.mesh or ''} to {reach:.3g}")
+                    raise SettingError(field, must, f"{body.mesh or body.kind} to {reach:.3g}")
                 place = frame.placement * body.placement
                 yield PlacedBody(str(frame.name), int(frame.parentJoint), place, shape)
 

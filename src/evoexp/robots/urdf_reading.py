@@ -307,6 +307,8 @@ class _Check:
         if tag in ("link", "joint"):
             where = f"{tag} '{element.get('name', '')}'"
         if tag == "collision_checking":
+            if unnamed := [child.tag for child in element if not child.get("name")]:
+                self._refuse(f"name in a <{unnamed[0]}> in a <{tag}>", where, "none")
             return
         self._attributes(element, tag, where)
         known: tuple[str, ...] = PARTS.get(tag, ())
@@ -349,7 +351,7 @@ class _Check:
                 raise SettingError(self._field, XACRO, f'<{tag} {name}="{text[:40]}"/>')
             if kinds.get(name):
                 self._check_numbers(tag, name, text, where)
-        missing = [name for name in kinds if element.get(name) is None]
+        missing = [name for name in kinds if not element.get(name)]
         for name in set(element.keys()) - kinds.keys():
             if (tag, name) == ("origin", "quat_xyzw"):
                 self._refuse("rpy in an <origin>", where, name)
@@ -372,6 +374,8 @@ class _Check:
                 self._refuse(f"finite numbers, at most {LARGEST:g}, {here}", where, text[:60])
         if name in POSITIVE and min(values) <= 0.0:
             self._refuse(f"numbers greater than 0 {here}", where, text[:60])
+        if name == "velocity" and values[0] < 0.0:
+            self._refuse(f"a number of at least 0 {here}", where, text[:60])
         if name == "scale" and 0.0 in values:
             self._refuse(f"numbers other than 0 {here}", where, text[:60])
 

@@ -38,12 +38,12 @@ class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
         return self.batches(_Search(self, problem), rng)
 
     def memory(self, problem: ArmProblem) -> int:
-        """Return the memory of both trees, of their copy as they grow, and of a record's copy."""
+        """Return the memory of both trees, whose arrays double, and of a record's copy."""
         most = (self.num_generations + 1) * self.ga.iterations_per_generation
         nodes = NODES_PER_ITERATION * min(self.max_iterations, most)  # trees of one start
         low, high = self.box(problem)
         tested = distance(low, high) / self.resolution
-        return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
+        return int(8 * (len(problem.start) + 1) * (8 * nodes + 2 * tested))
 
     @property
     def most_iterations(self) -> int:

@@ -107,11 +107,11 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
         return found
 
     def memory(self, problem: Problem) -> int:
-        """Return the memory of both trees, of their copy as they grow, and of an edge's tests."""
+        """Return the memory of both trees, whose arrays double, and of an edge's tests."""
         low, high = problem.joint_limits.T / DEGREE
         tested = distance(low, high) / self.resolution
         nodes = NODES_PER_ITERATION * self.max_iterations
-        return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
+        return int(8 * (len(problem.start) + 1) * (8 * nodes + 2 * tested))
 
     def _errors(self, problem: Problem, path: FloatArray) -> tuple[float, float]:
         """Return the least distance of the tip from the via point, and its last from the goal."""

@@ -52,7 +52,7 @@ class EdgeTest:
     def grow(
         self, trees: Trees, tree: int, target: FloatArray, step: float
     ) -> tuple[Trees, int, int]:
-        """Return the answers of the kernel `grow` but for the configurations, which are counted."""
+        """Grow the trees by the kernel `grow`, and count the configurations that it tests."""
         trees, end, met, asked = grow(*self._test, trees, tree, target, step, self.resolution)
         self.queries += asked
         return trees, end, met
@@ -60,7 +60,7 @@ class EdgeTest:
     def shortcut(
         self, path: FloatArray, lengths: FloatArray, ends: FloatArray
     ) -> tuple[FloatArray, FloatArray, int]:
-        """Return those of the kernel `shortcut`, likewise."""
+        """Try lines by the kernel `shortcut`, and count the configurations that it tests."""
         path, lengths, tried, asked = shortcut(*self._test, path, lengths, ends, self.resolution)
         self.queries += asked
         return path, lengths, tried

@@ -181,7 +181,7 @@ def missing(components: Mapping[str, str]) -> list[str]:
 
 
 def lacking(config_json: bytes) -> str:
-    """Return how to install what a condition needs and is not there; nothing if all is.
+    """Return how to install the missing packages of a condition; nothing if none is missing.
 
     Args:
         config_json: The condition's canonical form.

@@ -159,7 +159,7 @@ def _text(name: str, override: Override) -> str:
 
 
 def _without(member: Crossed, varied: set[str]) -> Choice:
-    """Return the choice of a combination without overrides of what the file's conditions vary."""
+    """Return a combination's choice without overrides of fields that the file's conditions vary."""
     taken_back = {
         key
         for key, override in member.typed.items()

@@ -26,7 +26,7 @@ def exact_cases(cases: list[Case]) -> list[Case]:
 
 
 def evolved_cases(exact_cases: list[Case]) -> list[Case]:
-    """Return those of them for which anything was evolved."""
+    """Return the criteria that runs evolved, of those with a known optimum."""
     return [case for case in exact_cases if case.evolved]
 
 

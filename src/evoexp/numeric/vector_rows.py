@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.errors import TypingError
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import intrinsic
@@ -49,9 +48,6 @@ def _interleaved(builder: Any, rows: list[Any], width: int) -> list[Any]:
 
 @intrinsic
 def _transpose(typing_context: Any, rows: Any) -> Any:
-    if rows != types.UniTuple(vector_type, LANES):
-        raise TypingError(f"must be eight vectors, is {rows}")
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values = [builder.extract_value(arguments[0], k) for k in range(LANES)]
         for width in (1, 2, 4):
@@ -126,8 +122,6 @@ def _load_each(typing_context: Any, array: Any, places: Any, at: Any, offset: An
 def _count(
     typing_context: Any, array: Any, places: Any, at: Any, offset: Any, limits: Any, num: Any
 ) -> Any:
-    if not isinstance(num, types.IntegerLiteral):
-        raise TypingError("num must be a constant")
     # the bits of the numbers that count, of every lane
     last = (0xFF << (LANES - num.literal_value)) & 0xFF
     counted = int.from_bytes(bytes([last] * LANES), "little")

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.vector_rows import (
@@ -108,3 +109,12 @@ def test_whole_numbers_become_places() -> None:
     numbers, out = np.array([0.0, 1.0, 5.0, 2.0**40, 7.0, 0.0, 3.0, 2.0]), np.zeros(12, np.uint64)
     as_places(numbers, out)
     assert list(out) == [0, 0, 0, *(numbers + np.arange(8)).astype(int), 0]
+
+
+def test_the_number_that_is_counted_is_a_constant() -> None:
+    @kernel
+    def count_some(array: FloatArray, places: Any, num: int) -> Any:
+        return num_up_to(array, places, U(0), U(0), load(array, U(0)), num)
+
+    with pytest.raises(TypingError, match="constant"):
+        count_some(np.zeros(8), np.zeros(8, np.uint64), 7)

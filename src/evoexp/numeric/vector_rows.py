@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
+from numba.core.errors import TypingError
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import intrinsic
@@ -122,6 +123,8 @@ def _load_each(typing_context: Any, array: Any, places: Any, at: Any, offset: An
 def _count(
     typing_context: Any, array: Any, places: Any, at: Any, offset: Any, limits: Any, num: Any
 ) -> Any:
+    if not isinstance(num, types.IntegerLiteral):  # numba then asks again with its value
+        raise TypingError("num must be a constant")
     # the bits of the numbers that count, of every lane
     last = (0xFF << (LANES - num.literal_value)) & 0xFF
     counted = int.from_bytes(bytes([last] * LANES), "little")

@@ -74,10 +74,6 @@ class Population(NamedTuple):
     block_reaches: FloatArray
 
 
-Directions = tuple[Any, Any, Any, Any]
-"""Cosine and sine of the first link, and of the second, of one arm or of eight."""
-
-
 def count_collisions(
     one: Arm, outlines_1: FloatArray, two: Arm, outlines_2: FloatArray
 ) -> Crossings:
@@ -277,10 +273,10 @@ def _sign_products(one: tuple[Line, Line], two: tuple[Line, Line]) -> Vector:
 def _boundary_products(
     arm_1: Arm,
     one: tuple[Line, Line],
-    turns_1: Directions,
+    turns_1: Line,
     arm_2: Arm,
     two: tuple[Line, Line],
-    turns_2: Directions,
+    turns_2: Line,
 ) -> Vector:
     """Return the least sign product of the boundary lines of two arms, or of links without such."""
     least, half_1, half_2 = spread(np.inf), arm_1.half_width, arm_2.half_width
@@ -293,7 +289,7 @@ def _boundary_products(
 
 
 @inlined
-def _beside(links: tuple[Line, Line], turns: Directions, shift: float) -> tuple[Line, Line]:
+def _beside(links: tuple[Line, Line], turns: Line, shift: float) -> tuple[Line, Line]:
     """Return lines parallel to links."""
     (x, y, u, v), (elbow_x, elbow_y, w, z), (c, s, d, t) = links[0], links[1], turns
     second = (elbow_x - shift * t, elbow_y + shift * d, w, z)
@@ -304,10 +300,10 @@ def _beside(links: tuple[Line, Line], turns: Directions, shift: float) -> tuple[
 def _circle_distances(
     arm_1: Arm,
     one: tuple[Line, Line],
-    turns_1: Directions,
+    turns_1: Line,
     arm_2: Arm,
     two: tuple[Line, Line],
-    turns_2: Directions,
+    turns_2: Line,
 ) -> Vector:
     """Return the least squared distance, less radius², of circles from lines and each other."""
     (x_1, y_1, u, v), (x_2, y_2, w, z) = one[1], two[1]
@@ -321,7 +317,7 @@ def _circle_distances(
 
 @inlined
 def _circle_distance(
-    arm: Arm, links: tuple[Line, Line], turns: Directions, x: Vector, y: Vector, radius: float
+    arm: Arm, links: tuple[Line, Line], turns: Line, x: Vector, y: Vector, radius: float
 ) -> Vector:
     """Return the squared distance, less radius², of a circle around (x, y) from an arm's lines."""
     (elbow_x, elbow_y, _, _), (c, s, d, t), half = links[1], turns, arm.half_width

@@ -14,7 +14,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from collision.built_bodies import built, num_before_contact
 from evoexp.collision.bodies.body_collision import BodyCollision
+from evoexp.robots.kinematics import kinematic_table
 from evoexp.scenarios.obstacles import obstacle_table
 from references import arms_6r, arms_7r, primitives_numpy
 
@@ -27,7 +29,7 @@ DRAWN_7R = {"random": arms_7r.random_configurations, "population": arms_7r.popul
 def collision_of(shapes: str) -> BodyCollision:
     model = arms_6r.model()
     table = obstacle_table(arms_6r.OBSTACLES)
-    return BodyCollision.build(
+    return built(
         model,
         arms_6r.shapes_of(getattr(arms_6r, shapes)(model)),
         table,
@@ -38,7 +40,7 @@ def collision_of(shapes: str) -> BodyCollision:
 
 def collision_of_7r() -> BodyCollision:
     table = obstacle_table(arms_7r.OBSTACLES)
-    return BodyCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
+    return built(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
 
 
 def coal_collisions(shapes: str, broad_phase: bool) -> Callable[[Any], Any]:
@@ -57,11 +59,10 @@ def coal_collisions(shapes: str, broad_phase: bool) -> Callable[[Any], Any]:
 def numpy_clearance() -> Callable[[Any], Any]:
     """Return a function of q (nq, configurations): the least clearance of the spheres."""
     model = arms_6r.model()
-    collision, table = collision_of("spheres"), obstacle_table(arms_6r.OBSTACLES)
+    table = obstacle_table(arms_6r.OBSTACLES)
     shapes = arms_6r.shapes_of(arms_6r.spheres(model))
-    local = np.array(
-        [collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)]
-    )
+    chain = kinematic_table(model)
+    local = np.array([chain.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)])
     checked = np.ones((len(shapes.joint), len(table.kind)), dtype=bool)
     for joint, k in IGNORED:
         checked[shapes.joint == joint, k] = False
@@ -73,7 +74,7 @@ def numpy_clearance() -> Callable[[Any], Any]:
     )
 
     def clearance(q: Any) -> Any:
-        centers = primitives_numpy.sphere_centers(collision.table, shapes.joint - 1, local, q)
+        centers = primitives_numpy.sphere_centers(chain, shapes.joint - 1, local, q)
         outside = primitives_numpy.to_obstacles(centers, shapes.radius, table, checked)
         return np.minimum(outside, primitives_numpy.to_self(centers, shapes.radius, *pairs.T))
 
@@ -127,7 +128,7 @@ def bench_collides_7r(beside: Any, drawn: str, size: int) -> None:
                 1,
             ),
             "whether any of 20 collides": (
-                lambda: [collision.num_free(edge) for edge in edges],
+                lambda: [num_before_contact(collision, edge) for edge in edges],
                 SIZE,
                 10,
             ),

@@ -29,7 +29,7 @@ def num_tests(problem: Problem) -> int:
     """
     return (
         2
-        * problem.collision.num_positions
+        * problem.collision.path.num_positions
         * len(problem.start)
         * len(problem.collision.ellipses[0])
     )
@@ -105,7 +105,7 @@ def obvious_check(
     )
 
     def check() -> np.ndarray:
-        straightforward(starts, ends, *about, problem.collision.num_positions, hit)
+        straightforward(starts, ends, *about, problem.collision.path.num_positions, hit)
         return hit
 
     assert np.array_equal(check(), problem.collision.collide(starts, ends))

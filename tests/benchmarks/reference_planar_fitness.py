@@ -96,7 +96,7 @@ def _arms(given: Condition, problem: Any) -> _Arms:
         arms.along[a][:] = spheres.local[first:stop, 0]
         links = spheres.joint[first:stop] - spheres.joint[first]
         arms.link[:] = links
-    arms.radius = problem.collision.radius
+    arms.radius = problem.collision.spheres.radius
     arms.weights[:] = given.planner.objective.weights
     return arms
 

@@ -29,7 +29,7 @@ def judgement(seed: int) -> _Judgement:
     rng = np.random.default_rng(seed)
     scene = random_scene(rng)
     motion = random_motion(rng, scene.model.nq)
-    return _Judgement(scene, motion, 0.0, scene.tolerances, 1e-3, Limits())
+    return _Judgement(scene, motion, 0.0, 1e-3, Limits())
 
 
 def write_bounds(task: Task, begin: float, end: float, bounds: np.ndarray) -> None:
@@ -85,14 +85,8 @@ def test_the_bound_is_reached() -> None:
     ball = pin.SE3(np.eye(3), np.array([2.0, 3.0, 0.0]))
     geometry.addGeometryObject(pin.GeometryObject("ball", 0, 0, ball, coal.Sphere(0.1)))
     geometry.addCollisionPair(pin.CollisionPair(0, 1))
-    judged = _Judgement(
-        geometry_scene(model, geometry),
-        Motion(np.array([[0.0], [0.5]])),
-        0.0,
-        np.ones(1),
-        1e-3,
-        Limits(),
-    )
+    motion = Motion(np.array([[0.0], [0.5]]))
+    judged = _Judgement(geometry_scene(model, geometry), motion, 0.0, 1e-3, Limits())
     bounds = np.empty((2, 1))
     write_bounds(judged.task, 0.0, 1.0, bounds)
     assert bounds[0, 0] == pytest.approx(0.5 * 2.1)

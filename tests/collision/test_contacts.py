@@ -10,10 +10,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from collision.built_bodies import built, num_before_contact
 from composed import composed
 from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
-from evoexp.collision.bodies.body_shapes import Shapes
 from evoexp.collision.bodies.contact_kernels import find_contacts
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
 from evoexp.scenarios.obstacles import (
@@ -29,12 +30,12 @@ COUNTS = [1, 7, 8, 9, 100, 333]
 
 def arm_7r() -> BodyCollision:
     table = obstacle_table(arms_7r.OBSTACLES)
-    return BodyCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
+    return built(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
 
 
 def arm_6r() -> BodyCollision:
     model, table = arms_6r.model(), obstacle_table(arms_6r.OBSTACLES)
-    return BodyCollision.build(
+    return built(
         model,
         arms_6r.shapes_of(arms_6r.spheres(model)),
         table,
@@ -58,8 +59,9 @@ def slider(size: float, obstacles: tuple[Any, ...], radius: float = 0.1) -> Body
     first = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
     model.addJoint(first, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
     center = np.array([[0.0, 0.0, 0.0], [size, 0.0, 0.0]])
-    shapes = Shapes(np.array([1, 2]), center, center, np.array([radius, radius]))
-    return BodyCollision.build(model, shapes, obstacle_table(obstacles), ())
+    joints = np.array([1, 2])
+    shapes = Shapes(joints, center, center, np.array([radius, radius]), joints)
+    return built(model, shapes, obstacle_table(obstacles), ())
 
 
 @pytest.mark.parametrize("arm", ARMS)
@@ -74,7 +76,7 @@ def test_answers_are_the_signs_of_the_clearances(arm: str, drawn: str, count: in
     assert np.abs(exact).min() > 1e-9
     assert np.array_equal(found, exact < 0.0)
     assert np.array_equal(collision.collides(q), exact < 0.0)
-    assert collision.num_free(q) == leading_free(exact < 0.0)
+    assert num_before_contact(collision, q) == leading_free(exact < 0.0)
 
 
 @pytest.mark.parametrize("drawn", ["random_configurations", "population"])
@@ -97,10 +99,10 @@ def test_the_search_for_any_collision_ends_where_the_first_is_found(arm: str) ->
     for place in (0, 5, 8, 50, free.shape[1]):
         mixed = np.insert(free, place, q[:, hits][:, 0], axis=1)
         assert decided(collision, mixed, at_first=True)[0] == -1 - place // 8 * 8
-        assert collision.num_free(mixed) == place // 8 * 8
+        assert num_before_contact(collision, mixed) == place // 8 * 8
     assert decided(collision, free, at_first=True)[0] == 0
-    assert collision.num_free(free) == free.shape[1]
-    assert collision.num_free(free[:, :0]) == 0
+    assert num_before_contact(collision, free) == free.shape[1]
+    assert num_before_contact(collision, free[:, :0]) == 0
 
 
 def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
@@ -112,8 +114,8 @@ def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
     exact = collision.clearance(q).least
     assert np.array_equal(exact < 0.0, [False, False, True])
     assert np.array_equal(collision.collides(q), exact < 0.0)
-    assert collision.num_free(q) == 0
-    assert collision.num_free(q[:, :2]) == 2
+    assert num_before_contact(collision, q) == 0
+    assert num_before_contact(collision, q[:, :2]) == 2
 
 
 def test_centres_within_boxes_without_thickness_collide() -> None:
@@ -143,7 +145,8 @@ def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
     model, own = arms_6r.model(), arms_7r.shapes()
     for joint in range(1, model.njoints):
         model.jointPlacements[joint].translation *= scale
-    fitting = own._replace(joint=np.minimum(own.joint, 6))
+    joint = np.minimum(own.joint, 6)
+    fitting = own._replace(joint=joint, body=joint)
     shapes = fitting._replace(
         start=scale * own.start, end=scale * own.end, radius=scale * own.radius
     )
@@ -161,7 +164,7 @@ def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
         for one in arms_6r.OBSTACLES
         if isinstance(one, SphereObstacle | BoxObstacle)
     )
-    collision = BodyCollision.build(model, shapes, obstacle_table(obstacles))
+    collision = built(model, shapes, obstacle_table(obstacles))
     q = rng.uniform(-np.pi, np.pi, size=(6, 1)) + rng.choice([0.1, 3.0]) * rng.normal(size=(6, 203))
     doubts, found = decided(collision, q, at_first=False)
     assert doubts == 0
@@ -170,18 +173,17 @@ def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
 
 def test_capsules_are_answered_in_full() -> None:
     model, table = arms_6r.model(), obstacle_table(arms_6r.OBSTACLES)
-    collision = BodyCollision.build(
+    collision = built(
         model,
         arms_6r.shapes_of(arms_6r.capsules(model)),
         table,
         arms_6r.SELF_PAIRS,
         [(1, arms_6r.FLOOR)],
     )
-    assert not collision.only_spheres
     q = arms_6r.random_configurations(50)
     hits = collision.collides(q)
-    assert collision.num_free(q) == leading_free(hits)
-    assert collision.num_free(q[:, ~hits]) == (~hits).sum()
+    assert num_before_contact(collision, q) == leading_free(hits)
+    assert num_before_contact(collision, q[:, ~hits]) == (~hits).sum()
 
 
 @pytest.mark.parametrize("experiment", ["rana_planar", "rana_obstacles", "rana_puma"])
@@ -194,16 +196,14 @@ def test_touching_spheres_find_any_collision(experiment: str) -> None:
     assert 0 < hits.sum() < len(hits)
     assert np.array_equal(collision.collides(q), hits)
     general, q = collision.general, DEGREE * q
-    assert general.num_free(q) == leading_free(hits)
+    assert num_before_contact(general, q) == leading_free(hits)
     free = q[:, ~hits]
-    assert general.num_free(free) == free.shape[1]
+    assert num_before_contact(general, free) == free.shape[1]
     for count in (1, 7, 8, 9, 20):
         few = q[:, :count]
-        assert general.num_free(few) == leading_free(hits[:count])
+        assert num_before_contact(general, few) == leading_free(hits[:count])
         mixed = np.hstack([free[:, :count], q[:, hits][:, :1]])
-        assert general.num_free(mixed) == count // 8 * 8
-    with pytest.raises(ValueError, match="q must have shape"):
-        general.num_free(q[:2])
+        assert num_before_contact(general, mixed) == count // 8 * 8
 
 
 PROGRAMME = """

@@ -64,7 +64,7 @@ def test_all_four_pairs_of_links_count() -> None:
     rng = np.random.default_rng(3)
     q_1, q_2 = rng.uniform(0.0, np.pi, (2, 2, 20000))
     found = closed_form(SCENE_A[0], q_1, SCENE_A[1], q_2)
-    assert 0.3 < found.crossing[3].sum() / found.colliding.sum() < 0.45
+    assert 0.3 < found.crossing[3].sum() / found.crossing.any(axis=0).sum() < 0.45
     assert found.crossing.any(axis=1).all()
 
 
@@ -301,12 +301,6 @@ def test_what_does_not_fit_is_refused() -> None:
         ValueError, match=r"q must have shape \(configurations, 2, individuals\), was \(3, 4\)"
     ):
         one.outlines(np.zeros((3, 4)))
-    with pytest.raises(
-        ValueError, match=r"outlines_2 must have shape \(configurations, 4 or 8, individuals\)"
-    ):
-        count_collisions(one, points_1, two, points_2[:, :3])
-    with pytest.raises(ValueError, match="as many configurations, had 4 and 3"):
-        count_collisions(one, points_1, two, points_2[:3])
     with pytest.raises(ValueError, match="at most 32767 configurations, were 32768"):
         count_collisions(one, np.zeros((32768, 4, 1)), two, np.zeros((32768, 4, 1)))
     for value in (np.nan, np.inf, 1e200):
@@ -318,7 +312,3 @@ def test_what_does_not_fit_is_refused() -> None:
         count_collisions(Arm((np.nan, 0.0), (1.0, 1.0)), points_1, two, points_2)
     with pytest.raises(ValueError, match=r"both have shape \(2, n\), were \(2, 3\) and \(2, 4\)"):
         closed_form(one, np.zeros((2, 3)), two, np.zeros((2, 4)))
-    with pytest.raises(ValueError, match="collision_substeps must be at least 1, was 0"):
-        path_configurations(np.zeros((4, 2, 3)), np.zeros(2), np.zeros(2), 0)
-    with pytest.raises(ValueError, match=r"goal must have shape \(2,\), was \(3,\)"):
-        path_configurations(np.zeros((4, 2, 3)), np.zeros(2), np.zeros(3), 1)

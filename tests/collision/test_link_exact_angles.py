@@ -78,7 +78,7 @@ def test_lines_collide_as_in_exact_arithmetic(step: int, end: int, distance: int
     check(counts, expected)
     pairs = np.array(list(np.ndindex(len(chosen), len(chosen)))).T
     closed = closed_form(first, q[0][:, pairs[0]], second, q[0][:, pairs[1]])
-    check(closed.colliding.reshape(counts.shape), expected)
+    check(closed.crossing.any(axis=0).reshape(counts.shape), expected)
 
 
 def test_multiples_of_15_degrees_collide_as_in_exact_arithmetic() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from collision.built_bodies import num_before_contact
 from collision.touching_arms import ONE_PLANAR, THREE_PLANAR, TWO_PLANAR, TWO_SPATIAL
 from evoexp.collision.bodies.body_collision import leading_free
 from evoexp.collision.bodies.planar_contacts import contacts, link_lines
@@ -40,7 +41,7 @@ def test_circles_at_equal_steps_collide_where_their_clearance_is_negative(
         exact = collision.clearance(q).least
         assert np.abs(exact).min() > 1e-10
         assert np.array_equal(collision.collides(q), exact < 0.0)
-        assert collision.general.num_free(DEGREE * q) == leading_free(exact < 0.0)
+        assert num_before_contact(collision.general, DEGREE * q) == leading_free(exact < 0.0)
 
 
 def test_circles_that_touch_are_measured_exactly() -> None:

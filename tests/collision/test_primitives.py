@@ -10,9 +10,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from collision.built_bodies import built, default_pairs, limited
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.body_shapes import Shapes, default_pairs
-from evoexp.robots.kinematics import UnsupportedJoint
+from evoexp.collision.bodies.packing import Shapes
+from evoexp.robots.kinematics import UnsupportedJoint, kinematic_table
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
@@ -23,8 +24,6 @@ from evoexp.scenarios.obstacles import (
 )
 from references import arms_6r, primitives_numpy
 from references.primitive_distances import along, to_obstacle, to_segment
-
-NONE = obstacle_table(())
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:
@@ -161,9 +160,8 @@ def check_against_plain(
     rng: np.random.Generator, model: Any, geometry: Any, deepest: float
 ) -> None:
     table = obstacle_table(random_obstacles(rng))
-    joints = {one.parentJoint for one in geometry.geometryObjects}
-    pairs, arms = default_pairs(model, joints), [-1, *rng.integers(0, 2, size=model.nq).tolist()]
-    collision = BodyCollision.build(model, arms_6r.shapes_of(geometry), table, arms=arms)
+    shapes, arms = arms_6r.shapes_of(geometry), [-1, *rng.integers(0, 2, size=model.nq).tolist()]
+    pairs, collision = default_pairs(model, shapes), built(model, shapes, table, arms=arms)
     q = rng.uniform(-np.pi, np.pi, size=(model.nq, 5))
     found = collision.clearance(q)
     for sample in range(q.shape[1]):
@@ -202,7 +200,7 @@ def test_a_6r_arm_agrees_with_coal(shapes: str) -> None:
     model = arms_6r.model()
     geometry = getattr(arms_6r, shapes)(model)
     ignored = [(1, arms_6r.FLOOR)]
-    collision = BodyCollision.build(
+    collision = built(
         model,
         arms_6r.shapes_of(geometry),
         obstacle_table(arms_6r.OBSTACLES),
@@ -244,12 +242,11 @@ def test_depths_agree_with_plain_numpy_in_a_crowd_of_large_obstacles() -> None:
         HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, 0.6), normal=(0.1, 0.2, 1.0)),
     )
     table = obstacle_table(obstacles + large)
-    collision = BodyCollision.build(model, shapes, table)
+    collision = built(model, shapes, table)
     q = arms_6r.random_configurations(1000)
-    local = np.array(
-        [collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)]
-    )
-    centers = primitives_numpy.sphere_centers(collision.table, shapes.joint - 1, local, q)
+    chain = kinematic_table(model)
+    local = np.array([chain.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)])
+    centers = primitives_numpy.sphere_centers(chain, shapes.joint - 1, local, q)
     every = np.ones((len(local), len(table.kind)), dtype=bool)
     expected = primitives_numpy.to_obstacles(centers, shapes.radius, table, every)
     found = collision.clearance(q).to_obstacles
@@ -265,9 +262,7 @@ def test_verdicts_agree_with_coal(shapes: str, drawn: str) -> None:
     geometry = getattr(arms_6r, shapes)(model)
     ignored = [(1, arms_6r.FLOOR)]
     table = obstacle_table(arms_6r.OBSTACLES)
-    collision = BodyCollision.build(
-        model, arms_6r.shapes_of(geometry), table, arms_6r.SELF_PAIRS, ignored
-    )
+    collision = built(model, arms_6r.shapes_of(geometry), table, arms_6r.SELF_PAIRS, ignored)
     scene = arms_6r.with_obstacles(geometry, arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, ignored)
     pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(model, scene, 1)
     q = getattr(arms_6r, drawn)(400)
@@ -284,7 +279,7 @@ def collision_of(
     geometry = random_geometry(rng, model, 20, 6)
     cut = [-1, *(k * arms // model.nq for k in range(model.nq))]
     table = obstacle_table(random_obstacles(rng))
-    return BodyCollision.build(model, arms_6r.shapes_of(geometry), table, arms=cut), rng
+    return built(model, arms_6r.shapes_of(geometry), table, arms=cut), rng
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -293,10 +288,10 @@ def test_a_batch_is_its_configurations_one_by_one(seed: int, count: int) -> None
     collision, rng = collision_of(seed)
     q = rng.uniform(-np.pi, np.pi, size=(6, count))
     for limit in (np.inf, 0.1):
-        together = np.array(collision.clearance(q, limit))
-        backwards = np.array(collision.clearance(q[:, ::-1], limit))[:, ::-1]
+        together = np.array(limited(collision, q, limit))
+        backwards = np.array(limited(collision, q[:, ::-1], limit))[:, ::-1]
         alone = np.hstack(
-            [np.array(collision.clearance(q[:, k : k + 1], limit)) for k in range(0, count, 7)]
+            [np.array(limited(collision, q[:, k : k + 1], limit)) for k in range(0, count, 7)]
         )
         assert np.array_equal(together, backwards)
         assert np.array_equal(together[:, ::7], alone)
@@ -308,12 +303,12 @@ def test_a_limit_skips_only_what_is_not_asked(seed: int, limit: float) -> None:
     collision, rng = collision_of(seed, arms=1 + seed % 2)
     near = rng.uniform(-np.pi, np.pi, size=(6, 1)) + 0.1 * rng.normal(size=(6, 150))
     for q in (near, rng.uniform(-np.pi, np.pi, size=(6, 150))):
-        for exact, limited in zip(
-            collision.clearance(q), collision.clearance(q, limit), strict=True
+        for exact, bounded in zip(
+            collision.clearance(q), limited(collision, q, limit), strict=True
         ):
             below = exact < limit
-            assert np.array_equal(limited[below], exact[below])
-            assert np.all(limited[~below] == limit)
+            assert np.array_equal(bounded[below], exact[below])
+            assert np.all(bounded[~below] == limit)
 
 
 def test_no_configurations_and_what_is_not_a_number() -> None:
@@ -334,15 +329,16 @@ def test_pairs_arms_and_ignored_obstacles_are_the_callers() -> None:
         HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0), normal=(0.0, 0.0, 1.0)),
     )
     ends = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    shapes = Shapes(np.array([0, 1, 2]), np.zeros((3, 3)), ends, np.ones(3))
+    shapes = Shapes(np.arange(3), np.zeros((3, 3)), ends, np.ones(3), np.arange(3))
     q = np.zeros((2, 1))
 
     def clearance(**options: Any) -> list[float]:
-        collision = BodyCollision.build(model, shapes, obstacle_table((floor,)), **options)
+        collision = built(model, shapes, obstacle_table((floor,)), **options)
         return [float(row[0]) for row in collision.clearance(q)]
 
-    assert clearance() == [-1.0, 3.0, np.inf]  # 5 m apart, two trees; the world is their parent
-    assert clearance(pairs=[(1, 2)], ignored=[(1, 0), (2, 0)]) == [np.inf, 3.0, np.inf]
+    two = {"arms": (-1, 0, 1)}
+    assert clearance(**two) == [-1.0, 3.0, np.inf]  # 5 m apart; the world is their parent
+    assert clearance(pairs=[(1, 2)], ignored=[(1, 0), (2, 0)], **two) == [np.inf, 3.0, np.inf]
     assert clearance(pairs=[(0, 2)]) == [-1.0, np.inf, 3.0]
     assert clearance(arms=(-1, 0, 0)) == [-1.0, np.inf, 3.0]
 
@@ -354,50 +350,13 @@ def two_sticks() -> Any:
     return model
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"joint": np.array([1, 3])}, "shapes.joint must be joints of the model, 0 to 2"),
-        ({"start": np.zeros((1, 3))}, r"shapes.start must be finite, of shape \(2, 3\)"),
-        ({"end": np.full((2, 3), np.nan)}, r"shapes.end must be finite"),
-        ({"radius": np.array([0.1, -0.1])}, "shapes.radius must be finite, at least 0"),
-        ({"joint": np.array([], dtype=int)}, "with one shape at least"),
-    ],
-)
-def test_wrong_shapes_are_refused(changes: dict[str, np.ndarray], message: str) -> None:
-    good = Shapes(np.array([1, 2]), np.zeros((2, 3)), np.ones((2, 3)), np.ones(2))
-    with pytest.raises(ValueError, match=message):
-        BodyCollision.build(two_sticks(), good._replace(**changes), NONE)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            {"pairs": [(1, 1)]},
-            r"pairs must hold two different joints of \[1, 2\] each, was \(1, 1\)",
-        ),
-        ({"pairs": [(0, 1)]}, "pairs must hold two different joints"),
-        ({"ignored": [(1, 0)]}, "ignored must hold pairs"),
-        ({"arms": (0, 0)}, "arms must have one number per joint of the model, 3, had 2"),
-    ],
-)
-def test_wrong_pairs_are_refused(options: dict[str, Any], message: str) -> None:
-    shapes = Shapes(np.array([1, 2]), np.zeros((2, 3)), np.ones((2, 3)), np.ones(2))
-    with pytest.raises(ValueError, match=message):
-        BodyCollision.build(two_sticks(), shapes, NONE, **options)
-
-
 def test_wrong_arguments_are_refused() -> None:
     collision, _ = collision_of(1)
     with pytest.raises(ValueError, match=r"q must have shape \(6, configurations\), was \(5, 2\)"):
         collision.collides(np.zeros((5, 2)))
     with pytest.raises(ValueError, match=r"q must have shape \(6, configurations\), was \(6,\)"):
         collision.clearance(np.zeros(6))
-    with pytest.raises(ValueError, match="limit must be a number, was nan"):
-        collision.clearance(np.zeros((6, 1)), np.nan)
     free = pin.Model()
     free.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")
-    shapes = Shapes(np.array([1]), np.zeros((1, 3)), np.zeros((1, 3)), np.ones(1))
     with pytest.raises(UnsupportedJoint):
-        BodyCollision.build(free, shapes, NONE)
+        kinematic_table(free)

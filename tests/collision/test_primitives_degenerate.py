@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.body_shapes import Shapes
+from collision.built_bodies import built
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
@@ -54,9 +54,10 @@ def clearance(
     joints: list[int], starts: Any, ends: Any, radii: Any, obstacles: tuple[Any, ...] = ()
 ) -> Any:
     """Clearances of shapes on a hinge at rest, and on the world beside it."""
-    shapes = Shapes(np.array(joints), np.array(starts), np.array(ends), np.array(radii))
+    columns = (np.array(column) for column in (joints, starts, ends, radii, joints))
+    shapes = Shapes(*columns)
     pairs = [(0, 1)] if len(joints) > 1 else []
-    collision = BodyCollision.build(hinge(), shapes, obstacle_table(obstacles), pairs)
+    collision = built(hinge(), shapes, obstacle_table(obstacles), pairs)
     return collision.clearance(np.zeros((1, 1)))
 
 

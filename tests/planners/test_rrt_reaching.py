@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from composed import composed
-from evoexp.collision.planar.link_ellipses import EllipseConfigurations
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
@@ -58,7 +57,7 @@ def test_configurations_are_judged_as_paths_that_stay(arm: str) -> None:
     _, problem = condition(arm).prepare()
     low, high = problem.joint_limits.T
     q = low[:, None] + (high - low)[:, None] * np.random.default_rng(1).random((len(low), 300))
-    found = EllipseConfigurations(problem.collision).collides(np.degrees(q))
+    found = problem.collision.collides(np.degrees(q))
     wanted = [problem.collision.contact(each, each) is not None for each in q.T]
     assert found.tolist() == wanted
     assert 20 < sum(wanted) < 280

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -196,5 +196,6 @@ def shapes_of(geometry: Any) -> Shapes:
     for item in geometry.geometryObjects:
         half = item.geometry.halfLength if isinstance(item.geometry, coal.Capsule) else 0.0
         center, along = item.placement.translation, half * item.placement.rotation[:, 2]
-        rows.append((item.parentJoint, center - along, center + along, item.geometry.radius))
+        joint, ends = item.parentJoint, (center - along, center + along)
+        rows.append((joint, *ends, item.geometry.radius, joint))
     return Shapes(*(np.array(column) for column in zip(*rows, strict=True)))

@@ -7,7 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import SphereObstacle
 
@@ -79,7 +79,8 @@ def shapes() -> Shapes:
             center.append((1.0 - f) * np.array(start) + f * np.array(end))
             radius.append(size)
     centers = np.array(center)
-    return Shapes(np.array(joint, dtype=np.int64), centers, centers, np.array(radius))
+    joints = np.array(joint, dtype=np.int64)
+    return Shapes(joints, centers, centers, np.array(radius), joints)
 
 
 def geometry(arm: Any) -> Any:

@@ -10,7 +10,6 @@ import pytest
 from evoexp.collision.body_table import body_table
 from evoexp.collision.motion_bounds import (
     approach_bounds,
-    configuration,
     joint_frames,
     joint_twists,
     pair_reaches,
@@ -203,7 +202,7 @@ def frames_and_twists(
 ) -> None:
     """Write frames and twists of all joints."""
     chain, q = KinematicChain(*fields), np.empty(coefficients.shape[1])
-    configuration(coefficients, u, q)
+    q[:] = coefficients[0] + u * (coefficients[1] + u * (coefficients[2] + u * coefficients[3]))
     joint_frames(chain, q, frames)
     joint_twists(chain, coefficients, u, frames, twists)
 

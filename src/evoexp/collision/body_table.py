@@ -64,15 +64,15 @@ class BodyTable(NamedTuple):
         flat = all(
             self.exact[k] and self.kind[k] in (SEGMENT, BOX, HULL, HALF_SPACE) for k in (one, two)
         )
-        closed = any(self._is_ball(k) or self.kind[k] == HALF_SPACE for k in (one, two))
+        closed = any(
+            self.kind[k] == HALF_SPACE or (self.kind[k] == SEGMENT and self.size[k, 0] == 0.0)
+            for k in (one, two)
+        )
         plain = all(self.kind[k] in (SEGMENT, BOX, CYLINDER, HALF_SPACE) for k in (one, two))
         half_space = (
             HALF_SPACE in (self.kind[one], self.kind[two]) and self.exact[one] and self.exact[two]
         )
         return FLAT_TOLERANCE if flat or half_space or (closed and plain) else ROUND_TOLERANCE
-
-    def _is_ball(self, body: int) -> bool:
-        return bool(self.kind[body] == SEGMENT and self.size[body, 0] == 0.0)
 
 
 NO_CORNERS = np.empty((0, 3))
@@ -143,7 +143,11 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
     if isinstance(shape, coal.Halfspace):
         normal = matrix_product(rotation, shape.n)
-        return _Core(HALF_SPACE, radius=swept), _with_z(normal), translation + normal * shape.d
+        # a rotation whose third column is the normal
+        x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
+        x /= np.sqrt((x * x).sum())
+        rotation = np.column_stack([x, np.cross(normal, x), normal])
+        return _Core(HALF_SPACE, radius=swept), rotation, translation + normal * shape.d
     if isinstance(shape, coal.Sphere):
         core = _Core(SEGMENT, radius=shape.radius + swept)
     elif isinstance(shape, coal.Capsule):
@@ -202,10 +206,3 @@ def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[
     from_origin = min(float(np.sqrt(squares.sum(axis=1).max())), float(np.sqrt(x + y + z)) + ball)
     from_axis = min(float(np.sqrt(squares[:, :2].sum(axis=1).max())), float(np.sqrt(x + y)) + ball)
     return from_origin + core.radius, from_axis + core.radius
-
-
-def _with_z(normal: FloatArray) -> FloatArray:
-    """Return a rotation whose third column is the unit vector `normal`."""
-    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
-    x /= np.sqrt((x * x).sum())
-    return np.column_stack([x, np.cross(normal, x), normal])

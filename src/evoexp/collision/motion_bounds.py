@@ -21,14 +21,6 @@ PARALLEL = 1e-12
 
 
 @inlined
-def configuration(coefficients: FloatArray, u: float, q: FloatArray) -> None:
-    """Write q (nq,) at u in [0, 1] on the segment of `coefficients` (4, nq), by Horner's rule."""
-    for k in range(len(q)):
-        c1, c2, c3 = coefficients[1, k], coefficients[2, k], coefficients[3, k]
-        q[k] = coefficients[0, k] + u * (c1 + u * (c2 + u * c3))
-
-
-@inlined
 def joint_frames(chain: KinematicChain, q: FloatArray, frames: FloatArray) -> None:
     """Write the frames of all joints (joints, FRAME) at one configuration q (nq,)."""
     rotation, translation = chain.rotation, chain.translation
@@ -68,13 +60,7 @@ def joint_twists(
     """Write the twists of the joints' frames (joints, 6), per u: turning ω, then a velocity v.
 
     v is the velocity of the point of the frame that is at the world's origin; a point x of the
-    frame moves at v + ω × x.
-
-    Args:
-        coefficients: (4, nq) of the segment.
-        u: Place on the segment, in [0, 1].
-        frames: (joints, FRAME) from `joint_frames` at u.
-        twists: Written.
+    frame moves at v + ω × x. The frames are those of `joint_frames` at u in [0, 1].
     """
     for k in range(len(chain.parent)):
         p, j = chain.parent[k], chain.index_q[k]
@@ -100,12 +86,7 @@ def joint_twists(
 
 @kernel
 def moved_by_one(chain: KinematicChain, joint: IntArray, pairs: IntArray) -> BoolArray:
-    """Return (pairs,) true where no joint carries both bodies.
-
-    Args:
-        joint: (bodies,) index of the joint that carries a body, −1 for none.
-        pairs: (pairs, 2) indices of bodies.
-    """
+    """Return (pairs,) true where no joint carries both bodies of a pair; see `reaches`."""
     out = np.ones(len(pairs), dtype=np.bool_)
     for pair in range(len(pairs)):
         a = joint[pairs[pair, 0]]
@@ -159,12 +140,7 @@ def reaches(
 
 @kernel
 def pair_reaches(pairs: IntArray, reach: FloatArray) -> FloatArray:
-    """Bound the change of a pair's distance by the speed of each joint, (pairs, joints).
-
-    Args:
-        pairs: (pairs, 2) indices of bodies.
-        reach: (bodies, joints) from `reaches`.
-    """
+    """Bound the change of a pair's distance by the speed of each joint, (pairs, joints)."""
     out = np.zeros((len(pairs), reach.shape[1]))
     for pair in range(len(pairs)):
         one, two = pairs[pair, 0], pairs[pair, 1]

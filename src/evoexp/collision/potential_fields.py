@@ -88,7 +88,11 @@ class PotentialFields(Component):
         )
         own = grid(closed)
         around = np.pad(unsafeness, 1, constant_values=self.obstacle_potentials[0])
-        return Fields(own, around.ravel(), self._goal_potentials(own.num_nodes), self.neighbourhood)
+        # the goal's potentials go on with the last difference
+        first = np.array([0.0, *self.goal_potentials])
+        steps = np.arange(1.0, max(own.num_nodes - len(first), 0) + 1.0)
+        potentials = np.append(first, steps * (first[-1] - first[-2]) + first[-1])
+        return Fields(own, around.ravel(), potentials, self.neighbourhood)
 
     def _unsafeness(self, blocked: np.ndarray) -> FloatArray:
         """Return the unsafeness of every node, in the shape of the grid."""
@@ -100,9 +104,3 @@ class PotentialFields(Component):
         table = np.array(self.obstacle_potentials)
         inside = (slice(1, -1),) * blocked.ndim
         return np.asarray(table[np.minimum(steps[inside], len(table) - 1)])
-
-    def _goal_potentials(self, count: int) -> FloatArray:
-        """Return the potentials after 0 … count − 1 steps."""
-        own = np.array([0.0, *self.goal_potentials])
-        further = np.arange(1.0, max(count - len(own), 0) + 1.0) * (own[-1] - own[-2]) + own[-1]
-        return np.concatenate([own, further])

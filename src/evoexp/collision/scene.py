@@ -6,7 +6,6 @@ motions and threads.
 """
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,8 +30,6 @@ from evoexp.scenarios.obstacles import (
     obstacle_hulls,
     obstacle_table,
 )
-
-NO_HULLS: Mapping[int, FloatArray] = MappingProxyType({})
 
 
 class AllowedContact(NamedTuple):
@@ -110,8 +107,7 @@ def scene(
         table, hulls = obstacles, {}
     else:
         table, hulls = obstacle_table(obstacles), obstacle_hulls(obstacles)
-    geometry = pin.GeometryModel()
-    counts = [0] * assembly.num_arms
+    geometry, counts = pin.GeometryModel(), [0] * assembly.num_arms
     bodies = list(assembly.geometry.geometryObjects)
     arms = assembly.body_arms
     for k, (arm, item) in enumerate(zip(arms, bodies, strict=True)):
@@ -169,7 +165,7 @@ def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = Non
 
 
 def obstacle_shapes(
-    table: ObstacleTable, hulls: Mapping[int, FloatArray] = NO_HULLS
+    table: ObstacleTable, hulls: Mapping[int, FloatArray] | None = None
 ) -> list[tuple[Any, Any]]:
     """Return every obstacle as a coal shape and its placement, a `pin.SE3`.
 
@@ -181,7 +177,7 @@ def obstacle_shapes(
     """
     shapes: list[tuple[Any, Any]] = []
     for k, (kind, center, rotation, (a, b, c)) in enumerate(zip(*table, strict=True)):
-        if k in hulls:
+        if hulls and k in hulls:
             found = hull_of(hulls[k])
             if found is None:
                 must = "points that lie in no plane"

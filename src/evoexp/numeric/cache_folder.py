@@ -5,6 +5,7 @@ user. A file begins with a hash of its name and content, and counts as missing i
 """
 
 import atexit
+import contextlib
 import functools
 import os
 import shutil
@@ -22,7 +23,7 @@ _OTHERS_MAY_WRITE = 0o022  # bits of a folder's mode
 
 
 class Damaged(Exception):
-    """A file that is not as it was written, or that another user wrote."""
+    """A file that is missing, not as it was written, or another user's."""
 
 
 def cache_root() -> Path:
@@ -36,11 +37,17 @@ def _settled(named: str) -> Path:
     if folder.is_absolute() or VARIABLE in os.environ:
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            reason = _made_private(folder)
+            if not is_own(folder):
+                reason = "belongs to another user, whose files are not run"
+            elif not os.access(folder, os.W_OK | os.X_OK):
+                reason = "cannot be written"
+            else:
+                mode = folder.stat().st_mode
+                if mode & _OTHERS_MAY_WRITE:
+                    folder.chmod(mode & ~_OTHERS_MAY_WRITE & 0o777)
+                return folder
         except OSError as error:
             reason = error.strerror or str(error)
-        if not reason:
-            return folder
     temporary = Path(tempfile.mkdtemp(prefix="evoexp-"))
     os.environ[VARIABLE] = str(temporary)  # worker processes inherit it
     remove_at_exit(temporary)
@@ -60,18 +67,6 @@ def remove_at_exit(folder: Path) -> None:
     atexit.register(remove)
 
 
-def _made_private(folder: Path) -> str:
-    """Take others' permission to write; return why a folder cannot be used, or nothing."""
-    if not is_own(folder):
-        return "belongs to another user, whose files are not run"
-    if not os.access(folder, os.W_OK | os.X_OK):
-        return "cannot be written"
-    mode = folder.stat().st_mode
-    if mode & _OTHERS_MAY_WRITE:
-        folder.chmod(mode & ~_OTHERS_MAY_WRITE & 0o777)
-    return ""
-
-
 def is_own(path: Path) -> bool:
     """Return whether a file or folder is this user's; where nobody owns files, all are."""
     return not hasattr(os, "geteuid") or path.stat().st_uid == os.geteuid()
@@ -81,15 +76,11 @@ def read_kept(path: Path) -> bytes:
     """Return the content of a kept file.
 
     Raises:
-        FileNotFoundError: If it is not there.
-        Damaged: If it is not as it was written, or not this user's.
+        Damaged: If it is missing, not as it was written, or not this user's.
     """
-    try:
+    content = b""
+    with contextlib.suppress(OSError):
         content = path.read_bytes() if is_own(path) else b""
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise FileNotFoundError(path) from error
-    except OSError as error:
-        raise Damaged(path) from error
     if content[:_SIZE] != _hash(path, content[_SIZE:]):
         raise Damaged(path)
     return content[_SIZE:]
@@ -105,8 +96,6 @@ def write_kept(path: Path, content: bytes) -> None:
     temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}.tmp")
     try:
         temporary.write_bytes(_hash(path, content) + content)
-        if path.is_dir():  # put there by somebody else: no file can take its place
-            shutil.rmtree(path)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)

@@ -76,9 +76,8 @@ class KernelAddress(numba.types.WrapperAddressProtocol):
         return self._signature
 
 
-def intrinsic(function: Callable[..., Any]) -> Any:
-    """Return numba's intrinsic; kernels call it without the typing context that it begins with."""
-    return numba.extending.intrinsic(function)
+intrinsic: Callable[..., Any] = numba.extending.intrinsic
+"""numba's decorator; kernels call such a function without its first argument."""
 
 
 def _borrow(typing_context: Any, value: Any) -> Any:
@@ -89,20 +88,16 @@ def _borrow(typing_context: Any, value: Any) -> Any:
 
 
 def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """Return a value whose pointers to its owner are null, and those of its items to any depth."""
+    fields: tuple[str, ...] = ()
     if isinstance(kind, types.Array):
-        return _without(context, builder, kind, value, "meminfo", "parent")
-    if isinstance(kind, types.NumPyRandomGeneratorType):
-        return _without(context, builder, kind, value, "meminfo")
-    if isinstance(kind, types.BaseTuple):
-        items: Any = kind
-        for k, item in enumerate(items):
+        fields = ("meminfo", "parent")
+    elif isinstance(kind, types.NumPyRandomGeneratorType):
+        fields = ("meminfo",)
+    elif isinstance(kind, types.BaseTuple):
+        for k, item in enumerate(cast(Any, kind)):
             part = _without_owner(context, builder, item, builder.extract_value(value, k))
             value = builder.insert_value(value, part, k)
-    return value
-
-
-def _without(context: Any, builder: Any, kind: Any, value: Any, *fields: str) -> Any:
-    """Return a value of a structure whose fields, pointers, are null."""
     model = context.data_model_manager[kind]
     for field in fields:
         null = cgutils.get_null_value(model.get(builder, value, field).type)
@@ -110,22 +105,17 @@ def _without(context: Any, builder: Any, kind: Any, value: Any, *fields: str) ->
     return value
 
 
-def _viewing(num_widths: int) -> Any:
-    """Return a function for kernels that views part of a flat array, with rows or without."""
-
+def _view(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        whole, first, *shape = arguments
+        whole, first, count = arguments
         data = context.make_array(signature.args[0])(context, builder, whole).data
-        itemsize, num_items = context.get_constant(types.intp, 8), shape[0]
-        for width in shape[1:]:
-            num_items = builder.mul(num_items, width)
-        strides = [*(builder.mul(width, itemsize) for width in shape[1:]), itemsize]
+        itemsize = context.get_constant(types.intp, 8)
         fields = {
             "data": builder.gep(data, [first]),
-            "nitems": num_items,
+            "nitems": count,
             "itemsize": itemsize,
-            "shape": cgutils.pack_array(builder, shape),
-            "strides": cgutils.pack_array(builder, strides),
+            "shape": cgutils.pack_array(builder, [count]),
+            "strides": cgutils.pack_array(builder, [itemsize]),
         }
         model = context.data_model_manager[signature.return_type]
         view = cgutils.get_null_value(model.get_value_type())  # no owner
@@ -133,26 +123,16 @@ def _viewing(num_widths: int) -> Any:
             view = model.set(builder, view, value, field)
         return view
 
-    def flat(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
-        return types.Array(array.dtype, 1, "C")(array, types.intp, types.intp), generate
-
-    def rows(typing_context: Any, array: Any, first: Any, count: Any, width: Any) -> Any:
-        view = types.Array(array.dtype, 2, "C")
-        return view(array, types.intp, types.intp, types.intp), generate
-
-    return intrinsic(rows if num_widths else flat)
+    return types.Array(array.dtype, 1, "C")(array, types.intp, types.intp), generate
 
 
-view_part: Callable[..., Any] = _viewing(0)
+view_part: Callable[..., Any] = intrinsic(_view)
 """Return part of a flat contiguous array of eight-byte items, as a view that owns nothing.
 
 Its arguments: the array, the place of the first item, how many. Nothing is checked. It takes the
 time of an addition; numba's slices take some 20 ns. An array born in a kernel must be used once
 more behind the last use of its views.
 """
-
-view_rows: Callable[..., Any] = _viewing(1)
-"""Return rows in a flat array: as `view_part`, the width of a row as fourth argument."""
 
 
 def _copy(typing_context: Any, source: Any, first: Any, out: Any, at: Any, count: Any) -> Any:

@@ -337,40 +337,24 @@ def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> 
     rng = borrowed(rng)
     num_pairs = (out.size + 1) // 2
     pairs = np.empty(2 * num_pairs)
-    s = np.empty(num_pairs)
+    squares = np.empty(num_pairs)
+    # uniform points in the unit disc
     i = 0
     while i < num_pairs:
         u = 2.0 * rng.random() - 1.0
         v = 2.0 * rng.random() - 1.0
         pairs[2 * i] = u
         pairs[2 * i + 1] = v
-        s[i] = u * u + v * v
-        i += 1 if 0.0 < s[i] < 1.0 else 0
-    scale_to_normal(pairs, s, out)
-
-
-@kernel
-def scale_to_normal(
-    pairs: NDArray[np.float64], squares: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    """Write standard normal deviates of points in the unit disc (Marsaglia & Bray 1964).
-
-    Args:
-        pairs: (≥ n) coordinates of uniform points, pair by pair.
-        squares: (≥ n / 2) their squared distances from the centre, in (0, 1); overwritten.
-        out: (n,) written.
-    """
-    for i in range(len(squares)):
+        squares[i] = u * u + v * v
+        i += 1 if 0.0 < squares[i] < 1.0 else 0
+    for i in range(num_pairs):
         squares[i] = math.sqrt(-2.0 * log(squares[i]) / squares[i])
     for i in range(out.size):
         out[i] = pairs[i] * squares[i // 2]
 
 
 def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> NDArray[np.float64]:
-    """Draw standard normal deviates, the same bits everywhere, from `random()` alone.
-
-    The polar method of Marsaglia & Bray 1964. (numpy's `Generator.normal` calls libm, which differs
-    between machines.)
+    """Draw standard normal deviates by the polar method of Marsaglia & Bray 1964, from `random()`.
 
     Args:
         rng: Advanced by 2 uniforms per attempt; an attempt yields a pair of deviates with

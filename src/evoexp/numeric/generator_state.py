@@ -1,14 +1,11 @@
 """The state of a numpy PCG64 as bytes, as the digests of replicates take it."""
 
 from collections.abc import Iterable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645  # of a PCG64
 STATE_SIZE = 16  # [B] of `state_bytes`: those of the state itself, which come first
-_MASK = 2**128 - 1
 
 
 def state_bytes(bit_generator: Any) -> bytes:
@@ -35,32 +32,20 @@ def state_bytes(bit_generator: Any) -> bytes:
 def states_behind(state: bytes, counts: Iterable[int]) -> list[bytes]:
     """Return the states behind some steps that draw numbers each.
 
-    A step of many numbers is one multiplication and one addition, as each number is (Brown 1994).
-
     Args:
         state: Where the first step begins, see `state_bytes`.
         counts: Numbers that each step draws.
     """
-    number, rest = int.from_bytes(state[:STATE_SIZE], "little"), state[STATE_SIZE:]
-    increment = int.from_bytes(rest[:STATE_SIZE], "little")
+    number, rest = state[:STATE_SIZE], state[STATE_SIZE:]
+    words = [int.from_bytes(part, "little") for part in (number, rest[:STATE_SIZE])]
+    generator = np.random.PCG64(0)
+    named: Any = dict(zip(("state", "inc"), words, strict=True))
+    generator.state = {"bit_generator": "PCG64", "state": named, "has_uint32": 0, "uinteger": 0}
     states = []
     for count in counts:
-        factor, addend = _jump(count, increment)
-        number = (number * factor + addend) & _MASK
-        states.append(number.to_bytes(STATE_SIZE, "little") + rest)
+        generator.advance(int(count))
+        states.append(state_bytes(generator)[:STATE_SIZE] + rest)
     return states
-
-
-@lru_cache(maxsize=64)
-def _jump(count: int, increment: int) -> tuple[int, int]:
-    """Return factor and addend of `count` steps of a PCG64 at once."""
-    factor, addend, power, power_addend = 1, 0, MULTIPLIER, increment
-    while count:
-        if count & 1:
-            factor, addend = factor * power & _MASK, (addend * power + power_addend) & _MASK
-        power, power_addend = power * power & _MASK, power_addend * (power + 1) & _MASK
-        count >>= 1
-    return factor, addend
 
 
 def demand_pcg64(bit_generator: Any) -> None:

@@ -4,8 +4,8 @@ A folder's name is a hash of all that a kernel is made of: evoexp's sources, tho
 a guest's kernel, numba, llvmlite and the processor. So an edit compiles kernels again.
 
 numba reads its files as they are: a damaged one would end in a traceback, or run as machine code.
-So files are listed with their checksums when they are written, and those that are not as they were
-listed are removed before the first kernel of a folder is loaded.
+So files are listed with their checksums when they are written. Where one is not as it was listed,
+all files of its folder are removed before the first kernel is loaded from there.
 """
 
 import contextlib
@@ -37,8 +37,7 @@ ROOMS_ABOVE = frozenset(
     {"batch", "commands", "configuration", "papers", "playback", "report", "testing", "assets"}
 )
 _OWN = __name__.split(".")[0]
-_STATES: dict[Path, tuple[int, int] | None] = {}  # of the sources, when they were hashed
-_KINDS = (".nbi", ".nbc")  # numba's files: indices, machine code
+_STATES: dict[str, list[tuple[Path, int]]] = {}  # of packages' sources, when they were hashed
 
 
 @contextlib.contextmanager
@@ -47,7 +46,10 @@ def kept_kernels(function: Callable[..., Any]) -> Iterator[bool]:
 
     numba looks at its settings where a kernel is defined, and they are as before afterwards.
     """
-    folder = None if function.__name__ == "<lambda>" else _folder_of(function)  # lines may be alike
+    callees = [value for value in function.__globals__.values() if hasattr(value, "py_func")]
+    packages = {each.__module__.split(".")[0] for each in (function, *callees)} | {_OWN}
+    is_lambda = function.__name__ == "<lambda>"  # lines may be alike
+    folder = None if is_lambda else _folder_of(frozenset(packages))
     if folder is None:
         yield False
         return
@@ -60,28 +62,18 @@ def kept_kernels(function: Callable[..., Any]) -> Iterator[bool]:
         config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
 
 
-def _folder_of(function: Callable[..., Any]) -> Path | None:
-    """Return the folder for a function; None if its sources or a place to write are missing."""
-    callees = [value for value in function.__globals__.values() if hasattr(value, "py_func")]
-    modules = {each.__module__ for each in (function, *callees)}
-    packages = frozenset(module.split(".")[0] for module in modules) | {_OWN}
-    try:
-        root = cache_root() / "kernels"
-        return _made(root, _key(packages))
-    except OSError:
-        return None
-
-
 @functools.cache
-def _made(root: Path, name: str) -> Path | None:
-    """Return a folder for kernels that was made, and remove old ones; None on a full disk."""
-    folder = root / name
-    folder.mkdir(parents=True, exist_ok=True)
-    if shutil.disk_usage(folder).free < LEAST_ROOM:
-        return None
-    os.utime(folder)
-    remove_old(root)
-    return folder
+def _folder_of(packages: frozenset[str]) -> Path | None:
+    """Make the folder for kernels of some packages; None without sources or a place to write."""
+    with contextlib.suppress(OSError):
+        root = cache_root() / "kernels"
+        folder = root / _key(packages)
+        folder.mkdir(parents=True, exist_ok=True)
+        if shutil.disk_usage(folder).free >= LEAST_ROOM:
+            os.utime(folder)
+            remove_old(root)
+            return folder
+    return None
 
 
 def remove_old(root: Path) -> None:
@@ -93,7 +85,6 @@ def remove_old(root: Path) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
 
 
-@functools.cache
 def _key(packages: frozenset[str]) -> str:
     """Return the hash of some packages' sources, the compilers' versions and the processor."""
     compilers = sys.version, numba.__version__, llvmlite.__version__
@@ -112,42 +103,27 @@ def sources_key(package: str = _OWN) -> str:
     Raises:
         OSError: If there are none, as for what is typed into an interpreter.
     """
-    key = hashlib.sha256()
-    for path in sorted(_sources(package)):
-        _STATES[path] = _state(path)
+    key, _STATES[package] = hashlib.sha256(), _states(package)
+    for path, _ in _STATES[package]:
         key.update(f"{path.name}\0".encode())
         key.update(path.read_bytes())
     return key.hexdigest()
 
 
-def _state(path: Path) -> tuple[int, int] | None:
-    """Return when a file was changed, and its size; None if it is not there."""
-    with contextlib.suppress(OSError):
-        status = path.stat()
-        return status.st_mtime_ns, status.st_size
-    return None
-
-
-def _are_edited() -> bool:
-    """Return whether sources changed since they were hashed: other ones may be loaded by now."""
-    return any(_state(path) != state for path, state in _STATES.items())
-
-
-def _sources(package: str) -> Iterator[Path]:
-    """Yield the Python files of a package; for a module, those in its folder."""
-    module = sys.modules[package]
-    if file := getattr(module, "__file__", None):
-        folders = [Path(file).parent]
+def _states(package: str) -> list[tuple[Path, int]]:
+    """Return the Python files of a package, or of a module's folder, and when each was changed."""
+    module, paths = sys.modules[package], list[Path]()
+    if hasattr(module, "__path__"):
+        for folder in map(Path, module.__path__):
+            hidden = ROOMS_ABOVE if package == _OWN else frozenset[str]()
+            paths += folder.glob("*.py")
+            for room in folder.glob("*/"):
+                paths += room.rglob("*.py") if room.name not in hidden else []
+    elif module.__dict__.get("__file__") is not None:
+        paths += Path(str(module.__file__)).parent.glob("*.py")
     else:
-        folders = [Path(each) for each in getattr(module, "__path__", ())]  # without __init__.py
-    if not folders:
         raise FileNotFoundError(package)
-    is_package = hasattr(module, "__path__")
-    for folder in folders:
-        for place, rooms, files in os.walk(folder):
-            hidden = ROOMS_ABOVE if package == _OWN and Path(place) == folder else frozenset[str]()
-            rooms[:] = sorted(set(rooms) - hidden) if is_package else []
-            yield from (Path(place) / name for name in files if name.endswith(".py"))
+    return [(path, path.stat().st_mtime_ns) for path in sorted(paths)]
 
 
 class Checksums(event.Listener):
@@ -158,20 +134,17 @@ class Checksums(event.Listener):
 
     def __init__(self) -> None:
         """Know no folder."""
-        self._lines: dict[Path, set[str]] = {}  # of the list of each folder
-        self._states = set[tuple[str, int, int]]()  # of files that are listed
-        self._writing: list[tuple[Path, contextlib.ExitStack]] = []
+        self._checked = set[Path]()
+        self._writing: list[tuple[Path, Any]] = []  # folders, and the lock of each
 
     def check(self, folder: Path) -> None:
-        """Remove the files of a folder that are not as they were listed; looked at once."""
-        if folder in self._lines:
-            return
-        self._lines[folder] = set(_read_list(folder))
-        if self._unlisted(folder):
-            with _locked(folder):
-                self._lines[folder] = set(_read_list(folder))
-                for path, _ in self._unlisted(folder):
-                    _remove(path)
+        """Remove the files of a folder if one is not as it was listed; looked at once."""
+        if folder not in self._checked and _unlisted(folder):
+            lock = _locked(folder)
+            if _unlisted(folder):
+                shutil.rmtree(folder, ignore_errors=True)
+            lock.release()
+        self._checked.add(folder)
 
     def on_start(self, event: Any) -> None:
         """Do nothing."""
@@ -180,40 +153,16 @@ class Checksums(event.Listener):
         """Lock a folder before a kernel is written to it; then list its files."""
         if event.kind == "numba:compile":
             folder = Path(event.data["dispatcher"].stats.cache_path or "")
-            if folder in self._lines:
-                lock = contextlib.ExitStack()
-                lock.enter_context(_locked(folder))
-                self._writing.append((folder, lock))
+            if folder in self._checked:
+                self._writing.append((folder, _locked(folder)))
             return
         while self._writing:
             folder, lock = self._writing.pop()
-            with lock, contextlib.suppress(OSError):
-                if not _are_edited():
-                    self.list_new(folder)
-
-    def list_new(self, folder: Path) -> None:
-        """Append the files of a folder that are new or changed to its list."""
-        lines = [line for _, line in self._unlisted(folder)]
-        with open(folder / LIST, "a", encoding="utf-8") as file:
-            file.write("".join(f"{line}\n" for line in lines))
-        self._lines[folder].update(lines)
-
-    def _unlisted(self, folder: Path) -> list[tuple[Path, str]]:
-        """Return numba's files that are not as they were listed, and their lines in the list."""
-        unlisted = []
-        for entry in os.scandir(folder):
-            if not entry.name.endswith(_KINDS):
-                continue
-            status = entry.stat()
-            state = entry.path, status.st_mtime_ns, status.st_size
-            if state in self._states:
-                continue
-            line = f"{_checksum(Path(entry.path))} {entry.name}"
-            if line in self._lines[folder]:
-                self._states.add(state)
-            else:
-                unlisted.append((Path(entry.path), line))
-        return unlisted
+            with contextlib.suppress(OSError):
+                # sources that changed since they were hashed may have been loaded by now
+                if all(_states(package) == states for package, states in _STATES.items()):
+                    list_files(folder)
+            lock.release()
 
 
 CHECKSUMS = Checksums()
@@ -221,32 +170,26 @@ for _kind in ("numba:compile", "numba:compiler_lock"):
     event.register(_kind, CHECKSUMS)
 
 
-def _read_list(folder: Path) -> list[str]:
-    path = folder / LIST
-    content = path.read_bytes() if path.is_file() and is_own(path) else b""
-    return content.decode(errors="replace").splitlines()
+def list_files(folder: Path) -> None:
+    """Append the files of a folder that are new or changed to its list."""
+    lines = sorted(_unlisted(folder))
+    with open(folder / LIST, "a", encoding="utf-8") as file:
+        file.write("".join(f"{line}\n" for line in lines))
 
 
-def _checksum(path: Path) -> str:
-    """Return the checksum of a file; none of what is no file of this user."""
-    if not path.is_file() or not is_own(path):
-        return "none"
-    return xxhash.xxh3_128_hexdigest(path.read_bytes())
+def _unlisted(folder: Path) -> set[str]:
+    """Return the lines of numba's files that are not in this user's list of a folder."""
+    path, files = folder / LIST, folder.glob("*.nb[ic]")  # indices and machine code
+    lines = {f"{xxhash.xxh3_128_hexdigest(file.read_bytes())} {file.name}" for file in files}
+    listed = path.read_text(errors="replace") if path.is_file() and is_own(path) else ""
+    return lines - set(listed.splitlines())
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Let no other process write to a folder meanwhile; a lock that cannot be had is no reason."""
+def _locked(folder: Path) -> Any:
+    """Let no other process write to a folder; a lock that cannot be had is no reason to fail."""
     from filelock import FileLock, Timeout  # only what compiles needs it
 
-    with contextlib.ExitStack() as lock:
-        with contextlib.suppress(OSError, Timeout):
-            lock.enter_context(FileLock(folder / "lock").acquire(timeout=PATIENCE_S))
-        yield
+    lock = FileLock(folder.with_suffix(".lock"))
+    with contextlib.suppress(OSError, Timeout):
+        lock.acquire(timeout=PATIENCE_S)
+    return lock

@@ -49,9 +49,6 @@ def _interleaved(builder: Any, rows: list[Any], width: int) -> list[Any]:
 
 @intrinsic
 def _transpose(typing_context: Any, rows: Any) -> Any:
-    if rows != types.UniTuple(vector_type, LANES):
-        raise TypingError(f"must be eight vectors, is {rows}")
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values = [builder.extract_value(arguments[0], k) for k in range(LANES)]
         for width in (1, 2, 4):
@@ -126,7 +123,7 @@ def _load_each(typing_context: Any, array: Any, places: Any, at: Any, offset: An
 def _count(
     typing_context: Any, array: Any, places: Any, at: Any, offset: Any, limits: Any, num: Any
 ) -> Any:
-    if not isinstance(num, types.IntegerLiteral):
+    if not isinstance(num, types.IntegerLiteral):  # numba then asks again with its value
         raise TypingError("num must be a constant")
     # the bits of the numbers that count, of every lane
     last = (0xFF << (LANES - num.literal_value)) & 0xFF

@@ -26,10 +26,6 @@ from evoexp.numeric.compilation import inlined, intrinsic
 
 LANES = 8
 
-_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
-_WORDS = ir.VectorType(ir.IntType(64), LANES)
-_BITS = ir.VectorType(ir.IntType(1), LANES)
-
 
 class Mask(Protocol):
     """Eight truth values, of a comparison of vectors."""
@@ -59,14 +55,17 @@ class Vector(Protocol):
 class _VectorType(types.Type):
     """numba's type of one kind of vector."""
 
-    @property
-    def lanes(self) -> ir.VectorType:
-        """LLVM's type of it."""
-        return _LLVM_TYPES[self.name]
+    lanes: ir.VectorType  # LLVM's type of it
+
+    def __init__(self, name: str, item: ir.Type) -> None:
+        super().__init__(name)
+        self.lanes = ir.VectorType(item, LANES)
 
 
-_LLVM_TYPES = {"vector8": _DOUBLES, "words8": _WORDS, "mask8": _BITS}
-vector_type, word_type, mask_type = map(_VectorType, _LLVM_TYPES)
+vector_type = _VectorType("vector8", ir.DoubleType())
+word_type = _VectorType("words8", ir.IntType(64))
+mask_type = _VectorType("mask8", ir.IntType(1))
+_DOUBLES = vector_type.lanes
 
 
 @register_model(_VectorType)
@@ -77,8 +76,11 @@ class _VectorModel(models.PrimitiveModel):
         super().__init__(manager, kind, kind.lanes)
 
 
-def _spread(builder: Any, value: Any, lanes: ir.VectorType) -> Any:
-    """Return a vector of one scalar in every lane."""
+def _spread(builder: Any, value: Any, kind: Any) -> Any:
+    """Return a vector of one scalar in every lane; a vector as it is."""
+    lanes = kind.lanes
+    if isinstance(value.type, ir.VectorType):
+        return value
     if isinstance(value, ir.Constant):
         return ir.Constant(lanes, [value.constant] * LANES)
     nothing = ir.Constant(lanes, ir.Undefined)
@@ -95,65 +97,52 @@ def _define(
     instruction: Callable[[Any, Any, Any], Any],
 ) -> None:
     """Define an operator for two vectors, and for a vector and a scalar on either side."""
+    kinds = (vector, vector), (vector, scalar), (scalar, vector)
 
     class Operator(ConcreteTemplate):
-        cases = [  # noqa: RUF012 (numba reads a list)
-            signature(result, *pair)
-            for pair in ((vector, vector), (vector, scalar), (scalar, vector))
-        ]
+        cases = [signature(result, *pair) for pair in kinds]  # noqa: RUF012 (numba reads a list)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return instruction(builder, *(_spread(builder, value, vector) for value in arguments))
 
     infer_global(operation)(Operator)
-
-    def both(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return instruction(builder, *arguments)
-
-    def scalar_last(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        one, two = arguments
-        return instruction(builder, one, _spread(builder, two, vector.lanes))
-
-    def scalar_first(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        one, two = arguments
-        return instruction(builder, _spread(builder, one, vector.lanes), two)
-
-    lower_builtin(operation, vector, vector)(both)
-    lower_builtin(operation, vector, scalar)(scalar_last)
-    lower_builtin(operation, scalar, vector)(scalar_first)
+    for pair in kinds:
+        lower_builtin(operation, *pair)(generate)
 
 
-def _define_operators() -> None:
-    arithmetic = {
-        operator.add: ir.IRBuilder.fadd,
-        operator.sub: ir.IRBuilder.fsub,
-        operator.mul: ir.IRBuilder.fmul,
-        operator.truediv: ir.IRBuilder.fdiv,
-    }
-    of_words = {
-        operator.add: ir.IRBuilder.add,
-        operator.and_: ir.IRBuilder.and_,
-        operator.xor: ir.IRBuilder.xor,
-        operator.lshift: ir.IRBuilder.shl,
-    }
-    for operation, instruction in arithmetic.items():
-        _define(operation, vector_type, types.float64, vector_type, instruction)
-    for operation, instruction in of_words.items():
-        _define(operation, word_type, types.int64, word_type, instruction)
-
-    def comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
-        return lambda builder, one, two: builder.fcmp_ordered(sign, one, two)
-
-    def unequal(builder: Any, one: Any, two: Any) -> Any:
-        return builder.icmp_signed("!=", one, two)
-
-    comparisons = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
-    for sign, operation in comparisons.items():
-        _define(operation, vector_type, types.float64, mask_type, comparison(sign))
-    _define(operator.eq, vector_type, types.float64, mask_type, comparison("=="))
-    _define(operator.ne, word_type, types.int64, mask_type, unequal)
-    _define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
-    _define(operator.or_, mask_type, types.boolean, mask_type, ir.IRBuilder.or_)
+def _comparison(sign: str) -> Callable[[Any, Any, Any], Any]:
+    return lambda builder, one, two: builder.fcmp_ordered(sign, one, two)
 
 
-_define_operators()
+def _unequal(builder: Any, one: Any, two: Any) -> Any:
+    return builder.icmp_signed("!=", one, two)
+
+
+for _operation, _instruction in {
+    operator.add: ir.IRBuilder.fadd,
+    operator.sub: ir.IRBuilder.fsub,
+    operator.mul: ir.IRBuilder.fmul,
+    operator.truediv: ir.IRBuilder.fdiv,
+}.items():
+    _define(_operation, vector_type, types.float64, vector_type, _instruction)
+for _operation, _instruction in {
+    operator.add: ir.IRBuilder.add,
+    operator.and_: ir.IRBuilder.and_,
+    operator.xor: ir.IRBuilder.xor,
+    operator.lshift: ir.IRBuilder.shl,
+}.items():
+    _define(_operation, word_type, types.int64, word_type, _instruction)
+for _sign, _operation in {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+}.items():
+    _define(_operation, vector_type, types.float64, mask_type, _comparison(_sign))
+_define(operator.ne, word_type, types.int64, mask_type, _unequal)
+_define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
+_define(operator.or_, mask_type, types.boolean, mask_type, ir.IRBuilder.or_)
 
 
 def _check_array(array: Any) -> None:
@@ -196,7 +185,7 @@ def _store(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
 @intrinsic
 def _spread_scalar(typing_context: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _spread(builder, arguments[0], _DOUBLES)
+        return _spread(builder, arguments[0], vector_type)
 
     return vector_type(types.float64), generate  # of an int, too
 
@@ -210,28 +199,12 @@ def _select(typing_context: Any, condition: Any, one: Any, two: Any) -> Any:
 
 
 @intrinsic
-def _mask_bits(typing_context: Any, mask: Any) -> Any:
+def _any_lane(typing_context: Any, mask: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         word = builder.bitcast(arguments[0], ir.IntType(LANES))
-        return builder.zext(word, ir.IntType(64))
+        return builder.icmp_unsigned("!=", word, ir.Constant(word.type, 0))
 
-    return types.int64(mask_type), generate
-
-
-@intrinsic
-def _least_lane(typing_context: Any, vector: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        (value,), index, half = arguments, ir.IntType(32), LANES // 2
-        while half > 0:  # the upper half of the lanes that are left onto the lower one
-            order = [(lane + half) % LANES for lane in range(LANES)]
-            moved = builder.shuffle_vector(
-                value, value, ir.Constant(ir.VectorType(index, LANES), order)
-            )
-            value = builder.select(builder.fcmp_ordered("<", moved, value), moved, value)
-            half //= 2
-        return builder.extract_element(value, ir.Constant(index, 0))
-
-    return types.float64(vector_type), generate
+    return types.boolean(mask_type), generate
 
 
 def _of_llvm(name: str) -> Any:
@@ -282,11 +255,8 @@ spread: Callable[[float], Vector] = _spread_scalar
 select: Callable[[Any, Any, Any], Any] = _select
 """Return the first value in lanes where a condition holds, the second in the others."""
 
-mask_bits: Callable[[Mask], int] = _mask_bits
-"""Return the lanes in which a condition holds as the bits of a whole number, the first lowest."""
-
-least_lane: Callable[[Vector], float] = _least_lane
-"""Return the least number of a vector without NaN."""
+any_lane: Callable[[Mask], bool] = _any_lane
+"""Return whether a condition holds in any lane."""
 
 root: Callable[[Vector], Vector] = _of_llvm("sqrt")
 """Return the square root of every lane, correctly rounded."""
@@ -323,9 +293,3 @@ def upper(one: Vector, two: Vector) -> Vector:
     """Return the greater of two numbers, lane by lane; the first where either is NaN."""
     found: Vector = select(one < two, two, one)
     return found
-
-
-@inlined
-def any_lane(mask: Mask) -> bool:
-    """Return whether a condition holds in any lane."""
-    return mask_bits(mask) != 0

@@ -1,26 +1,24 @@
 """Robots as spheres and capsules in space, among obstacles of all kinds.
 
 Any Pinocchio model whose joints have one coordinate, any number of arms; planar arms are trees with
-z = 0. A body is all shapes that move with one joint, unless the shapes name their bodies. Angles
-are radians here, as in Pinocchio.
+z = 0. Angles are radians here, as in Pinocchio.
 """
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
-from evoexp.collision.bodies.body_shapes import Pairs, Shapes, arms_of_joints, default_pairs
 from evoexp.collision.bodies.body_tables import FlatTables, flattened, named_tables
 from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.collision.bodies.contact_kernels import find_contacts
-from evoexp.collision.bodies.packing import pack_tables
+from evoexp.collision.bodies.packing import BodyPair, Shapes, pack_tables
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.numeric.vectors import LANES
 from evoexp.records import BoolArray, FloatArray
-from evoexp.robots.kinematics import KinematicTable, kinematic_table
+from evoexp.robots.kinematics import KinematicTable
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 
 
@@ -87,65 +85,48 @@ class FreeTest(NamedTuple):
         return cls(_address(function, kinds), tables)
 
 
-@functools.cache
-def _address(function: Callable[..., int], kinds: Any) -> KernelAddress:
-    return KernelAddress(function, kinds)
+_address = functools.cache(KernelAddress)
 
 
 class BodyCollision(NamedTuple):
     """Spheres and capsules on one robot, the obstacles around it, and the pairs to be checked."""
 
-    table: KinematicTable  # the kinematic table of the model
     tables: FlatTables  # robot, obstacles and pairs, as kernels take them
-    only_spheres: bool  # whether no shape is a capsule
+    nq: int  # coordinates of the robot
 
     @classmethod
     def build(
         cls,
-        model: Any,
+        table: KinematicTable,
         shapes: Shapes,
         obstacles: ObstacleTable,
-        pairs: Pairs | None = None,
-        ignored: Pairs = (),
-        arms: Sequence[int] | None = None,
-        table: KinematicTable | None = None,
+        pairs: Iterable[BodyPair],
+        ignored: Iterable[BodyPair] = (),
+        arms: Sequence[int] = (),
     ) -> "BodyCollision":
         """Return the collision model of a robot among obstacles, ready for batches.
 
         Args:
-            model: `pin.Model` whose joints have one coordinate each.
+            table: The robot's kinematic table.
             shapes: Its spheres and capsules; those of the world (a pedestal) are checked against
                 bodies only.
-            pairs: Bodies that are checked against each other, by their numbers (the joints', unless
-                shapes have others); `default_pairs` if not given.
+            pairs: Numbers of bodies that are checked against each other.
             ignored: Pairs (body, obstacle) that are not checked: the floor that the first link
                 stands on.
-            arms: Which arm each joint of the model belongs to, the world included; `arms_of_joints`
-                if not given. Negative numbers belong to every arm.
-            table: The model's kinematic table, if it is known.
-
-        Raises:
-            UnsupportedJoint: If a joint has not exactly one coordinate.
-            ValueError: If shapes, pairs or arms do not fit the model.
+            arms: Which arm each joint of the model belongs to, the world included; all to one if
+                empty. Negative numbers belong to every arm.
         """
-        shapes = shapes.checked(model)
-        table = kinematic_table(model) if table is None else table
-        chosen = default_pairs(model, shapes.joint) if pairs is None else pairs
-        arm = arms_of_joints(model) if arms is None else tuple(arms)
-        if len(arm) != model.njoints:
-            raise ValueError(
-                f"arms must have one number per joint of the model, {model.njoints}, had {len(arm)}"
-            )
-        packed = pack_tables(table, shapes, obstacles, tuple(chosen), tuple(ignored), arm)
-        return cls(table, flattened(packed), len(packed.capsules) == 0)
+        packed = pack_tables(table, shapes, obstacles, pairs, ignored, arms)
+        return cls(flattened(packed), table.num_coordinates)
 
     @classmethod
-    def of_pair(cls, model: Any, shapes: Shapes, pair: tuple[int, int]) -> "BodyCollision":
+    def of_pair(
+        cls, table: KinematicTable, shapes: Shapes, pair: tuple[int, int]
+    ) -> "BodyCollision":
         """Return the collision model of two bodies alone."""
-        own = shapes.of(np.isin(shapes.labels, pair))
-        return cls.build(model, own, obstacle_table(()), (pair,))
+        return cls.build(table, shapes.of(np.isin(shapes.body, pair)), obstacle_table(()), (pair,))
 
-    def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearances:
+    def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations.
 
         They are exact, but for a capsule whose axis enters a box or a cylinder: its clearance is
@@ -153,19 +134,11 @@ class BodyCollision(NamedTuple):
 
         Args:
             q: (nq, configurations) [rad], lengths for prismatic joints. NaN where q holds NaN.
-            limit: Above it nothing is measured: a clearance is exact where it is less, elsewhere it
-                is the limit.
 
         Raises:
-            ValueError: If q has another number of rows than the model has coordinates, or the limit
-                is NaN.
+            ValueError: If q has another number of rows than the model has coordinates.
         """
-        if np.isnan(limit):
-            raise ValueError("limit must be a number, was nan")
-        q = self._checked(q)
-        out = np.empty((3, q.shape[1]))
-        least_clearances(self.tables, float(limit), False, q, out)
-        return Clearances(*out)
+        return Clearances(*self._measured(q, np.inf))
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,); true for NaN.
@@ -175,31 +148,28 @@ class BodyCollision(NamedTuple):
         Raises:
             ValueError: If q has another number of rows than the model has coordinates.
         """
-        q = self._checked(q)
-        if self.only_spheres:
-            out = np.empty(q.shape[1], dtype=np.bool_)
-            if find_contacts(self.tables, False, q, out) == 0:
-                return out
-        rows = np.empty((3, q.shape[1]))
-        least_clearances(self.tables, 0.0, True, q, rows)
-        return np.asarray(~(rows[0] >= 0.0))  # all rows are the same
+        return np.asarray(~(self._measured(q, 0.0)[0] >= 0.0))  # all rows are the same
+
+    def _measured(self, q: FloatArray, limit: float) -> FloatArray:
+        """Return clearances (3, configurations) up to a limit; at a limit of 0 their signs only."""
+        q = contiguous_batch(q, self.nq)
+        out = np.empty((3, q.shape[1]))
+        least_clearances(self.tables, limit, limit == 0.0, q, out)
+        return out
 
     @property
     def free_test(self) -> FreeTest:
         """The test of configurations for kernels of other rooms."""
         return FreeTest.of(num_free, self.tables)
 
-    def num_free(self, q: FloatArray) -> int:
-        """Return the answer of the kernel `num_free` for a batch (nq, configurations) [rad].
 
-        Raises:
-            ValueError: If q has another number of rows than the model has coordinates.
-        """
-        return num_free(self.tables, self._checked(q))
+def contiguous_batch(q: FloatArray, nq: int) -> FloatArray:
+    """Return configurations (nq, configurations) as kernels take them.
 
-    def _checked(self, q: FloatArray) -> FloatArray:
-        nq = self.table.num_coordinates
-        q = np.ascontiguousarray(q, dtype=np.float64)
-        if q.ndim != 2 or q.shape[0] != nq:
-            raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
-        return q
+    Raises:
+        ValueError: If q has another shape.
+    """
+    q = np.ascontiguousarray(q, dtype=np.float64)
+    if q.ndim != 2 or q.shape[0] != nq:
+        raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
+    return q

@@ -11,7 +11,7 @@ import numpy as np
 
 from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.body_pairs import BodyPairs, body_pairs
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.box_support import coal
 from evoexp.collision.covers.body_covers import (
     Cover,
@@ -39,13 +39,9 @@ class CollisionModel(Component):
         """How far covers are asked to reach beyond bodies at most [length unit]; inf: no matter."""
         return np.inf
 
-    def cover(self, item: Any) -> Cover:
-        """Return the cover that stands for a geometry object."""
+    def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
+        """Return the cover that stands for a geometry object, for which spheres may be given."""
         raise NotImplementedError
-
-    def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
-        """Return the cover of a robot's body, for which spheres may be given."""
-        return self.cover(item)
 
     def bind(self, assembly: Assembly) -> "BodyModel":
         """Return the model of a robot.
@@ -54,7 +50,7 @@ class CollisionModel(Component):
             UnsupportedShape: If a body cannot be covered.
         """
         items, given = list(assembly.geometry.geometryObjects), assembly.spheres or {}
-        covers = tuple(self.cover_of(item, given.get(item.name)) for item in items)
+        covers = tuple(self.cover(item, given.get(item.name)) for item in items)
         bodies = zip(covers, (item.parentJoint for item in items), strict=True)
         shapes = Shapes.joined(_shapes(*body, number) for number, body in enumerate(bodies))
         return BodyModel(assembly, covers, shapes, body_pairs(assembly, shapes), self.asked)
@@ -73,13 +69,11 @@ class SphereSets(CollisionModel):
         """The inflation."""
         return self.inflation
 
-    def cover(self, item: Any) -> Cover:
-        """Return spheres around a geometry object."""
-        return kept_sphere_cover(item, self.inflation)
-
-    def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
-        """Return the given spheres; spheres around a body for which there are none."""
-        return self.cover(item) if given is None or len(given) == 0 else given_cover(item, given)
+    def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
+        """Return the given spheres, or else spheres around a geometry object."""
+        if given is None or len(given) == 0:
+            return kept_sphere_cover(item, self.inflation)
+        return given_cover(item, given)
 
 
 class BodyCapsules(CollisionModel):
@@ -93,7 +87,7 @@ class BodyCapsules(CollisionModel):
     # covered best by the first
     around_cylinders: bool = False
 
-    def cover(self, item: Any) -> Cover:
+    def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
         """Return the capsule around a geometry object."""
         is_around = self.around_cylinders and isinstance(item.geometry, coal.Cylinder)
         found = around_cylinder(item) if is_around else capsule_cover(item)
@@ -128,30 +122,53 @@ class BodyModel(NamedTuple):
         """How far a cover reaches beyond its body, or a mesh's convex hull, at most."""
         return max(cover.inflation for cover in self.covers)
 
-    def described(self, unit: str) -> str:
-        """Return a line on the covers: how many, and how far they reach [length unit]."""
-        items = self.assembly.geometry.geometryObjects
+    def notes(self, unit: str, is_complete: bool = False) -> list[str]:
+        """Describe the covers [unit], and the pairs that only the certifier judges.
+
+        Args:
+            is_complete: Whether pairs that nobody judges are listed, too.
+        """
+        items, names = self.assembly.geometry.geometryObjects, self.names
+        # how many covers there are, and how far they reach
         meshes = any(isinstance(item.geometry, coal.BVHModelBase) for item in items)
         beyond = "them, or the convex hulls of meshes" if meshes else "them"
-        return (
-            f"{len(self.names)} bodies covered by {self.num_shapes} spheres and capsules, which "
+        lines = [
+            f"{len(names)} bodies covered by {self.num_shapes} spheres and capsules, which "
             f"reach at most {self.inflation:.3g} {unit} beyond {beyond}"
-        )
-
-    def reach_notes(self, unit: str) -> list[str]:
-        """Remark on covers that do not contain their bodies, or reach farther than asked."""
-        named, lines = list(zip(self.names, self.covers, strict=True)), []
-        most = self.asked * (1.0 + 1e-6)
+        ]
+        named, most = list(zip(names, self.covers, strict=True)), self.asked * (1.0 + 1e-6)
         if out := [f"{name} {c.uncovered:.3g}" for name, c in named if c.uncovered > 0.0]:
-            told = ", ".join(out)
-            lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {told}")
+            sizes = ", ".join(out)
+            lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {sizes}")
         if wide := [f"{name} {c.inflation:.3g}" for name, c in named if c.inflation > most]:
-            told = ", ".join(wide)
+            sizes = ", ".join(wide)
             if self.assembly.frames is not None:  # out of a URDF
-                told += "; robot.decomposition or robot.spheres bring closer ones"
+                sizes += "; robot.decomposition or robot.spheres bring closer ones"
             must = f"the {self.asked:g} {unit} asked for"
-            lines.append(f"covers that reach farther than {must}: {told}")
-        return lines
+            lines.append(f"covers that reach farther than {must}: {sizes}")
+        # pairs of bodies, and covers made smaller
+        pairs, where = self.sorted_pairs, "the start or the goal"
+        unjudged = {
+            "neighbours or disabled, not tested": pairs.adjacent,
+            "always touch, not tested": pairs.always,
+            "never touch, not tested": pairs.never,
+        }
+        left = {
+            "touch in no posture sampled, judged by the certifier only": pairs.unseen,
+            "covers touch in every posture sampled, judged by the certifier only": (
+                pairs.overlapping
+            ),
+        }
+        fitted = {f"covers touch at {where}, left to the certifier": pairs.fitted}
+        groups = (unjudged | left) if is_complete else left
+        lines += _listed(groups, names)
+        if self.shrunk:
+            sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
+            lines.append(
+                f"covers made smaller, since they touch an obstacle at {where} where the bodies do "
+                f"not: {sizes}"
+            )
+        return lines + _listed(fitted, names)
 
     @property
     def num_shapes(self) -> int:
@@ -171,8 +188,7 @@ class BodyModel(NamedTuple):
             carried: An object that is part of the robot now; its number is one past the bodies'.
         """
         shapes, pairs, arms = self.shapes, self.pairs, self.assembly.body_arms
-        model = self.assembly.model
-        of_joint = [-1] * model.njoints
+        of_joint = [-1] * self.assembly.model.njoints
         for arm, item in zip(arms, self.assembly.geometry.geometryObjects, strict=True):
             of_joint[item.parentJoint] = arm if item.parentJoint else -1
         if carried is not None:
@@ -180,7 +196,7 @@ class BodyModel(NamedTuple):
             shapes = Shapes.joined([shapes, _shapes(carried.cover, carried.joint, own)])
             pairs = (*pairs, *((body, own) for body in carried.watched))
         table = self.assembly.table
-        return BodyCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
+        return BodyCollision.build(table, shapes, obstacles, pairs, ignored, of_joint)
 
     def touching(
         self,
@@ -212,9 +228,7 @@ class BodyModel(NamedTuple):
         shapes = Shapes.joined(inner.values())
         every = ((body, k) for body in inner for k in range(len(obstacles.kind)))
         ignored = tuple(pair for pair in every if pair not in allowed)
-        model, table = self.assembly.model, self.assembly.table
-        arms = [0] * model.njoints
-        return BodyCollision.build(model, shapes, obstacles, (), ignored, arms, table)
+        return BodyCollision.build(self.assembly.table, shapes, obstacles, (), ignored)
 
     def fitted(
         self, obstacles: ObstacleTable, ignored: tuple[Pair, ...], q: FloatArray
@@ -229,9 +243,9 @@ class BodyModel(NamedTuple):
             ignored: Pairs (body, obstacle) that may touch.
             q: (nq, configurations) [rad] at which nothing touches.
         """
-        model, radius, shrunk = self.assembly.model, self.shapes.radius.copy(), []
+        radius, shrunk = self.shapes.radius.copy(), []
         for body in range(len(self.covers)):
-            own = self.shapes.labels == body
+            own = self.shapes.body == body
             if not self.shapes.joint[own].all():  # what stands still is not tested
                 continue
             alone = self._replace(shapes=self.shapes.of(own), sorted_pairs=BodyPairs((), ()))
@@ -244,25 +258,20 @@ class BodyModel(NamedTuple):
         touching = tuple(
             pair
             for pair in self.pairs
-            if BodyCollision.of_pair(model, shapes, pair).collides(q).any()
+            if BodyCollision.of_pair(self.assembly.table, shapes, pair).collides(q).any()
         )
         tested = tuple(pair for pair in self.pairs if pair not in touching)
         pairs = self.sorted_pairs._replace(tested=tested, fitted=touching)
         return self._replace(shapes=shapes, sorted_pairs=pairs, shrunk=tuple(shrunk))
 
-    def fitting_notes(self, where: str, unit: str) -> list[str]:
-        """Describe the covers made smaller, and the pairs left to the certifier, by `fitted`."""
-        lines, names = [], self.names
-        if self.shrunk:
-            sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
-            lines.append(
-                f"covers made smaller, since they touch an obstacle at {where} where the bodies do "
-                f"not: {sizes}"
-            )
-        if pairs := self.sorted_pairs.fitted:
-            named = ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
-            lines.append(f"covers touch at {where}, left to the certifier: {named}")
-        return lines
+
+def _listed(groups: dict[str, tuple[Pair, ...]], names: tuple[str, ...]) -> list[str]:
+    """Return a line for each group of pairs that has some."""
+    named = {
+        what: ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
+        for what, pairs in groups.items()
+    }
+    return [f"{what}: {text}" for what, text in named.items() if text]
 
 
 class Carried(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.body_table import body_table
 from evoexp.collision.box_support import coal, distance
 from evoexp.collision.derived_pairs import (
@@ -81,9 +81,7 @@ def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
         derived = DerivedPairs.from_json(assembly.pairs)
         always = {pair for pair in apart if names[pair] in derived.always}
         unseen = {pair for pair in apart if names[pair] in derived.never}
-    groups: dict[str, list[Pair]] = {
-        name: [] for name in ("tested", "always", "never", "unseen", "overlapping")
-    }
+    groups = dict[str, tuple[Pair, ...]](tested=(), adjacent=tuple(adjacent))
     for pair in apart:
         if pair in always:
             group = "always"
@@ -91,13 +89,12 @@ def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
             group = "unseen"
         elif pair in unseen and _never_touch(assembly, shapes, pair):
             group = "never"
-        elif BodyCollision.of_pair(assembly.model, shapes, pair).collides(q).all():
+        elif BodyCollision.of_pair(assembly.table, shapes, pair).collides(q).all():
             group = "overlapping"
         else:
             group = "tested"
-        groups[group].append(pair)
-    sorted_pairs = {name: tuple(pairs) for name, pairs in groups.items()}
-    return BodyPairs(adjacent=tuple(adjacent), **sorted_pairs)
+        groups[group] = (*groups.get(group, ()), pair)
+    return BodyPairs(**groups)
 
 
 def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
@@ -121,24 +118,25 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     if len(moving) > 2:
         return False
     q, slack = _grid(assembly, moving, way, GRID)
-    if float(BodyCollision.of_pair(assembly.model, shapes, pair).clearance(q).least.min()) > slack:
+    if float(BodyCollision.of_pair(assembly.table, shapes, pair).clearance(q).least.min()) > slack:
         return True
     q, slack = _grid(assembly, moving, way, COARSE_GRID)
-    return bool(_coal_distances(assembly, pair, q).min() > slack)
+    model, data, least = assembly.model, assembly.model.createData(), np.inf
+    for n in range(q.shape[1]):
+        pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
+        places = (data.oMi[items[body].parentJoint] * items[body].placement for body in pair)
+        first, second = (coal.Transform3s(place.rotation, place.translation) for place in places)
+        one, two = (items[body].geometry for body in pair)
+        least = min(least, distance(one, first, two, second))
+    return least > slack
 
 
 def _grid(
     assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int
 ) -> tuple[FloatArray, float]:
-    """Return configurations on a grid, and a bound of a distance's change within half a step.
+    """Return configurations (nq, n) on a grid over some coordinates, `size` values of each.
 
-    Args:
-        moving: Indices of the coordinates that the grid spans.
-        way: (nq,) bound of |d distance / dq| by coordinate.
-        size: Values per coordinate.
-
-    Returns:
-        (nq, n) configurations, and the bound [length unit].
+    Also a bound of a distance's change within half a step, from that of |d distance / dq|, (nq,).
     """
     low, high = joint_limits(assembly)
     step = (high[moving] - low[moving]) / size
@@ -148,15 +146,3 @@ def _grid(
     for column, value in zip(moving, grid, strict=True):
         q[column] = value.ravel()
     return q, float(np.sum(way[moving] * 0.5 * step))
-
-
-def _coal_distances(assembly: Assembly, pair: Pair, q: FloatArray) -> FloatArray:
-    """Return the distances of two bodies, (configurations,)."""
-    model, data, distances = assembly.model, assembly.model.createData(), np.empty(q.shape[1])
-    one, two = (assembly.geometry.geometryObjects[body] for body in pair)
-    for n in range(q.shape[1]):
-        pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
-        places = (data.oMi[item.parentJoint] * item.placement for item in (one, two))
-        first, second = (coal.Transform3s(place.rotation, place.translation) for place in places)
-        distances[n] = distance(one.geometry, first, two.geometry, second)
-    return distances

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import inlined, view_part, view_rows
+from evoexp.numeric.compilation import inlined, view_part
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicChain
 from evoexp.scenarios.obstacles import ObstacleTable
@@ -114,7 +114,8 @@ def named_tables(n: FloatArray, i: IntArray) -> BodyTables:
 @inlined
 def _rows(array: Any, indices: IntArray, block: int, width: int) -> Any:
     """Return a block of a flat array, row by row."""
-    return view_rows(array, indices[2 * block], indices[2 * block + 1], width)
+    rows = indices[2 * block + 1]
+    return view_part(array, indices[2 * block], rows * width).reshape(rows, width)
 
 
 @inlined

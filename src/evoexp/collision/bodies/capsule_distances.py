@@ -125,11 +125,8 @@ def _crossing(p: Vector, u: Vector, half: Vector) -> Crossing:
 def nearest_on_segments(kind: int, half_edges: FloatArray, segments: Segments) -> Place:
     """Return the points of segments that are nearest to an obstacle's core.
 
-    Where a segment enters the core, the point is the middle of the part inside.
-
-    Args:
-        kind: Of the obstacle, from whose frame the segments are seen.
-        half_edges: (≥ 3,) of its core: see `BodyTables.cores`.
+    Segments are seen from its frame. Where one enters the core, the point is the middle of the part
+    inside.
     """
     (px, py, pz), (ux, uy, uz) = segments
     core = spread(half_edges[0]), spread(half_edges[1]), spread(half_edges[2])
@@ -238,11 +235,7 @@ def _zero_of_slope(
 
 @inlined
 def segment_to_point(segment: Segments, inverse: float, point: Place) -> Vector:
-    """Return the distance of a point from a segment, either of vectors or numbers.
-
-    Args:
-        inverse: 1 / squared length of the segment.
-    """
+    """Return the distance of a point from a segment, whose squared length is 1 / `inverse`."""
     (px, py, pz), (vx, vy, vz) = segment
     x, y, z = point[0] - px, point[1] - py, point[2] - pz
     t = _clamped((x * vx + y * vy + z * vz) * inverse)
@@ -258,11 +251,8 @@ def segment_to_segments(capsule: FloatArray, segments: Segments, other: float) -
     The foot of the common perpendicular, clamped to the first segment, is projected to the second,
     clamped, and back: that is the least of a convex function of two places (Ericson 2005, section
     5.1.9). It comes from cross products, whose errors stay harmless when the segments are nearly
-    parallel; for parallel ones any foot serves.
-
-    Args:
-        capsule: (8,) one end of its axis, from there to the other end, radius, 1 / squared length.
-        other: 1 / squared length of the others.
+    parallel; for parallel ones any foot serves. The capsule is a row of `BodyTables.capsules`; the
+    others' squared length is 1 / `other`.
     """
     (px, py, pz), (vx, vy, vz) = segments
     ux, uy, uz, inverse = capsule[3], capsule[4], capsule[5], capsule[7]

@@ -125,7 +125,13 @@ def _least_clearances(
             for t in range(units[b, FIRST_BALL], units[b, STOP_ENTRY]):
                 _meet_obstacle(tables, memory, b, tables.owners[t], decide)
         for p in range(len(tables.pairs)):
-            _meet_body(tables, memory, p, decide)
+            pair = tables.pairs[p]
+            line = U(0) if decide else U(pair[4]) * VECTOR
+            if _are_near(tables, memory, pair[0], pair[1], line):
+                for t in range(pair[2], pair[3]):
+                    a, b = tables.parts[t, 0], tables.parts[t, 1]
+                    if _are_near(tables, memory, a, b, line):
+                        _lower(memory, line, _between(tables, memory, a, b), decide)
         for row in range(3):
             own = 0 if decide else row * LANES
             for lane in range(min(LANES, count - first)):
@@ -214,19 +220,6 @@ def _are_near(tables: BodyTables, memory: Memory, one: int, two: int, row: np.ui
     within = upper(spread(0.0), (load(memory.least, row) + margin) * MARGIN)
     a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
     return any_lane(squared_distance(a, b) < within * within)
-
-
-@inlined
-def _meet_body(tables: BodyTables, memory: Memory, p: int, decide: bool) -> None:
-    """Lower a row of clearances to that of a pair of bodies; far parts are skipped."""
-    pairs = tables.pairs
-    one, two, first, stop = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
-    row = U(0) if decide else U(pairs[p, 4]) * VECTOR
-    if _are_near(tables, memory, one, two, row):
-        for t in range(first, stop):
-            a, b = tables.parts[t, 0], tables.parts[t, 1]
-            if _are_near(tables, memory, a, b, row):
-                _lower(memory, row, _between(tables, memory, a, b), decide)
 
 
 @inlined

@@ -11,7 +11,7 @@ import numpy as np
 
 from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
 from evoexp.collision.bodies.body_models import BodyModel, CollisionModel
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.derived_pairs import Pair
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
@@ -69,7 +69,7 @@ class CoveredCollision(NamedTuple):
     @property
     def num_tests(self) -> int:
         """Pairs of shapes that one configuration has: of two bodies, and with obstacles."""
-        own = dict(zip(*np.unique(self.shapes.labels, return_counts=True), strict=True))
+        own = dict(zip(*np.unique(self.shapes.body, return_counts=True), strict=True))
         between = sum(own[a] * own[b] for a, b in self.bodies.pairs)
         return int(between + sum(own.values()) * len(self.obstacles.kind))
 
@@ -89,14 +89,4 @@ class CoveredCollision(NamedTuple):
 
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""
-        lines = [self.bodies.described(unit), *self.bodies.reach_notes(unit)]
-        names, pairs = self.bodies.names, self.bodies.sorted_pairs
-        for what, left in (
-            ("touch in no posture sampled", pairs.unseen),
-            ("covers touch in every posture sampled", pairs.overlapping),
-        ):
-            if left:
-                told = ", ".join(f"{names[a]} with {names[b]}" for a, b in left)
-                lines.append(f"{what}, judged by the certifier only: {told}")
-        lines += self.bodies.fitting_notes("the start or the goal", unit)
-        return lines
+        return self.bodies.notes(unit)

@@ -87,15 +87,7 @@ def point_at(points: FloatArray, k: np.uint64) -> Place:
 def place_point(
     frames: FloatArray, joint: int, local: FloatArray, points: FloatArray, k: np.uint64
 ) -> None:
-    """Write a point that a joint moves.
-
-    Args:
-        frames: Of `spatial_frames`.
-        joint: Index into the kinematic table.
-        local: (≥ 3,) the point in the table's frame [length unit].
-        points: (≥ (k + 1) · POINT,) written.
-        k: Which of them it is.
-    """
+    """Write point k, which is `local` (≥ 3,) in a joint's frame of `spatial_frames`."""
     j, x, y, z = U(joint) * SPATIAL_FRAME, local[0], local[1], local[2]
     for row in range(3):
         a, o = j + U(3 * row) * VECTOR, j + U(9 + row) * VECTOR
@@ -137,12 +129,8 @@ def seen_from(center: FloatArray, turn: FloatArray, point: Place) -> Place:
 def distance_from_core(kind: int, core: FloatArray, point: Place) -> Vector:
     """Return the signed distance of a point in an obstacle's frame from the obstacle's core.
 
-    The core of spheres, capsules and boxes is a box, with edges of length 0 where needed.
-
-    Args:
-        kind: Of the obstacle.
-        core: A row of `BodyTables.cores`, whose thickness is left to the caller.
-        point: Seen from the obstacle's frame.
+    The core of spheres, capsules and boxes is a box, with edges of length 0 where needed. Its row
+    of `BodyTables.cores` holds a thickness, too, which is left to the caller.
     """
     x, y, z = point
     if kind == HALF_SPACE:
@@ -163,13 +151,7 @@ def distance_from_core(kind: int, core: FloatArray, point: Place) -> Vector:
 def nearest_to_obstacle(
     tables: BodyTables, o: int, centers: FloatArray, first: np.uint64, stop: np.uint64
 ) -> Vector:
-    """Return the least signed distance of some points from an obstacle's surface.
-
-    Args:
-        centers: (spheres · POINT,).
-        first: First point.
-        stop: One past the last.
-    """
+    """Return the least signed distance of points `first` … `stop` − 1 from an obstacle."""
     kind, center, core = tables.obstacles.kind[o], tables.obstacles.center[o], tables.cores[o]
     least, turn = spread(np.inf), tables.obstacles.rotation[o]
     if kind == SPHERE:  # one square root for all
@@ -189,15 +171,7 @@ def nearest_to_obstacle(
 def nearest(
     centers: FloatArray, one: np.uint64, end: np.uint64, first: np.uint64, stop: np.uint64
 ) -> Vector:
-    """Return the least squared distance between two ranges of points [length unit²].
-
-    Args:
-        centers: (spheres · POINT,).
-        one: First point of one range.
-        end: One past its last.
-        first: First point of the other.
-        stop: One past its last.
-    """
+    """Return the least squared distance of points `one` … `end` − 1 and `first` … `stop` − 1."""
     i, least = one, spread(np.inf)
     # four of them are held in registers
     while i + U(3) < end:
@@ -223,14 +197,7 @@ def nearest(
 def between_spheres(
     tables: BodyTables, centers: FloatArray, one: int, two: int, least: Vector
 ) -> Vector:
-    """Lower a clearance to the least one of two units' spheres [length unit].
-
-    Args:
-        centers: (spheres · POINT,), those of both units in one frame.
-        one: A unit.
-        two: Another one.
-        least: The clearance so far.
-    """
+    """Lower a clearance to the least one of two units' spheres, whose centres are in one frame."""
     units, runs, spheres = tables.units, tables.runs, tables.spheres
     for a in range(units[one, FIRST_RUN], units[one, STOP_RUN]):
         i, end = U(runs[a, 0]), U(runs[a, 1])

@@ -251,15 +251,7 @@ def _between_arms(
     at: np.uint64,
     least: Vector,
 ) -> Vector:
-    """Lower squared distances to the least ones of circles of two arms.
-
-    Args:
-        limit: Squared distance at which circles touch [length unit²].
-        slack: Squared distances nearer to the limit than this are in doubt.
-        lines: (links · OF_LINE,).
-        at: Of a vector in a block of lines.
-        least: The squared distances so far.
-    """
+    """Lower squared distances, of a vector in a block, to the least ones of circles of two arms."""
     reach = np.sqrt(limit + 2.0 * slack) * MARGIN
     for a in range(len(arm_links)):
         for b in range(a + 1, len(arm_links)):

@@ -11,8 +11,13 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.bodies.body_collision import BodyCollision, Clearances, FreeTest
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.body_collision import (
+    BodyCollision,
+    Clearances,
+    FreeTest,
+    contiguous_batch,
+)
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.bodies.planar_contacts import CircleTables, contacts, link_lines
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
@@ -61,33 +66,19 @@ class TouchingSpheres(Component):
                 "without tools: circles of one size cannot show them",
                 "tool_radius above 0",
             )
-        every = [
-            sphere
-            for link in assembly.links
-            if link.joint > 0
-            for sphere in self._of_link(assembly, link)
-        ]
-        kept = [
-            s for k, s in enumerate(every) if s.center.any() or not any(map(s.repeats, every[:k]))
-        ]
-        moving = np.array([sphere.joint for sphere in kept], dtype=np.int64)
-        centers = np.array([sphere.center for sphere in kept])
-        arms = np.array([sphere.arm for sphere in kept])
-        radii, table = np.full(len(kept), self.sphere_radius), assembly.table
-        local = np.array([table.local(sphere.joint, sphere.center) for sphere in kept])
+        arms, moving, centers = self._placed(assembly)
+        radii, table = np.full(len(arms), self.sphere_radius), assembly.table
+        local = np.array([table.local(*sphere) for sphere in zip(moving, centers, strict=True)])
         spheres, of_arms = Spheres(moving - 1, local, self.sphere_radius), _ranges(arms)
         # the general model: bodies of different arms against each other, and against obstacles
         arm_of = dict(zip(moving.tolist(), arms.tolist(), strict=True))
         between = [(j, k) for j, k in itertools.combinations(arm_of, 2) if arm_of[j] != arm_of[k]]
         arm_of_joints = [arm_of.get(joint, -1) for joint in range(assembly.model.njoints)]
         around = obstacle_table(obstacles).without_ellipses()
-        shapes = Shapes(moving, centers, centers, radii)
-        general = BodyCollision.build(
-            assembly.model, shapes, around, between, (), arm_of_joints, table
-        )
+        shapes = Shapes(moving, centers, centers, radii, moving)
+        general = BodyCollision.build(table, shapes, around, between, (), arm_of_joints)
         # the planar one, of links as lines of circles
-        links = np.cumsum(np.diff(moving, prepend=moving[0]) != 0)
-        of_links = _ranges(links)
+        of_links = _ranges(np.cumsum(np.diff(moving, prepend=moving[0]) != 0))
         arm_links = _ranges(arms[of_links[:, 0]])
         lines = link_lines(table.chain, *spheres, of_links, arm_links)
         if not table.planar or len(around.kind):
@@ -95,28 +86,30 @@ class TouchingSpheres(Component):
         tables = CircleTables(table.chain, lines, general.tables)
         return SphereCollision(assembly, spheres, shapes, of_arms, around, general, tables)
 
-    def _of_link(self, assembly: Assembly, link: Any) -> list["_Sphere"]:
-        fractions = (
-            np.linspace(0.0, 1.0, self.spheres_per_link)
-            if self.spheres_per_link > 1
-            else np.array([0.5])
-        )
-        centers = [link.start + f * (link.end - link.start) for f in fractions]
-        return [_Sphere(link.arm, link.joint, center, assembly) for center in centers]
+    def _placed(self, assembly: Assembly) -> tuple[IntArray, IntArray, FloatArray]:
+        """Return arm, joint and centre (3,) of each sphere on the links that move.
 
-
-class _Sphere(NamedTuple):
-    arm: int
-    joint: int
-    center: FloatArray
-    assembly: Assembly
-
-    def repeats(self, other: "_Sphere") -> bool:
-        """Whether it ends the other's link at the joint that both share: one point for every q."""
-        model = self.assembly.model
-        if self.arm != other.arm or model.parents[self.joint] != other.joint or self.center.any():
-            return False
-        return bool(np.array_equal(model.jointPlacements[self.joint].translation, other.center))
+        Two links share a joint: the sphere at the end of the first counts, if it stands there for
+        every q, and that at the beginning of the second does not.
+        """
+        parents, places = assembly.model.parents, assembly.model.jointPlacements
+        num = self.spheres_per_link
+        fractions = np.linspace(0.0, 1.0, num) if num > 1 else np.array([0.5])
+        every, is_new = list[tuple[int, int, FloatArray]](), list[bool]()
+        for link in (link for link in assembly.links if link.joint > 0):
+            ends = [
+                center
+                for arm, joint, center in every
+                if arm == link.arm and joint == parents[link.joint]
+            ]
+            begin = places[link.joint].translation
+            for fraction in fractions:
+                center = link.start + fraction * (link.end - link.start)
+                repeats = not center.any() and any(np.array_equal(begin, end) for end in ends)
+                every.append((link.arm, link.joint, center))
+                is_new.append(not repeats)
+        arms, joints, centers = zip(*itertools.compress(every, is_new), strict=True)
+        return np.array(arms), np.array(joints, dtype=np.int64), np.array(centers)
 
 
 def _ranges(owners: IntArray) -> IntArray:
@@ -155,18 +148,18 @@ class SphereCollision(NamedTuple):
         between = sum(a * b for a, b in itertools.combinations(own, 2))
         return between + sum(own) * len(self.obstacles.kind)
 
-    @property
-    def radius(self) -> float:
-        """Radius of every sphere [length unit]."""
-        return self.spheres.radius
-
     def clearance(self, q: FloatArray) -> Clearances:
         """Return the clearances of a batch of configurations (nq, configurations) [deg].
 
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        centers = self._centers(DEGREE * self._checked(q))
+        q = DEGREE * contiguous_batch(q, self.general.nq)
+        chain, pose = self.assembly.table.chain, np.empty((12, q.shape[1]))
+        centers = np.empty((len(self.spheres.joint), 3, q.shape[1]))
+        for k, (joint, local) in enumerate(zip(*self.spheres[:2], strict=True)):
+            frame_poses(chain, joint, np.append(np.eye(3), local), q, pose)
+            centers[k] = pose[9:]
         squares = np.full(q.shape[1], np.inf)
         for (first, stop), (begin, end) in itertools.combinations(self.arm_spheres, 2):
             for center in centers[first:stop]:
@@ -179,7 +172,8 @@ class SphereCollision(NamedTuple):
                 kind, size, matrix_product(points, rotation.reshape(3, 3))
             )
             outside = np.minimum(outside, distances.min(axis=0))
-        return Clearances(outside - self.radius, np.sqrt(squares) - 2.0 * self.radius)
+        radius = self.spheres.radius
+        return Clearances(outside - radius, np.sqrt(squares) - 2.0 * radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,): where `clearance` is negative.
@@ -187,7 +181,7 @@ class SphereCollision(NamedTuple):
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        q = self._checked(q)
+        q = contiguous_batch(q, self.general.nq)
         out = np.empty(q.shape[1])
         contacts(self.tables, q, 0, out)
         return np.asarray(~(out >= 0.0))
@@ -196,22 +190,6 @@ class SphereCollision(NamedTuple):
     def free_test(self) -> FreeTest:
         """The test of configurations for kernels of other rooms."""
         return self.general.free_test
-
-    def _centers(self, q: FloatArray) -> FloatArray:
-        """Return the centres (spheres, 3, configurations) at q (nq, configurations) [rad]."""
-        chain, pose = self.assembly.table.chain, np.empty((12, q.shape[1]))
-        centers = np.empty((len(self.spheres.joint), 3, q.shape[1]))
-        for k, (joint, local) in enumerate(zip(*self.spheres[:2], strict=True)):
-            frame_poses(chain, joint, np.append(np.eye(3), local), q, pose)
-            centers[k] = pose[9:]
-        return centers
-
-    def _checked(self, q: FloatArray) -> FloatArray:
-        nq = self.assembly.table.num_coordinates
-        q = np.ascontiguousarray(q, dtype=np.float64)
-        if q.ndim != 2 or q.shape[0] != nq:
-            raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
-        return q
 
 
 def _signed_distances(kind: int, size: FloatArray, points: FloatArray) -> FloatArray:

@@ -96,11 +96,7 @@ def judged_part(part: Part, motion: Motion, security_margin: float) -> Certifica
         refuted_pair=PAIR.join(verdict.refuted_pair or ()),
         certificate_queries=verdict.queries,
     )
-    return _with_depths(judged, part, piece)
-
-
-def _with_depths(judged: Certificate, part: Part, piece: Motion) -> Certificate:
-    """Add to the verdict on a piece how deep the pairs overlap that may touch in it."""
+    # how deep the pairs overlap that may touch
     depths, queries = contact_depths(part.scene, piece)
     if not depths:
         return judged

@@ -35,17 +35,15 @@ class CoalDistance:
         self._t = np.nan
         self._places: dict[int, Any] = {}  # body → coal's transform at t
         self._known: dict[tuple[int, float], float] = {}
+        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+        self._request.gjk_tolerance, self._request.gjk_max_iterations = (
+            GJK_TOLERANCE,
+            GJK_ITERATIONS,
+        )
 
     @cached_property
     def _data(self) -> Any:
         return self.scene.model.createData()  # most motions need no distance of coal's
-
-    @cached_property
-    def _question(self) -> tuple[Any, Any]:
-        """Coal's request, and where it writes its answer."""
-        request = coal.DistanceRequest()
-        request.gjk_tolerance, request.gjk_max_iterations = GJK_TOLERANCE, GJK_ITERATIONS
-        return request, coal.DistanceResult()
 
     def __call__(self, pair: int, t: float) -> float:
         """Return the distance of a pair at t; negative where bodies overlap.
@@ -61,10 +59,13 @@ class CoalDistance:
             self._place(t)
             solids = []
             for body in self.scene.pairs[pair].tolist():
-                solids += [self.scene.shapes[body][0], self._transform(body)]
-            request, result = self._question
-            result.clear()
-            distance = float(coal.distance(*solids, request, result))
+                shape, joint, local = self.scene.shapes[body]
+                if body not in self._places:
+                    place = local if joint == 0 else self._data.oMi[joint] * local
+                    self._places[body] = coal.Transform3s(place.rotation, place.translation)
+                solids += [shape, self._places[body]]
+            self._result.clear()
+            distance = float(coal.distance(*solids, self._request, self._result))
             self._known[pair, t] = distance
         return distance
 
@@ -75,44 +76,32 @@ class CoalDistance:
             (pairs,) [length unit]; −inf where one of the two has no end, such as a half-space.
         """
         self._place(t)
-        places = self._data.oMi
-        middles = np.array([places[joint].act(middle) for joint, middle in self._middles])
+        places, (joints, locals_, radii) = self._data.oMi, self._balls
+        middles = np.array(
+            [places[j].act(middle) for j, middle in zip(joints, locals_, strict=True)]
+        )
         one, two = self.scene.pairs.T
         away = middles[one] - middles[two]
-        bounds: FloatArray = (
-            np.sqrt((away * away).sum(axis=1)) - self._radii[one] - self._radii[two]
-        )
+        bounds: FloatArray = np.sqrt((away * away).sum(axis=1)) - radii[one] - radii[two]
         return bounds
 
     @cached_property
-    def _middles(self) -> list[tuple[int, FloatArray]]:
-        """Joint, and middle in the joint's frame (3,), of the ball around each body."""
-        middles = []
-        for radius, (shape, joint, local) in zip(self._radii, self.scene.shapes, strict=True):
-            middle = shape.aabb_center if np.isfinite(radius) else np.zeros(3)
-            middles.append((int(joint), np.asarray(local.act(middle))))
-        return middles
-
-    @cached_property
-    def _radii(self) -> FloatArray:
-        """Radii (bodies,) of the balls around the bodies."""
-        for shape, _, _ in self.scene.shapes:
+    def _balls(self) -> tuple[list[int], list[FloatArray], FloatArray]:
+        """Joint, middle in the joint's frame (3,), and radius of the ball around each body."""
+        joints, middles, radii = list[int](), list[FloatArray](), list[float]()
+        for shape, joint, local in self.scene.shapes:
             shape.computeLocalAABB()
-        return np.array([float(shape.aabb_radius) for shape, _, _ in self.scene.shapes])
+            radii.append(float(shape.aabb_radius))
+            middle = shape.aabb_center if np.isfinite(radii[-1]) else np.zeros(3)
+            joints.append(int(joint))
+            middles.append(np.asarray(local.act(middle)))
+        return joints, middles, np.array(radii)
 
     def _place(self, t: float) -> None:
         if t != self._t:
             pin.forwardKinematics(self.scene.model, self._data, self.motion.at(t))
             self._t = t
             self._places.clear()
-
-    def _transform(self, body: int) -> Any:
-        """Return coal's transform of a body, made once per instant."""
-        if body not in self._places:
-            _, joint, local = self.scene.shapes[body]
-            place = local if joint == 0 else self._data.oMi[joint] * local
-            self._places[body] = coal.Transform3s(place.rotation, place.translation)
-        return self._places[body]
 
 
 def first_contact(

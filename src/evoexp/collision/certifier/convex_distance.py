@@ -153,16 +153,10 @@ def _gjk(
 
 @inlined
 def _closest_of_simplex(p: FloatArray, count: int, out: FloatArray) -> int:
-    """Find the point of a simplex that is closest to the origin, and the corners that carry it.
+    """Write the point of a simplex (4, 3) that is closest to the origin.
 
-    Args:
-        p: (4, 3) corners; those that carry the point are moved to the front.
-        count: How many corners there are.
-        out: (3,), written: the point.
-
-    Returns:
-        Number of the corners that carry the point; 4 if the origin lies within the simplex, and
-        then nothing is written.
+    The corners that carry it are moved to the front, and their number is returned; 4 if the origin
+    lies within the simplex, and then nothing is written.
     """
     if count == 1:
         out[0], out[1], out[2] = p[0, 0], p[0, 1], p[0, 2]
@@ -328,14 +322,8 @@ def segment_distance(
 ) -> float:
     """Return the distance of two segments, centred in their frames along the z axes.
 
-    Ericson 2005, section 5.1.9.
-
-    Args:
-        one: (12,) a segment's frame.
-        half_one: Half its length [length unit].
-        two: (12,) the other's frame.
-        half_two: Half its length.
-        across: (3,), written: the vector from the second's nearest point to the first's.
+    Ericson 2005, section 5.1.9. The vector from the second's nearest point to the first's is
+    written to `across` (3,).
     """
     rx, ry, rz = one[9] - two[9], one[10] - two[10], one[11] - two[11]
     ux, uy, uz = one[2], one[5], one[8]

@@ -39,12 +39,7 @@ class LeastDistance:
 
         Args:
             scene: Its bodies must be `known`.
-
-        Raises:
-            ValueError: If a body is known by its hull only.
         """
-        if not known(scene):
-            raise ValueError("scene: a body is known by its hull only")
         num_pairs, num_joints = len(scene.pairs), len(scene.table.chain.parent)
         self._task = Task(
             chain=scene.table.chain,

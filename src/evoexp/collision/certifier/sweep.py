@@ -101,7 +101,17 @@ def sweep_motion(task: Task, goal: Goal, work: Workspace) -> Sweep:
         np.full(num_pairs, np.inf),
         np.zeros(num_pairs),
     )
-    done = _sweep(task, goal, work, found, _levels(num_pairs, len(task.chain.parent)))
+    levels = Levels(
+        bounds=np.empty((2, num_pairs)),
+        above=np.empty(len(task.chain.parent)),
+        lists=np.empty((DEPTH + 2, num_pairs), dtype=np.int64),
+        counts=np.empty(DEPTH + 2, dtype=np.int64),
+        depths=np.empty(DEPTH + 2, dtype=np.int64),
+        begins=np.empty(DEPTH + 2),
+        ends=np.empty(DEPTH + 2),
+    )
+    levels.lists[0], levels.counts[0] = np.arange(num_pairs), num_pairs  # of whole segments
+    done = _sweep(task, goal, work, found, levels)
     return Sweep(
         state[LEAST],
         state[FIRST],
@@ -113,21 +123,6 @@ def sweep_motion(task: Task, goal: Goal, work: Workspace) -> Sweep:
         found.pair_least,
         found.pair_least_at,
     )
-
-
-def _levels(num_pairs: int, num_joints: int) -> Levels:
-    """Return the levels of a segment that is not halved yet: all pairs are left."""
-    levels = Levels(
-        bounds=np.empty((2, num_pairs)),
-        above=np.empty(num_joints),
-        lists=np.empty((DEPTH + 2, num_pairs), dtype=np.int64),
-        counts=np.empty(DEPTH + 2, dtype=np.int64),
-        depths=np.empty(DEPTH + 2, dtype=np.int64),
-        begins=np.empty(DEPTH + 2),
-        ends=np.empty(DEPTH + 2),
-    )
-    levels.lists[0], levels.counts[0] = np.arange(num_pairs), num_pairs
-    return levels
 
 
 @kernel

@@ -8,7 +8,6 @@ from evoexp.collision.body_table import BodyTable
 from evoexp.collision.certifier.convex_distance import distance_bounds, support
 from evoexp.collision.motion_bounds import (
     FRAME,
-    configuration,
     joint_frames,
     joint_twists,
     pair_reaches,
@@ -90,7 +89,10 @@ def approach_weights(
 def move_to(task: Task, work: Workspace, segment: int, u: float) -> None:
     """Place the joints at u in [0, 1] on a segment."""
     work.stamps[-1] += 1
-    configuration(task.coefficients[segment], u, work.q)
+    coefficients, q = task.coefficients[segment], work.q
+    for k in range(len(q)):  # by Horner's rule
+        c1, c2, c3 = coefficients[1, k], coefficients[2, k], coefficients[3, k]
+        q[k] = coefficients[0, k] + u * (c1 + u * (c2 + u * c3))
     joint_frames(task.chain, work.q, work.frames)
 
 
@@ -105,25 +107,22 @@ def pair_distance(
         joint = bodies.joint[body]
         if joint >= 0 and stamps[body] != stamps[-1]:
             stamps[body] = stamps[-1]
-            _place_body(
-                work.frames[joint], bodies.rotation[body], bodies.translation[body], world[body]
+            frame, rotation, translation = (
+                work.frames[joint],
+                bodies.rotation[body],
+                bodies.translation[body],
             )
+            for e in range(3):
+                a, b, c = frame[3 * e], frame[3 * e + 1], frame[3 * e + 2]
+                for k in range(3):
+                    turned = a * rotation[k] + b * rotation[3 + k] + c * rotation[6 + k]
+                    world[body, 3 * e + k] = turned
+                x, y, z = translation[0], translation[1], translation[2]
+                world[body, 9 + e] = frame[9 + e] + (a * x + b * y + c * z)
     one, two, normal = task.pairs[pair, 0], task.pairs[pair, 1], work.normals[pair]
     return distance_bounds(
         bodies, world, one, two, need, enough, converged, normal, work.simplex, work.scratch
     )
-
-
-@inlined
-def _place_body(
-    frame: FloatArray, rotation: FloatArray, translation: FloatArray, out: FloatArray
-) -> None:
-    """Write a body's frame in the world (FRAME,) from its joint's frame and its place in it."""
-    for e in range(3):
-        a, b, c = frame[3 * e], frame[3 * e + 1], frame[3 * e + 2]
-        for k in range(3):
-            out[3 * e + k] = a * rotation[k] + b * rotation[3 + k] + c * rotation[6 + k]
-        out[9 + e] = frame[9 + e] + (a * translation[0] + b * translation[1] + c * translation[2])
 
 
 @inlined
@@ -158,16 +157,8 @@ def separation_later(
 
     A point x of a body then stands at x + later (v + ω × x), at a height
     n·x + later (n·v + (n × ω)·x) that is linear in x: the least and the greatest height are those
-    of support points in a turned direction. The gap is a concave function of `later`.
-
-    Args:
-        world: (bodies, 12) frames of the bodies.
-        twists: (joints, 6) from `joint_twists`.
-        one: Index of a body.
-        two: Index of the other.
-        normal: (3,) from the second to the first, of any length.
-        later: How far ahead; negative: back.
-        scratch: (3, 3) scratch.
+    of support points in a turned direction. The gap is a concave function of `later`. The normal
+    leads from the second to the first, and has any length.
     """
     length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
     if not length > 0.0:

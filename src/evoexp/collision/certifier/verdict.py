@@ -67,7 +67,6 @@ def certify(
     motion: Motion,
     security_margin: float | FloatArray = 0.0,
     *,
-    contact_tolerance: float | None = None,
     resolution: float = 1e-3,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Verdict:
@@ -78,29 +77,16 @@ def certify(
         motion: In the units of the model: radians, lengths.
         security_margin: Clearance that the task requires [length unit]: of every pair of bodies, or
             (pairs,) of each.
-        contact_tolerance: A distance at or below it is contact [length unit]; None:
-            `Scene.tolerances`.
         resolution: The clearance is proven up to this part of it [-]; inf: not at all.
         limits: Numbers after which the certifier gives up.
 
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
     """
-    tolerances = scene.tolerances
-    if contact_tolerance is not None:
-        if not 0.0 < contact_tolerance < np.inf:
-            raise ValueError(f"contact_tolerance must be above 0, was {contact_tolerance}")
-        tolerances = np.full(len(scene.pairs), contact_tolerance)
-    return _Judgement(scene, motion, security_margin, tolerances, resolution, limits).verdict()
+    return _Judgement(scene, motion, security_margin, resolution, limits).verdict()
 
 
-def is_clear(
-    scene: Scene,
-    motion: Motion,
-    security_margin: float | FloatArray = 0.0,
-    *,
-    limits: Limits = DEFAULT_LIMITS,
-) -> bool:
+def is_clear(scene: Scene, motion: Motion, security_margin: float | FloatArray = 0.0) -> bool:
     """Return whether no two bodies are proven ever to touch, nor to come closer than a margin.
 
     It answers as `certify` does, yet measures no clearance: it ends at any contact that it meets,
@@ -110,13 +96,11 @@ def is_clear(
         scene: The bodies; read only.
         motion: In the units of the model: radians, lengths.
         security_margin: See `certify`.
-        limits: Numbers after which the certifier gives up.
 
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
     """
-    tolerances = scene.tolerances
-    return _Judgement(scene, motion, security_margin, tolerances, np.inf, limits).is_clear()
+    return _Judgement(scene, motion, security_margin, np.inf, DEFAULT_LIMITS).is_clear()
 
 
 class _Candidate(NamedTuple):
@@ -135,7 +119,6 @@ class _Judgement:
         scene: Scene,
         motion: Motion,
         security_margin: float | FloatArray,
-        tolerances: FloatArray,
         resolution: float,
         limits: Limits,
     ) -> None:
@@ -143,7 +126,7 @@ class _Judgement:
         self.margins = np.empty(len(scene.pairs))
         self.margins[:] = security_margin
         self.scene, self.motion = scene, motion
-        self.tolerances, self.resolution, self.limits = tolerances, resolution, limits
+        self.tolerances, self.resolution, self.limits = scene.tolerances, resolution, limits
         self.coal = CoalDistance(scene, motion, limits.queries)
         self.floor = 1e-6 * scene.size
         self.intervals, self.looked, self.wants_first = 0, False, True
@@ -176,7 +159,9 @@ class _Judgement:
         try:
             contact, bound = self._search(self.resolution, self.tolerances, self.tolerances)
             if contact is not None:
-                return self._refuted(contact)
+                names, at = self.scene.pair_names(contact.pair), float(contact.t)
+                where = 0.0, at, names, at, names
+                return Verdict("refuted", "refuted", *where, 0.0, self.coal.queries, self.intervals)
             self._polish()
             proven = min(bound, self.best.distance)
             status: Status = "certified" if proven > -np.inf else "undecided"
@@ -196,12 +181,6 @@ class _Judgement:
         except QueryLimit:
             return False
         return contact is None and bound > -np.inf
-
-    def _refuted(self, contact: _Candidate) -> Verdict:
-        names = self.scene.pair_names(contact.pair)
-        at = float(contact.t)
-        where = 0.0, at, names, at, names
-        return Verdict("refuted", "refuted", *where, 0.0, self.coal.queries, self.intervals)
 
     def _free(self, status: Status, margin_status: Status, proven: float) -> Verdict:
         pair = self.scene.pair_names(self.best.pair) if self.best.pair >= 0 else None
@@ -241,8 +220,15 @@ class _Judgement:
         refine, measured = resolution < np.inf, self.resolution < np.inf
         asked = goal, level, self.tolerances
         precision = resolution, self.floor, ROUNDING * self.scene.size
-        if measured and not self.all_exact:
-            self._look_at_meshes(Goal(*asked, np.inf, *precision, True, refine, 0))
+        if measured and not self.all_exact and self.best.pair < 0:
+            # coal's distances of meshes where their convex hulls are closest
+            found = sweep_motion(
+                self.task, Goal(*asked, np.inf, *precision, True, refine, 0), self.work
+            )
+            pairs = np.flatnonzero(~self.task.exact)
+            for pair in pairs[np.argsort(found.pair_least[pairs], kind="stable")][:MAX_POLISHED]:
+                t = found.pair_least_at[pair]
+                self._note(_Candidate(self.coal(pair, t), t, int(pair)))
         while True:
             known, left = self.best.distance, self.limits.intervals - self.intervals
             instants = measured and not (self.looked and refine)
@@ -262,16 +248,6 @@ class _Judgement:
             self.sweep = found
             earlier, proven = self._search_leaves(found, contact, resolution, goal, level)
             return earlier, proven if found.done else -np.inf
-
-    def _look_at_meshes(self, goal: Goal) -> None:
-        """Ask coal for the distances of meshes where their convex hulls are closest."""
-        if self.best.pair >= 0:
-            return
-        found = sweep_motion(self.task, goal, self.work)
-        pairs = np.flatnonzero(~self.task.exact)
-        for pair in pairs[np.argsort(found.pair_least[pairs], kind="stable")][:MAX_POLISHED]:
-            t = found.pair_least_at[pair]
-            self._note(_Candidate(self.coal(pair, t), t, int(pair)))
 
     def _search_leaves(
         self,
@@ -343,11 +319,7 @@ def _joined(leaves: FloatArray) -> FloatArray:
 def _check(
     scene: Scene, motion: Motion, security_margin: float | FloatArray, resolution: float
 ) -> None:
-    """Check that the motion fits the model and that every number is in its range.
-
-    Raises:
-        ValueError: If not.
-    """
+    """Check that the motion fits the model and that every number is in its range."""
     nq = scene.model.nq
     if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
         raise ValueError(f"motion: q must have shape (instants, {nq}), was {motion.q.shape}")
@@ -358,15 +330,11 @@ def _check(
         )
     if not np.isfinite(motion.q).all() or not np.isfinite(motion.polynomials).all():
         raise ValueError("motion: q must be finite, was not")
-    if isinstance(security_margin, float):  # most often; arrays take longer
-        in_range = 0.0 <= security_margin < np.inf
-    else:
-        margins = np.asarray(security_margin, dtype=np.float64)
-        if margins.shape not in ((), (len(scene.pairs),)):
-            text = f"one number, or one per pair ({len(scene.pairs)})"
-            raise ValueError(f"security_margin must be {text}, was of shape {margins.shape}")
-        in_range = bool(((margins >= 0.0) & (margins < np.inf)).all())
-    if not in_range:
+    margins = np.asarray(security_margin, dtype=np.float64)
+    if margins.shape not in ((), (len(scene.pairs),)):
+        text = f"one number, or one per pair ({len(scene.pairs)})"
+        raise ValueError(f"security_margin must be {text}, was of shape {margins.shape}")
+    if not ((margins >= 0.0) & (margins < np.inf)).all():
         raise ValueError(f"security_margin must be at least 0, was {security_margin}")
     if not resolution > 0.0:
         raise ValueError(f"resolution must be above 0, was {resolution}")

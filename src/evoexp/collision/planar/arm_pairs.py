@@ -23,18 +23,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.collision.planar.planar_arms import (
-    OUTLINE_ROWS,
     POINT_ROWS,
     Arm,
     Bounds,
     bounds_of,
-    checked,
     colliding,
     tolerance_of,
 )
 from evoexp.collision.planar.segment_predicates import Line, sign_product, squared_from_link
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vector_rows import Eight, transposed
+from evoexp.numeric.vector_rows import transposed
 from evoexp.numeric.vectors import (
     LANES,
     Mask,
@@ -76,10 +74,6 @@ class Population(NamedTuple):
     block_reaches: FloatArray
 
 
-Directions = tuple[Any, Any, Any, Any]
-"""Cosine and sine of the first link, and of the second, of one arm or of eight."""
-
-
 def count_collisions(
     one: Arm, outlines_1: FloatArray, two: Arm, outlines_2: FloatArray
 ) -> Crossings:
@@ -92,33 +86,18 @@ def count_collisions(
         outlines_2: (K, 8, N2), the same configurations.
 
     Raises:
-        ValueError: If the shapes do not fit, there are more than 32767 configurations, something is
-            not finite or above 1e70, or a half width or radius is negative.
+        ValueError: If there are more than 32767 configurations, or something is not finite or above
+            1e70.
     """
-    enveloped = one.is_enveloped or two.is_enveloped
-    rows = (OUTLINE_ROWS,) if enveloped else (POINT_ROWS, OUTLINE_ROWS)
-    outlines_1 = checked("outlines_1", outlines_1, *rows)
-    outlines_2 = checked("outlines_2", outlines_2, *rows)
-    sizes = outlines_1.shape[0], outlines_2.shape[0]
-    if sizes[0] != sizes[1]:
-        raise ValueError(
-            "outlines_1 and outlines_2 must have as many configurations, had "
-            f"{sizes[0]} and {sizes[1]}"
-        )
-    if sizes[0] > MOST_CONFIGURATIONS:
-        raise ValueError(
-            f"outlines_1: at most {MOST_CONFIGURATIONS} configurations, were {sizes[0]}"
-        )
+    outlines_1, outlines_2 = np.ascontiguousarray(outlines_1), np.ascontiguousarray(outlines_2)
+    num_configurations = len(outlines_1)
+    if num_configurations > MOST_CONFIGURATIONS:
+        must = f"at most {MOST_CONFIGURATIONS} configurations"
+        raise ValueError(f"outlines_1: {must}, were {num_configurations}")
     for name, arm, outlines in (("one", one, outlines_1), ("two", two, outlines_2)):
         numbers = np.array([*arm.base, *arm.lengths, arm.half_width, arm.tcp_radius])
         if not (np.abs(numbers) < LARGEST).all() or not (np.abs(outlines) < LARGEST).all():
             raise ValueError(f"{name} and its outlines must be finite and below 1e70, was {arm}")
-        if (numbers[4:] < 0.0).any():
-            raise ValueError(
-                f"{name}: half_width and tcp_radius must be at least 0, were {arm.half_width} and "
-                f"{arm.tcp_radius}"
-            )
-    one, two = one.in_floats, two.in_floats
     num_1, num_2 = outlines_1.shape[2], outlines_2.shape[2]
     sums = np.zeros(num_1, dtype=np.int64), np.zeros(num_2, dtype=np.int64)
     crossings = Crossings(np.zeros((num_1, num_2), dtype=np.int16), *sums)
@@ -137,17 +116,10 @@ def count_pairs(
     sums_1: IntArray,
     sums_2: IntArray,
 ) -> None:
-    """Write the counts of all pairs, and their sums.
+    """Write the fields of `Crossings`.
 
-    Args:
-        arm_1: Arm of population 1.
-        outlines_1: (K, 4 | 8, N1), finite; with directions if an arm has an envelope.
-        arm_2: Arm of population 2.
-        outlines_2: (K, 4 | 8, N2), finite.
-        tolerance: Of `tolerance_of`.
-        counts: (N1, N2) int16.
-        sums_1: (N1,) int64.
-        sums_2: (N2,) int64.
+    Outlines (K, 4 | 8, N1) and (K, 4 | 8, N2) are finite, and hold directions if an arm has an
+    envelope; the tolerance is that of `tolerance_of`.
     """
     bounds = bounds_of(arm_1, arm_2, tolerance)
     one, two = _population(arm_1, outlines_1, 1.0), _population(arm_2, outlines_2, -1.0)
@@ -181,12 +153,7 @@ def count_pairs(
 
 @kernel
 def _population(arm: Arm, outlines: FloatArray, toward: float) -> Population:
-    """Return a population in blocks.
-
-    Args:
-        outlines: (K, 4 | 8, N).
-        toward: 1 for arm 1; −1 for arm 2, which reaches against the axes.
-    """
+    """Return a population (K, 4 | 8, N) in blocks; arm 2 reaches toward −1, against the axes."""
     num_configurations, rows, num = outlines.shape
     width, flat = (num + LANES - 1) // LANES * LANES, borrowed(outlines.reshape(-1))
     padded = np.empty(num_configurations * rows * width)
@@ -203,28 +170,24 @@ def _population(arm: Arm, outlines: FloatArray, toward: float) -> Population:
             tip_x = toward * load(padded, o + U(2) * step)
             tip_y = toward * load(padded, o + U(3) * step)
             # how far each arm reaches toward the others, and all of them
-            each = transposed(_reaches(x, y, elbow_x, elbow_y, tip_x, tip_y))
+            each = transposed(
+                (
+                    _most(x, elbow_x, tip_x),
+                    _most(y, elbow_y, tip_y),
+                    _most(x + y, elbow_x + elbow_y, tip_x + tip_y),
+                    _most(x - y, elbow_x - elbow_y, tip_x - tip_y),
+                    _most(-x, 0.0 - elbow_x, 0.0 - tip_x),
+                    _most(-y, 0.0 - elbow_y, 0.0 - tip_y),
+                    _most(-x - y, 0.0 - elbow_x - elbow_y, 0.0 - tip_x - tip_y),
+                    _most(y - x, elbow_y - elbow_x, tip_y - tip_x),
+                )
+            )
             most = each[0]
             for lane in range(LANES):
                 most = upper(most, each[lane])
                 store(reaches, U(((first + lane) * num_configurations + k) * LANES), each[lane])
             store(block_reaches, U(first * num_configurations + k * LANES), most)
     return Population(arm, padded, rows, width, reaches, block_reaches)
-
-
-@inlined
-def _reaches(x: float, y: float, a: Vector, b: Vector, c: Vector, d: Vector) -> Eight:
-    """Return how far base, elbow and tip reach along x, y, x + y, x − y, then against them."""
-    return (
-        _most(x, a, c),
-        _most(y, b, d),
-        _most(x + y, a + b, c + d),
-        _most(x - y, a - b, c - d),
-        _most(-x, 0.0 - a, 0.0 - c),
-        _most(-y, 0.0 - b, 0.0 - d),
-        _most(-x - y, 0.0 - a - b, 0.0 - c - d),
-        _most(y - x, b - a, d - c),
-    )
 
 
 @inlined
@@ -243,14 +206,9 @@ def _test_block(
     bounds: Bounds,
     tally: FloatArray,
 ) -> None:
-    """Count the configurations in which arms 1 of a block collide with those of a block of arms 2.
+    """Count the configurations in which arms 1 of a block, from `first` on, collide.
 
-    Args:
-        first: First arm of a block of population 1.
-        count: How many arms 1 there are.
-        begin: First arm of a block of population 2.
-        num_configurations: K.
-        tally: See `count_pairs`; those of the block are added.
+    Those of population 2 are the block from `begin` on; the tally is that of `count_pairs`.
     """
     one, two, tally = borrowed((one, two, tally))
     lanes, size, column = U(LANES), U(num_configurations * LANES), U(begin)
@@ -315,10 +273,10 @@ def _sign_products(one: tuple[Line, Line], two: tuple[Line, Line]) -> Vector:
 def _boundary_products(
     arm_1: Arm,
     one: tuple[Line, Line],
-    turns_1: Directions,
+    turns_1: Line,
     arm_2: Arm,
     two: tuple[Line, Line],
-    turns_2: Directions,
+    turns_2: Line,
 ) -> Vector:
     """Return the least sign product of the boundary lines of two arms, or of links without such."""
     least, half_1, half_2 = spread(np.inf), arm_1.half_width, arm_2.half_width
@@ -331,7 +289,7 @@ def _boundary_products(
 
 
 @inlined
-def _beside(links: tuple[Line, Line], turns: Directions, shift: float) -> tuple[Line, Line]:
+def _beside(links: tuple[Line, Line], turns: Line, shift: float) -> tuple[Line, Line]:
     """Return lines parallel to links."""
     (x, y, u, v), (elbow_x, elbow_y, w, z), (c, s, d, t) = links[0], links[1], turns
     second = (elbow_x - shift * t, elbow_y + shift * d, w, z)
@@ -342,10 +300,10 @@ def _beside(links: tuple[Line, Line], turns: Directions, shift: float) -> tuple[
 def _circle_distances(
     arm_1: Arm,
     one: tuple[Line, Line],
-    turns_1: Directions,
+    turns_1: Line,
     arm_2: Arm,
     two: tuple[Line, Line],
-    turns_2: Directions,
+    turns_2: Line,
 ) -> Vector:
     """Return the least squared distance, less radius², of circles from lines and each other."""
     (x_1, y_1, u, v), (x_2, y_2, w, z) = one[1], two[1]
@@ -359,7 +317,7 @@ def _circle_distances(
 
 @inlined
 def _circle_distance(
-    arm: Arm, links: tuple[Line, Line], turns: Directions, x: Vector, y: Vector, radius: float
+    arm: Arm, links: tuple[Line, Line], turns: Line, x: Vector, y: Vector, radius: float
 ) -> Vector:
     """Return the squared distance, less radius², of a circle around (x, y) from an arm's lines."""
     (elbow_x, elbow_y, _, _), (c, s, d, t), half = links[1], turns, arm.half_width

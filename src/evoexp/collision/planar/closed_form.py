@@ -22,11 +22,6 @@ class ClosedForm(NamedTuple):
     nu: FloatArray  # (4, n) the same on the link of arm 2
     crossing: BoolArray  # (4, n) whether the links have a point in common
 
-    @property
-    def colliding(self) -> BoolArray:
-        """Whether any pair of links crosses, (n,)."""
-        return np.asarray(self.crossing.any(axis=0))
-
 
 def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedForm:
     """Intersect all four pairs of links (Curkovic et al. 2013, Eqs. 11–12 and Fig. 7).
@@ -64,16 +59,14 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
         np.divide(_cross(w, v), across, out=mu[pair], where=skew)
         np.divide(_cross(w, u), across, out=nu[pair], where=skew)
     crossing = np.empty(mu.shape, dtype=np.bool_)
-    _write_crossings(joints_1, joints_2, tolerance_of(one.in_floats, two.in_floats), crossing)
+    _write_crossings(joints_1, joints_2, tolerance_of(one, two), crossing)
     return ClosedForm(mu, nu, crossing)
 
 
 def _joints(arm: Arm, q: FloatArray) -> FloatArray:
     """Return base, elbow and tip, (3, 2, n), at link angles (2, n) [rad]."""
-    joints = np.empty((3, 2, q.shape[1]))
-    joints[0] = np.array(arm.base)[:, None]
-    joints[1:] = arm.outlines(q[None])[0, :4].reshape(2, 2, -1)
-    return joints
+    base = np.repeat(np.reshape(arm.base, (1, 2, 1)), q.shape[1], axis=2)
+    return np.concatenate([base, arm.outlines(q[None])[0, :4].reshape(2, 2, -1)])
 
 
 def _cross(u: FloatArray, v: FloatArray) -> FloatArray:

@@ -65,30 +65,6 @@ class PathChecks(NamedTuple):
 
 
 @kernel
-def paths_collide(
-    starts: FloatArray,
-    ends: FloatArray,
-    lanes: IntArray,
-    count: int,
-    arm: PlanarArm,
-    ellipses: Ellipses,
-    path: TestedPath,
-    hit: BoolArray,
-) -> None:
-    """Find which straight joint-space paths collide (Lavoie & Boudreau 2001, Eq. 3).
-
-    Args:
-        starts: (N, individuals) joint angles at the start of each path, relative [rad].
-        ends: (N, individuals) at its end.
-        lanes: (≥ count) indices of the individuals to test.
-        path: The positions that are tested.
-        hit: (individuals,) written for those tested: whether each collides.
-    """
-    checks = prepare_checks(len(starts), count)
-    check_paths(starts, ends, lanes, count, arm, ellipses, path, hit, checks)
-
-
-@kernel
 def prepare_checks(num: int, count: int) -> PathChecks:
     """Make the scratch of `check_paths`: for an arm of `num` links, at most `count` paths."""
     rows = num * LANES
@@ -114,10 +90,14 @@ def check_paths(
     hit: BoolArray,
     checks: PathChecks,
 ) -> None:
-    """Do the work of `paths_collide` with what is prepared, as often as paths are to be tested.
+    """Find which straight joint-space paths collide (Lavoie & Boudreau 2001, Eq. 3).
 
     Args:
-        starts: As of `paths_collide`, and so are all but `checks`.
+        starts: (N, individuals) joint angles at the start of each path, relative [rad].
+        ends: (N, individuals) at its end.
+        lanes: (≥ count) indices of the individuals to test.
+        path: The positions that are tested.
+        hit: (individuals,) written for those tested: whether each collides.
         checks: Of `prepare_checks`; given, so that inner loops count no references.
     """
     starts, ends, lanes, arm, ellipses, hit, checks = borrowed(
@@ -180,13 +160,7 @@ def _sweep(
 def _test_links(
     ellipses: Ellipses, checks: PathChecks, now: int, chords: bool, gaps: Vector
 ) -> Vector:
-    """Lower `gaps` where a link, or a chord since the position before, meets an ellipse.
-
-    Args:
-        checks: With link ends.
-        now: Where the link ends of this position are.
-        chords: Whether chords are tested.
-    """
+    """Lower `gaps` where a link, or a chord since the position before, meets an ellipse."""
     x, y, u, v = checks.x[now], checks.y[now], checks.x[1 - now], checks.y[1 - now]
     num_ends = U(len(x)) // VECTOR
     for e in range(len(ellipses.maps)):

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.collision.bodies.body_shapes import Shapes
+from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.planar.arm_pairs import Crossings, count_collisions
 from evoexp.collision.planar.planar_arms import Arm, largest_coordinate, path_configurations
 from evoexp.collision.planar.segment_predicates import contact_tolerance
@@ -44,7 +44,7 @@ class LinkCrossings(Component):
         table = obstacle_table(obstacles).without_ellipses()
         firsts = (int(first) + 1 for first, _ in assembly.arm_slices)
         solids = tuple(
-            BodyCollision.build(assembly.model, _boundary_shapes(arm, first, table), table, ())
+            BodyCollision.build(assembly.table, _boundary_shapes(arm, first, table), table, ())
             for arm, first in zip(arms, firsts, strict=True)
             if len(table.kind)
         )
@@ -125,22 +125,18 @@ def _boundary_shapes(arm: Arm, first: int, obstacles: ObstacleTable) -> Shapes:
     """Return an arm's lines, or boundary lines, and its circle as thin capsules and a sphere.
 
     They are thicker by what rounding may hide, so that what touches an obstacle collides.
-
-    Args:
-        first: Pinocchio's index of its first joint.
-        obstacles: Among which it stands.
     """
     far = (np.abs(obstacles.center).sum(axis=1) + obstacles.size.sum(axis=1)).max(initial=0.0)
     near = contact_tolerance(largest_coordinate(arm) + float(far))
     beside = (-arm.half_width, arm.half_width) if arm.half_width > 0.0 else (0.0,)
     rows = [
-        (first + link, (0.0, y, 0.0), (length, y, 0.0), near)
+        (first + link, (0.0, y, 0.0), (length, y, 0.0), near, first + link)
         for link, length in enumerate(arm.lengths)
         for y in beside
     ]
     if arm.tcp_radius > 0.0:
         tip = (arm.lengths[1], 0.0, 0.0)
-        rows.append((first + 1, tip, tip, arm.tcp_radius + near))
+        rows.append((first + 1, tip, tip, arm.tcp_radius + near, first + 1))
     return Shapes(*(np.array(column) for column in zip(*rows, strict=True)))
 
 

@@ -8,9 +8,10 @@ from evoexp.collision.bodies.body_collision import FreeTest, leading_free
 from evoexp.collision.planar.ellipse_kernels import (
     Ellipses,
     TestedPath,
+    check_paths,
     gap,
     mapped,
-    paths_collide,
+    prepare_checks,
 )
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
@@ -56,8 +57,8 @@ class LinkEllipses(Component):
         rows = list(zip(*columns, strict=True))[:seen]
         maps = np.array([_to_unit_circle(*row) for row in rows]).reshape(-1, 5)
         reached = np.array([_first_link(arm, *row) for row in rows], dtype=np.int64)
-        ellipses, swept = Ellipses(maps, reached), self.swept == "chords"
-        return EllipseCollision(arm, ellipses, self.num_positions, swept, obstacles)
+        path = TestedPath(self.num_positions, self.swept == "chords")
+        return EllipseCollision(arm, Ellipses(maps, reached), path, obstacles)
 
 
 class Contact(NamedTuple):
@@ -74,8 +75,7 @@ class EllipseCollision(NamedTuple):
 
     arm: PlanarArm  # link lengths and base
     ellipses: Ellipses  # the ellipses as the kernels read them
-    num_positions: int  # m
-    chords: bool  # whether chords are swept
+    path: TestedPath  # the positions and chords that are tested
     obstacles: ObstacleTable  # the obstacle table
 
     @property
@@ -84,14 +84,9 @@ class EllipseCollision(NamedTuple):
         return len(self.arm.lengths) * len(self.ellipses.maps)
 
     @property
-    def path(self) -> TestedPath:
-        """The positions and chords that are tested."""
-        return TestedPath(self.num_positions, self.chords)
-
-    @property
     def queries(self) -> int:
         """Configurations that judging one path asks for; none if there is nothing to meet."""
-        return self.num_positions if len(self.ellipses.maps) else 0
+        return self.path.num_positions if len(self.ellipses.maps) else 0
 
     def collide(self, starts: FloatArray, ends: FloatArray) -> BoolArray:
         """Return which paths collide, (individuals,).
@@ -112,35 +107,46 @@ class EllipseCollision(NamedTuple):
         lanes = np.arange(starts.shape[1])
         hit = np.zeros(len(lanes), dtype=np.bool_)
         starts, ends = (np.ascontiguousarray(q, dtype=np.float64) for q in (starts, ends))
-        paths_collide(starts, ends, lanes, len(lanes), self.arm, self.ellipses, self.path, hit)
+        about = self.arm, self.ellipses, self.path, hit, prepare_checks(num, len(lanes))
+        check_paths(starts, ends, lanes, len(lanes), *about)
         return hit
 
     def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
         """Return the first contact of a path between postures (N,) [rad]; None if it is free."""
-        start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
-        position, obstacle, link, swept = _first_contact(
-            start, end, self.arm, self.ellipses, self.num_positions, self.chords
-        )
-        return None if position < 0 else Contact(position, obstacle + 1, link, bool(swept))
+        if not self.collide(start[:, None], end[:, None])[0]:
+            return None
+        num_links, last = len(self.arm.lengths), self.path.num_positions
+        begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)
+        x, y = np.empty((2, 2, (num_links + 1) * LANES))  # of link ends at two positions
+        block_ends(begin, stop, self.arm, 0, last, x[0], y[0])
+        for position in range(1, last + 1):
+            old, new = (position + 1) % 2, position % 2
+            block_ends(begin, stop, self.arm, position, last, x[new], y[new])
+            for e, ellipse in enumerate(self.ellipses.maps):
+                for k in range(num_links + 1):
+                    at, root = k * LANES, max(k - 1, 0) * LANES
+                    here = mapped(ellipse, x[new, at], y[new, at])
+                    before = mapped(ellipse, x[old, at], y[old, at])
+                    if self.path.chords and gap(*before, *here) <= 0.0:
+                        return Contact(position, e + 1, k, swept=True)
+                    if gap(*mapped(ellipse, x[new, root], y[new, root]), *here) <= 0.0:
+                        return Contact(position, e + 1, k, swept=False)
+        return None
 
-
-class EllipseConfigurations:
-    """The model of Lavoie & Boudreau 2001 at single configurations, without chords."""
-
-    def __init__(self, collision: EllipseCollision) -> None:
-        """Take the model of paths."""
-        self._collision = collision._replace(num_positions=1, chords=False)
+    @property
+    def at_configurations(self) -> "EllipseCollision":
+        """The model of single configurations, without chords."""
+        return self._replace(path=TestedPath(1, chords=False))
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations (N, count) [deg] collide, (count,)."""
         angles = np.ascontiguousarray(DEGREE * q)
-        return self._collision.collide(angles, angles)
+        return self.at_configurations.collide(angles, angles)
 
     @property
     def free_test(self) -> FreeTest:
         """The test of configurations for kernels of other rooms."""
-        collision = self._collision
-        return FreeTest.of(_num_free, (collision.arm, collision.ellipses, collision.path))
+        return FreeTest.of(_num_free, (self.arm, self.ellipses, self.at_configurations.path))
 
 
 @kernel
@@ -148,54 +154,9 @@ def _num_free(tables: tuple[PlanarArm, Ellipses, TestedPath], q: FloatArray) -> 
     """Return how many configurations (N, count) [rad] precede the eight of the first contact."""
     arm, ellipses, path = tables
     lanes, hit = np.arange(q.shape[1]), np.zeros(q.shape[1], dtype=np.bool_)
-    paths_collide(q, q, lanes, len(lanes), arm, ellipses, path, hit)
+    checks = prepare_checks(len(q), len(lanes))
+    check_paths(q, q, lanes, len(lanes), arm, ellipses, path, hit, checks)
     return leading_free(hit)
-
-
-@kernel
-def _first_contact(
-    start: FloatArray,
-    end: FloatArray,
-    arm: PlanarArm,
-    ellipses: Ellipses,
-    num_positions: int,
-    chords: bool,
-) -> tuple[int, int, int, bool]:
-    """Find the first contact of one path, by position, ellipse and link, chords before links.
-
-    Args:
-        start: (N,) joint angles at the start [rad].
-        end: (N,) at the end.
-        num_positions: M.
-        chords: Whether chords are swept.
-
-    Returns:
-        Position; index of the ellipse; link, or link end, from 1; whether the chord of that end
-        touches. −1, −1, −1 and false if nothing touches.
-    """
-    num = len(start)
-    begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)
-    x, y = np.empty((2, (num + 1) * LANES)), np.empty((2, (num + 1) * LANES))
-    block_ends(begin, stop, arm, 0, num_positions, x[0], y[0])
-    for position in range(1, num_positions + 1):
-        old, new = (position + 1) % 2, position % 2
-        block_ends(begin, stop, arm, position, num_positions, x[new], y[new])
-        for e in range(len(ellipses.maps)):
-            ellipse = ellipses.maps[e]
-            for k in range(num + 1):
-                at, root = k * LANES, max(k - 1, 0) * LANES
-                here = mapped(ellipse, x[new, at], y[new, at])
-                if chords and _meets(mapped(ellipse, x[old, at], y[old, at]), here):
-                    return position, e, k, True
-                if _meets(mapped(ellipse, x[new, root], y[new, root]), here):
-                    return position, e, k, False
-    return -1, -1, -1, False
-
-
-@kernel
-def _meets(one: tuple[float, float], two: tuple[float, float]) -> bool:
-    """Return whether a segment, given by its `mapped` ends, touches the unit circle."""
-    return bool(gap(one[0], one[1], two[0], two[1]) <= 0.0)
 
 
 def _to_unit_circle(

@@ -42,13 +42,6 @@ class Arm(NamedTuple):
         """Whether the arm is more than its lines."""
         return self.half_width > 0.0 or self.tcp_radius > 0.0
 
-    @property
-    def in_floats(self) -> "Arm":
-        """The same arm, its numbers as kernels take them."""
-        (x, y), (first, second) = self.base, self.lengths
-        base, lengths = (float(x), float(y)), (float(first), float(second))
-        return Arm(base, lengths, float(self.half_width), float(self.tcp_radius))
-
     def outlines(self, q: FloatArray) -> FloatArray:
         """Return the outlines of a population, (K, 8, N).
 
@@ -58,25 +51,13 @@ class Arm(NamedTuple):
         Raises:
             ValueError: If q has another shape.
         """
-        q = checked("q", q, 2)
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        if q.ndim != 3 or q.shape[1] != 2:
+            must = "(configurations, 2, individuals)"
+            raise ValueError(f"q must have shape {must}, was {q.shape}")
         outlines = np.empty((q.shape[0], OUTLINE_ROWS, q.shape[2]))
-        write_outlines(q, self.in_floats, outlines)
+        write_outlines(q, self, outlines)
         return outlines
-
-
-def checked(name: str, array: FloatArray, *rows: int) -> FloatArray:
-    """Return an array of a population, contiguous.
-
-    Raises:
-        ValueError: If it is not (configurations, one of some numbers of rows, individuals).
-    """
-    array = np.ascontiguousarray(array, dtype=np.float64)
-    if array.ndim != 3 or array.shape[1] not in rows:
-        allowed = " or ".join(map(str, rows))
-        raise ValueError(
-            f"{name} must have shape (configurations, {allowed}, individuals), was {array.shape}"
-        )
-    return array
 
 
 def path_configurations(
@@ -97,16 +78,7 @@ def path_configurations(
     Returns:
         Configurations ((K + 1) · collision_substeps − 1, 2, N) [rad]; every `collision_substeps`-th
         is a gene's own.
-
-    Raises:
-        ValueError: If a shape does not fit, or collision_substeps is below 1.
     """
-    genes = checked("genes", genes, 2)
-    if collision_substeps < 1:
-        raise ValueError(f"collision_substeps must be at least 1, was {collision_substeps}")
-    for name, end in (("start", start), ("goal", goal)):
-        if np.shape(end) != (2,):
-            raise ValueError(f"{name} must have shape (2,), was {np.shape(end)}")
     num = genes.shape[2]
     before, after = (np.repeat(np.reshape(end, (1, 2, 1)), num, axis=2) for end in (start, goal))
     corners = np.concatenate([before, genes, after])[:, None]
@@ -118,12 +90,9 @@ def path_configurations(
 
 @kernel
 def write_outlines(q: FloatArray, arm: Arm, outlines: FloatArray) -> None:
-    """Write elbows and tips (Eq. 11), and the links' directions where there is room for them.
+    """Write elbows and tips (Eq. 11) to outlines (K, 4 | 8, N), and directions if there is room.
 
-    Args:
-        q: (K, 2, N) angles of the links from +x [rad].
-        arm: Its base and lengths count.
-        outlines: (K, 4 | 8, N), written.
+    The angles q (K, 2, N) [rad] of the links are counted from +x.
     """
     num_configurations, rows, count = outlines.shape
     (base_x, base_y), (first, second) = arm.base, arm.lengths
@@ -131,8 +100,13 @@ def write_outlines(q: FloatArray, arm: Arm, outlines: FloatArray) -> None:
     for k in range(num_configurations):
         x = U(rows * k) * num
         y, z, w = x + num, x + U(2) * num, x + U(3) * num
+        # cosines, then sines, exact at multiples of 90°
         for link in range(2):
-            _write_directions(angles, U(2 * k + link) * num, count, flat, x + U(2 * link) * num)
+            angle, cosines = U(2 * k + link) * num, x + U(2 * link) * num
+            for n in range(count):
+                sine, cosine = exact_sincos(angles[angle + U(n)])
+                flat[cosines + U(n)] = cosine
+                flat[cosines + num + U(n)] = sine
         if rows == OUTLINE_ROWS:
             for n in range(4 * count):
                 flat[x + U(4) * num + U(n)] = flat[x + U(n)]
@@ -143,18 +117,6 @@ def write_outlines(q: FloatArray, arm: Arm, outlines: FloatArray) -> None:
         for n in range(count):
             flat[z + U(n)] = flat[x + U(n)] + second * flat[z + U(n)]
             flat[w + U(n)] = flat[y + U(n)] + second * flat[w + U(n)]
-
-
-@kernel
-def _write_directions(
-    angles: FloatArray, begin: np.uint64, count: int, out: FloatArray, x: np.uint64
-) -> None:
-    """Write cosines, then sines, of a row of angles to x on, exact at multiples of 90°."""
-    y = x + U(count)
-    for n in range(count):
-        sine, cosine = exact_sincos(angles[begin + U(n)])
-        out[x + U(n)] = cosine
-        out[y + U(n)] = sine
 
 
 @kernel
@@ -212,12 +174,6 @@ def largest_coordinate(arm: Arm) -> float:
 
 
 @kernel
-def num_boundaries(arm: Arm) -> int:
-    """Return the number of an arm's lines: its links, or two boundary lines for each of them."""
-    return 4 if arm.half_width > 0.0 else 2
-
-
-@kernel
 def boundary(
     arm: Arm, outlines: FloatArray, k: int, n: int, line: int
 ) -> tuple[float, float, float, float]:
@@ -246,22 +202,24 @@ def colliding(
 ) -> bool:
     """Return whether two individuals are at most a tolerance apart in configuration k."""
     radius_1, radius_2 = arm_1.tcp_radius, arm_2.tcp_radius
+    # an arm's links, or two boundary lines for each of them
+    num_1, num_2 = 4 if arm_1.half_width > 0.0 else 2, 4 if arm_2.half_width > 0.0 else 2
     # circle against circle
     cx, cy = outlines_1[k, 2, i], outlines_1[k, 3, i]
     fx, fy = outlines_2[k, 2, j], outlines_2[k, 3, j]
     if _near((fx - cx) * (fx - cx) + (fy - cy) * (fy - cy), radius_1 + radius_2, tolerance):
         return True
     # lines of arm 1 against the circle and the lines of arm 2
-    for one in range(num_boundaries(arm_1)):
+    for one in range(num_1):
         ax, ay, bx, by = boundary(arm_1, outlines_1, k, i, one)
         if _near(squared_distance(ax, ay, bx, by, fx, fy), radius_2, tolerance):
             return True
-        for two in range(num_boundaries(arm_2)):
+        for two in range(num_2):
             dx, dy, ex, ey = boundary(arm_2, outlines_2, k, j, two)
             if meeting(ax, ay, bx, by, dx, dy, ex, ey, tolerance):
                 return True
     # lines of arm 2 against the circle of arm 1
-    for two in range(num_boundaries(arm_2)):
+    for two in range(num_2):
         dx, dy, ex, ey = boundary(arm_2, outlines_2, k, j, two)
         if _near(squared_distance(dx, dy, ex, ey, cx, cy), radius_1, tolerance):
             return True

@@ -109,13 +109,7 @@ def squared_from_link(
 ) -> Vector:
     """Return the squared distance of points from the nearer of a link's boundary lines.
 
-    Args:
-        x: From the link's beginning.
-        y: Likewise.
-        c: Cosine of the link's direction.
-        s: Its sine.
-        length: Of the link.
-        half_width: Distance of both lines from the link.
+    Points are seen from the link's beginning; c and s are cosine and sine of its direction.
     """
     along, off = c * x + s * y, magnitude(c * y - s * x) - half_width
     out = upper(upper(0.0 - along, along - length), spread(0.0))

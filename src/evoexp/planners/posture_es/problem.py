@@ -145,19 +145,7 @@ def _bodies(
 
 def notes(problem: Problem) -> tuple[str, ...]:
     """Describe the collision model and list the body pairs that it skips."""
-    bodies, names, unit = problem.bodies, problem.bodies.names, problem.task.length_unit
-    lines = [bodies.described(unit), *bodies.reach_notes(unit)]
-    found, only = bodies.sorted_pairs, "judged by the certifier only"
-    for what, pairs in (
-        ("neighbours or disabled, not tested", found.adjacent),
-        ("always touch, not tested", found.always),
-        ("never touch, not tested", found.never),
-        (f"touch in no posture sampled, {only}", found.unseen),
-        (f"covers touch in every posture sampled, {only}", found.overlapping),
-    ):
-        if pairs:
-            lines.append(f"{what}: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs))
-    return (*lines, *bodies.fitting_notes("the start or the goal", unit))
+    return tuple(problem.bodies.notes(problem.task.length_unit, is_complete=True))
 
 
 def _limits(assembly: Assembly) -> FloatArray:

@@ -16,7 +16,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.planar.link_ellipses import EllipseConfigurations
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.answers import joint_names, of_limits, of_place
@@ -79,7 +78,7 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
 
         It is inf where a tested edge collides.
         """
-        edges = EdgeTest(EllipseConfigurations(problem.collision), self.resolution)
+        edges = EdgeTest(problem.collision, self.resolution)
         return judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
@@ -132,7 +131,7 @@ class _Search:
 
     def __init__(self, planner: RrtReaching, problem: Problem) -> None:
         self._planner, self._problem = planner, problem
-        self.edges = EdgeTest(EllipseConfigurations(problem.collision), planner.resolution)
+        self.edges = EdgeTest(problem.collision, planner.resolution)
         self.best_cost, self.population, self.stop_reason = np.inf, problem.start[None], ""
         self._steps: Iterator[float] | None = None
         self._plans = self._iterations = 0

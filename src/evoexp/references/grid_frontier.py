@@ -3,17 +3,14 @@
 The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no shortest-path
 algorithm minimises it. The truth is enclosed:
 
-- from above, by valid paths: the frontier of D + μ ΣS over all μ, the best of its paths improved by
-  exchanges of a few nodes (`grid_bounds`);
-- from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
-  ε D + (λ / N) ΣS is additive, so dynamic programming over 1 … N nodes finds the best walk, for
-  every N. That is the exact optimum where nodes may be passed again. Where they may not,
-  multipliers that punish further visits raise the bound, and the walks without their loops are
-  further paths.
+- from above, by valid paths: the best of the frontier of D + μ ΣS over all μ, or the best walk if
+  it has no loops;
+- from below, by walks, which may pass nodes again (`grid_bounds`). The least cost of all walks is
+  the exact optimum where nodes may be passed again, else a bound.
 
 Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`): every path
-of the frontier was improved, and the bounds are those of walks that never go straight back.
-`scripts/update-grid-truths` finds both.
+of the frontier was improved by exchanges of a few nodes, and the bounds were raised by Lagrangian
+relaxation. `scripts/update-grid-truths` finds both.
 """
 
 import hashlib
@@ -28,14 +25,7 @@ from pydantic import Field
 from evoexp.errors import SettingError
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.references.grid_bounds import (
-    Exchanges,
-    Network,
-    arrivals_of,
-    best_walks,
-    network_of,
-    relaxed,
-)
+from evoexp.references.grid_bounds import Network, arrivals_of, best_walks, network_of
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import LayoutCount, NonNegativeCount, Positive
 
@@ -74,10 +64,11 @@ class GridFrontier(Reference):
     greatest_weight: Positive  # of μ [cell]
     # of the walks; longer walks are not searched, and cannot be better if ε is not very small
     max_nodes: LayoutCount
+    # The next four are those of `scripts/update-grid-truths`, and tell of the shipped maps' truths:
     # no exchange of at most so many nodes improves the best path known
     exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
-    # of the shipped maps' paths, see `scripts/update-grid-truths`: exchanges of at most so many
-    # nodes are made though they cost more, to improve the path from there
+    # exchanges of at most so many nodes are made though they cost more, to improve the path from
+    # there
     forced_nodes: Annotated[int, Field(ge=0, le=4)]
     # the bound is raised until it is within this part of the best cost known, by every number
     # of nodes [-]
@@ -113,16 +104,11 @@ class GridFrontier(Reference):
                 network, *self.planner.objective.weights, float(rows[:, 4].min()), self.max_nodes
             )
             if self.planner.revisits or len(set(walk.tolist())) == len(walk):
-                best, known = self._better(problem, [walk], best, known)
-            if known_map is None and not self.planner.revisits:
-                exchanges = Exchanges(network, self.planner.objective.weights, self.exchanged_nodes)
-                best, known = self._better(problem, [exchanges.descend(best)], best, known)
+                cost = self.path_cost(problem, walk)
+                best, known = (walk, cost) if cost <= known else (best, known)
             floors, beyond = self.floors(network, known, walks)
             if known_map is not None:
                 floors[2:] = known_map.bounds
-            elif not self.planner.revisits:
-                paths_besides = self._relaxed(network, known, floors)
-                best, known = self._better(problem, paths_besides, best, known)
             bounds = np.column_stack([np.arange(2.0, len(floors)), floors[2:]])
             bound = float(min(floors[2:].min(initial=np.inf), beyond, known))
         terms = {
@@ -169,10 +155,8 @@ class GridFrontier(Reference):
         epsilon, lam = self.planner.objective.weights
         most = most_nodes(network, epsilon, lam, known, self.max_nodes)
         # a path of more nodes costs as much at least; without loops there may be none
-        beyond, present = (
-            epsilon * most + lam * _least_unsafeness(network),
-            np.unique(network.tails),
-        )
+        beyond = epsilon * most + lam * _least_unsafeness(network)
+        present = np.unique(network.tails)
         if not self.planner.revisits and most >= len(present):
             beyond, most = np.inf, len(present)
         # numbers of nodes that are left out have no better walk than the best one
@@ -180,22 +164,6 @@ class GridFrontier(Reference):
         inside = walks[:, 0] <= most
         floors[walks[inside, 0].astype(np.int64)] = walks[inside, 1]
         return floors, beyond
-
-    def _relaxed(self, network: Network, known: float, floors: FloatArray) -> list[np.ndarray]:
-        """Raise the bounds in place; return the paths that were found besides."""
-        epsilon, lam = self.planner.objective.weights
-        enough = (1.0 - self.bound_gap) * known
-        return relaxed(arrivals_of(network, epsilon), lam, known, enough, floors, self.bound_steps)
-
-    def _better(
-        self, problem: Any, paths: list[np.ndarray], best: np.ndarray, known: float
-    ) -> tuple[np.ndarray, float]:
-        """Return the best of some paths and of the one known, and its cost."""
-        for path in paths:
-            cost = self.path_cost(problem, path)
-            if cost <= known:
-                best, known = path, cost
-        return best, known
 
     def _rows(self, problem: Any, paths: list[tuple[float, np.ndarray]]) -> FloatArray:
         return np.array([(mu, *self._judged(problem, path)) for mu, path in paths])

@@ -11,8 +11,14 @@ import pytest
 import scipy
 
 from evoexp.errors import SettingError
-from evoexp.references.grid_bounds import arrivals_of, best_walks, network_of
-from evoexp.references.grid_frontier import GridFrontier, best_walk, frontier
+from evoexp.references.grid_frontier import (
+    GridFrontier,
+    arrivals_of,
+    best_walk,
+    best_walks,
+    frontier,
+    network_of,
+)
 from planners.grid_samples import planner, robot, scenario, solvable
 from references.all_paths import all_simple_paths, path_cost
 from shipped_conditions import expanded

@@ -84,8 +84,11 @@ def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureT
     if q_goal is None:
         link = task.link_goal(world.frames)
     else:
-        tool = _tool_pose(assembly, q_goal)
-        link = LinkGoal("", tool, task.position_tolerance, task.angle_tolerance)
+        tool = assembly.tools[0]
+        local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
+        pose = frame_pose(assembly.table, tool.joint - 1, local, q_goal)
+        place = Pose(pose[:9].reshape(3, 3), pose[9:])
+        link = LinkGoal("", place, task.position_tolerance, task.angle_tolerance)
     x, y, z = link.pose.position.tolist()
     goal: PoseGoal | PointGoal = PointGoal(kind="point", point=(x, y, z))
     if link.angle is not None:
@@ -125,11 +128,3 @@ def hull_notes(names: Sequence[str]) -> tuple[str, ...]:
 def _typed(assembly: Assembly, q: FloatArray) -> FloatArray:
     """Return q (nq,) [rad, m] as scenarios give it [deg, m]."""
     return np.where(assembly.table.slides, q, q / DEGREE)
-
-
-def _tool_pose(assembly: Assembly, q: FloatArray) -> Pose:
-    """Return the pose of the first arm's tool at q (nq,) [rad, m]."""
-    tool = assembly.tools[0]
-    local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
-    pose = frame_pose(assembly.table, tool.joint - 1, local, q)
-    return Pose(pose[:9].reshape(3, 3), pose[9:])

@@ -32,23 +32,14 @@ class Proofs:
     """Judges whole motions for a search that accepts proven ones only, each solution once.
 
     Answers are the same on every processor; a motion that cannot be decided is not proven.
-
-    Attributes:
-        planner: The planner.
-        problem: Its problem.
-        num_certificates: Motions judged so far.
     """
 
     def __init__(self, planner: Any, problem: Any) -> None:
-        """Begin with no verdict.
-
-        Args:
-            planner: A planner whose field `acceptance` is not `model`.
-        """
+        """Begin with no verdict; the planner's field `acceptance` is not `model`."""
         self.planner, self.problem = planner, problem
         self._known: dict[bytes, bool] = {}
         self._touching: dict[bytes, str] = {}
-        self.num_certificates = 0
+        self.num_certificates = 0  # motions judged so far
 
     def is_proven(self, solution: FloatArray) -> bool:
         """Return whether the certifier proves the motion of a flat solution."""

@@ -7,13 +7,12 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.evolution.best_team import BestTeam, best_team
-from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.planners.coevolution.teams import Evaluated
 from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from evoexp.planners.coevolution.planner import Coevolution
+    from evoexp.planners.coevolution.planner import Coevolution, Problem
 
 MOST = 100  # teams that are judged of one generation; the others are no answer
 
@@ -21,7 +20,7 @@ MOST = 100  # teams that are judged of one generation; the others are no answer
 class ProvenTeams:
     """Judges the cheapest teams of populations, and counts collisions where one is refuted."""
 
-    def __init__(self, planner: "Coevolution", problem: Problem) -> None:
+    def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
         """Begin with no verdict; the planner's `acceptance` is not `model`."""
         self._planner, self._problem = planner, problem
         self._proofs = Proofs(planner, problem)

@@ -119,12 +119,7 @@ def arm_problem(
 
 
 def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
-    """Return a task as a motion between configurations, all joints relative to the link before.
-
-    Raises:
-        SettingError: If its goal is a pose, it is silent about a joint, robots stand still, or an
-            obstacle stands on the start or the goal of a grid.
-    """
+    """Return a task as a motion between configurations, all joints relative to the link before."""
     if isinstance(task, GridMotion):
         task.blocked()  # refuses ends that are blocked
         return ArmMotion(

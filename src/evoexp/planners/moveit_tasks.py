@@ -41,11 +41,7 @@ def with_allowed_pairs(assembly: Assembly, task: MoveitTask) -> Assembly:
 
 
 def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
-    """Return a task as a motion between configurations.
-
-    Raises:
-        SettingError: If its goal is a pose, or is silent about a joint.
-    """
+    """Return a task as a motion between configurations; refuse a goal that is a pose."""
     if isinstance(task, ArmMotion):
         return task
     q_goal = task.goal_configuration(assembly.joint_names)
@@ -67,11 +63,7 @@ def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
 
 
 def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureTask:
-    """Return a task as one of reaching a pose of the tool.
-
-    Raises:
-        SettingError: If a joint has no start, or pairs with obstacles may touch.
-    """
+    """Return a task as one of reaching a pose; refuse one whose pairs with obstacles may touch."""
     if not isinstance(task, MoveitTask):
         return task
     world, names = task.world(assembly.frames, loaded_mesh), assembly.joint_names

@@ -69,14 +69,9 @@ class Proofs:
         return self._touching[key]
 
     def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
-        """Judge individuals, the cheapest first, until one is proven; refuted ones cost inf.
+        """Judge individuals, the cheapest first, until one is proven; return it, None if none is.
 
-        Args:
-            costs: (individuals,), changed; what costs inf is not judged.
-            solution: Makes a flat solution of an individual.
-
-        Returns:
-            The proven individual; None if none is.
+        In `costs` (individuals,) refuted ones cost inf then; what costs inf is not judged.
         """
         while np.isfinite(costs[k := int(np.argmin(costs))]):
             if self.is_proven(solution(k)):

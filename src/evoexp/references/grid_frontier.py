@@ -282,11 +282,7 @@ def geometric_series(first: float, last: float, count: int) -> list[float]:
 
 
 def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndarray]]:
-    """Return the paths that minimise D + μ ΣS (Dijkstra), each with the first μ that leads to it.
-
-    Args:
-        weights: Values of μ [cell].
-    """
+    """Return the paths that minimise D + μ ΣS (Dijkstra), each with the first μ leading to it."""
     from scipy.sparse import csgraph, csr_array
 
     dijkstra: Any = csgraph.dijkstra
@@ -311,19 +307,11 @@ def best_walk(
 ) -> tuple[FloatArray, np.ndarray]:
     """Return the costs of the best walks by their numbers of nodes, and the best walk of all.
 
-    Numbers of nodes whose walks are shown to be no better are left out.
-
-    Args:
-        epsilon: ε [1/cell].
-        lam: λ.
-        known: Cost of some path: numbers of nodes at which no walk can be better are left out.
-        max_nodes: The greatest number of nodes that is searched.
-
-    Returns:
-        (numbers, 2) numbers of nodes and costs; (nodes,) the best walk.
+    These are (numbers, 2) numbers of nodes and costs, and (nodes,). Numbers whose walks are shown to
+    be no better than another walk, or than some path of cost `known`, are left out.
 
     Raises:
-        SettingError: If no walk has as few nodes.
+        SettingError: If no walk has as few nodes as `max_nodes`.
     """
     most = most_nodes(network, epsilon, lam, known, max_nodes)
     arrivals, costs = arrivals_of(network, epsilon), np.full(most + 1, np.inf)

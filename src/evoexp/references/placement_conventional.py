@@ -119,12 +119,8 @@ def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArr
     against the slope of E along the surface of postures that reach the target, and is followed by
     a projection onto that surface.
 
-    Args:
-        x: (3, starts) directions that reach the target [rad].
-        steps: (steps,) their lengths [rad].
-
-    Returns:
-        (3, starts) and (starts,).
+    From directions x (3, starts) [rad] that reach the target to places (3, starts) and E (starts,),
+    by steps of given lengths (steps,) [rad].
     """
     x, ends, moves = x.copy(), x.copy(), np.ones(x.shape[1])
     costs, units = model.costs(*model.links(x)), np.eye(3)[:, :, None]

@@ -37,14 +37,9 @@ class ProvenTeams:
         return self._proofs.num_certificates
 
     def settle(self, populations: FloatArray, found: Evaluated) -> BestTeam:
-        """Judge teams, the cheapest first, until one is proven.
+        """Judge teams, the cheapest first, until one is proven; return it, or one not found.
 
-        Args:
-            populations: (robots, 2 K, individuals).
-            found: Of these; collisions and costs of those who are refuted are raised.
-
-        Returns:
-            The proven team; one that is not found where none is.
+        Collisions and costs of those who are refuted are raised.
         """
         for _ in range(MOST):
             best = best_team(found.collisions, found.teamable)
@@ -55,10 +50,7 @@ class ProvenTeams:
     def settle_each(self, populations: FloatArray, found: Evaluated, costs: FloatArray) -> None:
         """Judge the cheapest teams of the first robot's individuals until one is proven.
 
-        Args:
-            populations: (robots, 2 K, individuals).
-            found: Of these; collisions and costs of those who are refuted are raised.
-            costs: (individuals,) of their cheapest teams; changed.
+        `costs` (individuals,) are those of their cheapest teams; changed. See `settle`.
         """
         for _ in range(MOST):
             k = int(np.argmin(costs))

@@ -48,11 +48,7 @@ def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: boo
 
 
 def _lines(targets: NodeArray) -> Iterator[NodeArray]:
-    """Yield the nodes of each longest line of one move, in order.
-
-    Args:
-        targets: (nodes,) where the move leads to, −1 where it is not permitted.
-    """
+    """Yield the nodes of each longest line of one move, which leads to `targets` (nodes,) or −1."""
     is_target = np.zeros(len(targets), dtype=bool)
     is_target[targets[targets >= 0]] = True
     for node in np.flatnonzero((targets >= 0) & ~is_target):

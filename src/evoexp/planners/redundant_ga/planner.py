@@ -77,9 +77,7 @@ class RedundantGa(PlannerDefaults, Component):
     ) -> Iterator[Block]:
         """Yield the generations of SP1 and SP2 in turn, until both are successful.
 
-        Args:
-            rng: Source of all random numbers.
-            kind: What searches a sub-path: the genetic algorithm, or a control in its place.
+        By a kind of search: the genetic algorithm, or a control in its place.
         """
         search = kind(self, problem, rng)
         for _ in range(self.num_attempts):

@@ -74,8 +74,7 @@ class Search(GeneticSearch):
     def sub_path(self, *postures: FloatArray) -> Generator[Block, None, BestEnd]:
         """Search the end of SP1, or of SP2 behind a posture A; return the best one.
 
-        Args:
-            postures: (joints,) the start, and the posture A if SP2 is searched [rad].
+        The postures (joints,) are the start, and A if SP2 is searched [rad].
         """
         self._postures, self._path = postures, len(postures) - 1
         if self._path == 0:

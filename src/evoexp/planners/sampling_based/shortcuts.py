@@ -54,10 +54,9 @@ class ShortenedPath:
         return self.lengths[-1:]
 
     def attempt(self, uniforms: FloatArray) -> FloatArray:
-        """Try straight lines between places of the path; return its length after each [deg].
+        """Try straight lines between places (attempts, 2), shares of the path's length [0, 1).
 
-        Args:
-            uniforms: (attempts, 2) the places, as shares of the length.
+        Return its length after each [deg].
         """
         lengths, done, edges = np.empty(len(uniforms)), 0, self._edges
         while done < len(uniforms):

@@ -55,14 +55,7 @@ class Problem(ArmProblem):
         return self.collision
 
     def sphere_centres(self, q: FloatArray) -> list[FloatArray]:
-        """Return the centres of the circles or spheres at one configuration.
-
-        Args:
-            q: (nq,) [deg].
-
-        Returns:
-            One array (spheres, 3) [length unit] per arm.
-        """
+        """Return the centres (spheres, 3) of each arm's circles or spheres at q (nq,) [deg]."""
         model, shapes = self.assembly.model, self._spheres.shapes
         data, spheres = model.createData(), zip(shapes.joint.tolist(), shapes.start, strict=True)
         pin.forwardKinematics(model, data, DEGREE * q)
@@ -72,23 +65,12 @@ class Problem(ArmProblem):
     def centre_distances(self, q: FloatArray) -> FloatArray:
         """Return the least distance between centres of two arms, as the paper's Figs. 7 and 13 do.
 
-        Args:
-            q: (nq, configurations) [deg].
-
-        Returns:
-            (configurations,) [length unit].
+        (configurations,) [length unit] of q (nq, configurations) [deg].
         """
         return np.asarray(self.collision.clearance(q).between_arms + 2.0 * self.sphere_radius)
 
     def obstacle_distances(self, q: FloatArray) -> FloatArray:
-        """Return the least distance from a centre to the surface of an obstacle.
-
-        Args:
-            q: (nq, configurations) [deg].
-
-        Returns:
-            (configurations,) [length unit].
-        """
+        """Return the least distance from a centre to an obstacle's surface; see the one above."""
         return np.asarray(self.collision.clearance(q).to_obstacles + self.sphere_radius)
 
 

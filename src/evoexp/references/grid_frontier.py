@@ -307,8 +307,8 @@ def best_walk(
 ) -> tuple[FloatArray, np.ndarray]:
     """Return the costs of the best walks by their numbers of nodes, and the best walk of all.
 
-    These are (numbers, 2) numbers of nodes and costs, and (nodes,). Numbers whose walks are shown to
-    be no better than another walk, or than some path of cost `known`, are left out.
+    These are (numbers, 2) numbers of nodes and costs, and (nodes,). Numbers whose walks are shown
+    to be no better than another walk, or than some path of cost `known`, are left out.
 
     Raises:
         SettingError: If no walk has as few nodes as `max_nodes`.

@@ -32,6 +32,7 @@ from evoexp.records import FloatArray, IntArray
 if TYPE_CHECKING:
     from evoexp.planners.coevolution.planner import Coevolution, Problem
 
+NOT_FINITE = "points and bases must be finite and below 1e70"
 PER_CALL = 8  # generations that are computed in one call, at most
 CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
 
@@ -205,7 +206,7 @@ class TeamSearch(TableSearch):
             task, (select, cross, mutate) = self._planner.task(self._problem), self._operators
             given = task, *arguments, self.summaries, taken
             if not evolve(select, cross, mutate, uniforms, rates, first, *given):
-                raise ValueError("points and bases must be finite and below 1e70")
+                raise ValueError(NOT_FINITE)
         self.states = self._ahead.take(taken.tolist())
         return last
 

@@ -25,8 +25,8 @@ from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.answers import of_limits, of_place
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.generations import TeamSearch
-from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, measure
+from evoexp.planners.coevolution.generations import NOT_FINITE, TeamSearch
+from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, evaluate_lines, measure
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated
@@ -143,6 +143,11 @@ class Coevolution(PlannerDefaults, Component):
         """
         collision, objective = problem.collision, self.objective
         robots, _, count = populations.shape
+        if collision.is_lines:
+            lined = Evaluated.room(robots, count)
+            if not evaluate_lines(populations, self.task(problem), lined):
+                raise ValueError(NOT_FINITE)
+            return lined
         # paths, and C2 … C4 (Eqs. 6–8)
         criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
         paths = np.empty((robots, self.num_configurations + 2, 2, count))

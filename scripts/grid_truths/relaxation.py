@@ -27,7 +27,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray, IntArray
-from evoexp.references.grid_bounds import Arrivals
+from evoexp.references.grid_frontier import Arrivals
 
 NO_MOVE, NO_WAY_BACK = -1, -2
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from evoexp.evolution.scaled_selection import (
     choose_by_remainders,
-    num_remainder_uniforms,
     scale_costs,
 )
 
@@ -26,7 +25,7 @@ def scale_linearly(costs: np.ndarray, count: int, multiple: float = 2.0) -> np.n
 def stochastic_remainder(rng: np.random.Generator, expected: np.ndarray) -> np.ndarray:
     count, num = round(expected.sum()), len(expected)
     parents, order = np.empty(count, dtype=np.int64), np.empty(num, dtype=np.int64)
-    choose_by_remainders(rng.random(num_remainder_uniforms(num, count)), expected, order, parents)
+    choose_by_remainders(rng.random(num + 1 + count), expected, order, parents)
     return parents
 
 

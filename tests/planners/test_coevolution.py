@@ -9,8 +9,7 @@ import pytest
 from composed import composed
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
-from evoexp.planners.coevolution.link_problem import Problem
-from evoexp.planners.coevolution.planner import Coevolution
+from evoexp.planners.coevolution.planner import Coevolution, Problem
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
 

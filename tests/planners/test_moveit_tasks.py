@@ -12,7 +12,7 @@ from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.proofs import judge_motion
-from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
+from evoexp.planners.via_point_ga.strings import Strings
 from evoexp.records import generations
 from moveit_samples import (
     COVERED,
@@ -92,8 +92,8 @@ def test_pairs_that_may_touch_are_not_judged(tmp_path: Path) -> None:
 def test_covered_paths_agree_with_exact_bodies_and_keep_limits(tmp_path: Path) -> None:
     found = condition(tmp_path, "budget=paper", *SMALL)
     planner, problem = found.prepare()
-    strings = CoveredStrings(planner, problem)
-    assert strings.low.max() < strings.high.min()
+    low, high = Strings(planner, problem).limits
+    assert low.max() < high.min()
     *_, last = generations(planner.evolve(problem, found.rng(0)))
     assert last.solved
     motion = planner.motion(problem, last.best)

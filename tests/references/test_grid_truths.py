@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from composed import composed
 from evoexp.references.grid_frontier import GridFrontier, known_maps
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
@@ -47,6 +48,17 @@ def test_a_map_is_known_by_all_that_its_truth_depends_on() -> None:
         {"planner": own.planner.model_copy(update={"objective": heavier})},
     ):
         assert own.model_copy(update=update).key(problem) not in known_maps()
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize(("label", "least"), [("(b), exact", 31.540), ("(c), exact", 55.998)])
+def test_the_truth_of_the_papers_workspace_is_known_within_one_per_cent(
+    label: str, least: float
+) -> None:
+    own, problem = composed("experiment=chen_path", label=label).prepare()
+    truth = own.truth(problem)
+    assert least < truth.terms["lower_bound"] <= truth.cost
+    assert truth.cost <= 1.01 * truth.terms["lower_bound"]
 
 
 @pytest.mark.matrix

@@ -84,10 +84,15 @@ def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
             for p in range(level + 1, num):
                 bound += own[p, order[p, 0]]
             exhausted = bound > best
+        # of equal costs the first in lexicographic order, as far as the trial is known
+        p = 0
+        while p < level and trial[p] == team[p]:
+            p += 1
+        comes_first = trial[p] < team[p] if trial[p] != team[p] else level < num - 1
         # back, deeper, or a better team
         if exhausted:
             level -= 1
-        elif (bound < best or comes_first(trial, team, level)) and fits(collisions, trial, level):
+        elif (bound < best or comes_first) and fits(collisions, trial, level):
             if level < num - 1:
                 level += 1
                 ranks[level] = 0
@@ -97,15 +102,6 @@ def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
         if level >= 0:
             ranks[level] += 1
     return BestTeam(team, best)
-
-
-@kernel
-def comes_first(trial: IntArray, team: IntArray, level: int) -> bool:
-    """Return whether trial (P,), known up to `level`, can still come before a team (P,)."""
-    for p in range(level + 1):
-        if trial[p] != team[p]:
-            return bool(trial[p] < team[p])
-    return level < len(team) - 1
 
 
 @kernel

@@ -51,11 +51,8 @@ class ScaledGenetic(PopulationSettings):
     """A generational genetic algorithm whose parents are chosen as in `scaled_selection`.
 
     Costs are scaled linearly, then parents are drawn by stochastic remainder sampling without
-    replacement. For the places that the whole parts of the expected numbers leave, the remainders
-    are scanned systematically: added up once in random order, one place wherever the sum passes u,
-    u + 1, u + 2, …, with one uniform number u. That is assumed: Chen & Zalzala 1995 name the
-    sampling, not the scan, and Goldberg (1989) tosses a coin per remainder instead, which is biased
-    (see `scaled_selection.choose_by_remainders`).
+    replacement. The systematic scan of the remainders is assumed: Chen & Zalzala 1995 name the
+    sampling only.
     """
 
     component: ClassVar[str] = "scaled_genetic"

@@ -161,29 +161,15 @@ def renew_hall(
     # the best by rank and key, again and again; whoever shares a member with it is out
     held = 0
     while held < len(hall.teams) and num_left > 0:
-        taken = first_by_key(left[:num_left], ranks, hits, costs)
+        taken = left[0]
+        for k in left[1:num_left]:
+            if (ranks[k], hits[k], costs[k]) < (ranks[taken], hits[taken], costs[taken]):
+                taken = k
         hall.teams[held], hall.ages[held] = pool[taken], ages[taken]
         hall.collisions[held], hall.costs[held] = hits[taken], costs[taken]
         num_left = drop_rivals(pool, hall.teams[held], rules.exclusive, left, num_left)
         held += 1
     return held
-
-
-@kernel
-def first_by_key(left: IntArray, ranks: IntArray, hits: IntArray, costs: FloatArray) -> int:
-    """Return the candidate with the lowest (rank, collisions, cost) of some, the first of equals.
-
-    Args:
-        left: Indices of candidates.
-        ranks: (candidates,).
-        hits: (candidates,).
-        costs: (candidates,).
-    """
-    best = left[0]
-    for k in left[1:]:
-        if (ranks[k], hits[k], costs[k]) < (ranks[best], hits[best], costs[best]):
-            best = k
-    return int(best)
 
 
 @kernel
@@ -202,17 +188,9 @@ def is_among(team: IntArray, teams: IntArray, num_teams: int) -> bool:
 def drop_rivals(
     pool: IntArray, team: IntArray, exclusive: BoolArray, left: IntArray, num_left: int
 ) -> int:
-    """Remove the candidates that share a member with a team (P,) from `left`, in order.
+    """Remove the candidates of `pool` that share a member with a team (P,) from `left`, in order.
 
-    Args:
-        pool: (candidates, P) teams.
-        team: (P,).
-        exclusive: (P,) false for populations whose individuals may be shared.
-        left: (≥ num_left,) indices of candidates, rewritten.
-        num_left: Their number.
-
-    Returns:
-        The number of those that stay.
+    In populations that are not exclusive members may be shared. Returns how many candidates stay.
     """
     kept = 0
     for c in range(num_left):

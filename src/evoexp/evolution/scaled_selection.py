@@ -1,9 +1,5 @@
 """Selection by scaled costs: expected numbers of copies, and stochastic remainder sampling.
 
-Linear scaling says how many copies of every individual are expected among the parents; sampling
-makes each a parent as often as expected, rounded up or down. Which ones are rounded up is found by
-one systematic scan of the remainders, which is assumed: the paper names the sampling only.
-
 Every individual first becomes a parent as often as the whole part of its expected number says. For
 the places left, the remainders are added up once, in random order; an individual that brings the
 sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an individual gets at
@@ -54,7 +50,7 @@ def choose_parents(
     parents, elites, expected, order = memory
     choose_elites(costs, elites)
     scale_costs(costs, len(parents), multiple, expected)
-    uniforms = draw_many(draws, num_remainder_uniforms(len(costs), len(parents)))
+    uniforms = draw_many(draws, len(costs) + 1 + len(parents))
     if used_up(draws):
         return False
     choose_by_remainders(uniforms, expected, order, parents)
@@ -111,14 +107,8 @@ def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatA
 
 
 @kernel
-def num_remainder_uniforms(num: int, count: int) -> int:
-    """Return the number of uniform numbers that choosing `count` of `num` individuals takes."""
-    return num + 1 + count
-
-
-@kernel
 def choose_by_remainders(
-    uniforms: FloatArray,  # (`num_remainder_uniforms`,) in [0, 1)
+    uniforms: FloatArray,  # (individuals + 1 + parents,) in [0, 1)
     expected: FloatArray,  # (individuals,) ≥ 0, adding up to the number of parents but for rounding
     order: IntArray,  # (individuals,) scratch: the order of the scan; negative where placed
     # (parents,) written, in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋

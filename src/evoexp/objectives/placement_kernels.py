@@ -103,8 +103,6 @@ def measure_branches(angles: FloatArray, count: int, model: Model) -> tuple[Floa
 
     Args:
         angles: (2, ≥ count) θ1, θ2 [deg].
-        count: Individuals.
-        model: Task, weights and limits.
 
     Returns:
         (2, RESULTS, count) by branch: the criteria, torques, θ3 [deg] and X_p, which are NaN out of
@@ -129,13 +127,9 @@ def measure_branches(angles: FloatArray, count: int, model: Model) -> tuple[Floa
 
 @kernel
 def measure_postures(angles: FloatArray, count: int, model: Model, out: FloatArray) -> None:
-    """Measure a population, the better θ3 of each.
+    """Measure the first of a population (2, ≥ count) θ1, θ2 [deg], the better θ3 of each.
 
-    Args:
-        angles: (2, ≥ count) θ1, θ2 [deg].
-        count: Individuals.
-        model: Task, weights and limits.
-        out: (CRITERIA + 1, ≥ count) written: the criteria, and the branch (−1: infeasible).
+    `out` (CRITERIA + 1, ≥ count) is written: the criteria, and the branch (−1: infeasible).
     """
     branches, within = measure_branches(angles, count, model)
     # the better branch of each

@@ -64,11 +64,6 @@ class AngleTerm(Settings):
     weight: Positive  # per rad or per deg
     unit: Literal["rad", "deg"] = "rad"  # which of them
 
-    @property
-    def per_radian(self) -> float:
-        """The weight per rad."""
-        return self.weight / DEGREE if self.unit == "deg" else self.weight
-
 
 class LimitedAngle(AngleTerm):
     """An angle with a hard limit."""
@@ -153,11 +148,9 @@ class PostureCost(Component):
                 )
         counting = terms or self.chosen
         given = [getattr(self, name) if name in counting else None for name in TERMS]
-        rates = [
-            term.per_radian if isinstance(term, AngleTerm) else term.weight if term else 0.0
-            for term in given
-        ]
-        return np.array(rates)
+        weights = [term.weight if term else 0.0 for term in given]
+        units = [DEGREE if term and term.unit == "deg" else 1.0 for term in given]
+        return np.array(weights) / units  # of angles per rad
 
     @property
     def tilt_limits(self) -> tuple[float, float]:
@@ -246,10 +239,7 @@ def rate_poses(count: int, pose: FloatArray, aim: Aim, rows: FloatArray) -> None
 def _signed_distance(u: float, v: float, w: float) -> float:
     """Return the distance from a body of three pairs of faces, negative inside.
 
-    Args:
-        u: How far the point is beyond the nearer face of the first pair; negative between them.
-        v: The same of the second pair.
-        w: The same of the third pair.
+    u, v, w are how far the point is beyond the nearer face of each; negative between them.
     """
     a, b, c = max(u, 0.0), max(v, 0.0), max(w, 0.0)
     distance: float = np.sqrt(a * a + b * b + c * c) + min(max(u, max(v, w)), 0.0)
@@ -258,14 +248,7 @@ def _signed_distance(u: float, v: float, w: float) -> float:
 
 @kernel
 def rate_limits(count: int, q: FloatArray, limits: FloatArray, row: FloatArray) -> None:
-    """Write 1 − the smallest normalised margin of the joints.
-
-    Args:
-        count: Configurations.
-        q: (nq, configurations).
-        limits: (nq, 2).
-        row: (configurations,) written.
-    """
+    """Write 1 − the smallest normalised margin (configurations,) of the joints q (nq, …)."""
     for n in range(count):
         row[n] = 1.0
     for k in range(len(limits)):

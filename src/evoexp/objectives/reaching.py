@@ -4,8 +4,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.numeric.compilation import inlined, kernel
-from evoexp.numeric.vectors import LANES, Vector, load, root, select, spread, store
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.vectors import LANES, load, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import VECTOR, PlanarArm, block_ends, load_lanes
@@ -42,7 +42,7 @@ def measure_reach(
 ) -> None:
     """Write Eqs. 1, 2 and 4 of some individuals without collisions; inf if the tip is outside."""
     rows = len(starts) * LANES
-    begin, end = np.empty(rows), np.empty(rows)
+    begin, end, outside = np.empty(rows), np.empty(rows), spread(np.inf)
     x, y, found = np.empty(rows + LANES), np.empty(rows + LANES), np.empty(3 * LANES)
     for first in range(0, count, LANES):
         # tips of a block
@@ -55,7 +55,13 @@ def measure_reach(
             turn = load(begin, U(k) * VECTOR) - load(end, U(k) * VECTOR)
             squares = squares + turn * turn
         tip_x, tip_y = load(x, U(rows)), load(y, U(rows))
-        worth, off, turned = _weigh(tip_x, tip_y, squares, target, box, weights)
+        off_x, off_y = tip_x - target[0], tip_y - target[1]
+        off, turned = root(off_x * off_x + off_y * off_y), root(squares)
+        worth = weights[0] * off + weights[1] * turned
+        worth = select(tip_x < box[0], outside, worth)
+        worth = select(box[1] < tip_x, outside, worth)
+        worth = select(tip_y < box[2], outside, worth)
+        worth = select(box[3] < tip_y, outside, worth)
         store(found, U(0), worth)
         store(found, VECTOR, off)
         store(found, U(2) * VECTOR, turned)
@@ -66,24 +72,3 @@ def measure_reach(
                 found[LANES + n],
                 found[2 * LANES + n],
             )
-
-
-@inlined
-def _weigh(
-    tip_x: Vector,
-    tip_y: Vector,
-    squares: Vector,
-    target: FloatArray,
-    box: FloatArray,
-    weights: tuple[float, float],
-) -> tuple[Vector, Vector, Vector]:
-    """Return cost (Eq. 4), position error (Eq. 1) and displacement (Eq. 2) of eight individuals."""
-    outside = spread(np.inf)
-    off_x, off_y = tip_x - target[0], tip_y - target[1]
-    off, turned = root(off_x * off_x + off_y * off_y), root(squares)
-    worth = weights[0] * off + weights[1] * turned
-    worth = select(tip_x < box[0], outside, worth)
-    worth = select(box[1] < tip_x, outside, worth)
-    worth = select(tip_y < box[2], outside, worth)
-    worth = select(box[3] < tip_y, outside, worth)
-    return worth, off, turned

@@ -184,17 +184,11 @@ def move_points(
         for i in range(U1, N):
             own, place = i * VECTOR, start + i * pitch
             u = load(w, at.found + own)
-            x = spline_point(load_quads(w, places, at.knots + own, rows), u)
+            a0, m0, a1, m1 = load_quads(w, places, at.knots + own, rows)
+            x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
             if any_stays:
                 x = select(moves < 1.0, load(via_points, place), x)
             store(via_points, place, x)
-
-
-@inlined
-def spline_point(knots: tuple[Vector, Vector, Vector, Vector], u: Vector) -> Vector:
-    """Return the point of a segment's spline at u in [0, 1], from a and m at both ends."""
-    a0, m0, a1, m1 = knots
-    return a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
 
 
 @kernel

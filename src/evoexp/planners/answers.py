@@ -49,46 +49,28 @@ class Listing(NamedTuple):
 
 
 def num_body_tests(problem: Any) -> float:
-    """Return how many pairs of shapes one collision query of a planner stands for; NaN: not known.
-
-    Args:
-        problem: A prepared one; its collision model counts them.
-    """
+    """Return how many pairs of shapes one query of a problem's model is; NaN: not known."""
     return float(getattr(getattr(problem, "collision", None), "num_tests", math.nan))
 
 
 def num_values(shape: Shape) -> int:
-    """Return how many numbers a solution of a documented shape has; of any number of parts, many.
-
-    Args:
-        shape: As `Planner.shape` returns it.
-    """
+    """Return how many numbers a solution of a documented shape has; many for any number."""
     if len(shape) and shape[0] is ...:
         return LONGEST * num_values(shape[1:])
     return sum(math.prod(part) for part in shape)
 
 
 def of_place(name: str, given: FloatArray, wanted: FloatArray, unit: str) -> list[str]:
-    """Return a phrase if a configuration or place is another one than the task's.
+    """Return a phrase if a configuration or place is another one than the task's, of any shape.
 
-    Args:
-        name: Of the place, as in "the start of arm 1".
-        given: Its values in the solution, any shape.
-        wanted: Its values in the task, of the same shape.
+    The name is one as in "the start of arm 1".
     """
     apart = float(np.max(np.abs(given - wanted)))
     return [] if apart <= SAME else [f"{name} is not the task's: {apart:.4g} {unit} away"]
 
 
 def of_limits(names: Sequence[str], values: FloatArray, limits: FloatArray, unit: str) -> list[str]:
-    """Return a phrase per joint that leaves its limits.
-
-    Args:
-        names: (joints,) as in "joint 1".
-        values: (joints, configurations).
-        limits: (joints, 2) least and greatest value.
-        unit: Of values and limits.
-    """
+    """Return a phrase per joint that leaves its limits (joints, 2) by values (joints, any)."""
     below = limits[:, 0] - values.min(axis=1)
     above = values.max(axis=1) - limits[:, 1]
     return [

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.bodies.body_collision import Clearances
 from evoexp.collision.bodies.body_models import BodyModel
 from evoexp.collision.bodies.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
@@ -86,7 +85,16 @@ def arm_problem(
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
     elif isinstance(scenario, GridMotion):
-        assembly = _within_floor(assembly, scenario)
+        # a platform whose joints slide from the first node of the grid to the last one
+        slides = assembly.table.slides
+        if len(slides) != len(scenario.size) or not slides.all():
+            must = f"one that slides along the {len(scenario.size)} directions of the grid"
+            named = [str(name) for name in list(assembly.model.names)[1:]]
+            raise SettingError("robot", must, f"one of joints {', '.join(named)}")
+        floor = assembly.model.copy()
+        floor.lowerPositionLimit = np.zeros(len(slides))
+        floor.upperPositionLimit = np.array(scenario.size, dtype=np.float64) - 1.0
+        assembly = assembly._replace(model=floor)
     task = _arm_motion(assembly, scenario)
     # a metre of a sliding joint counts as a radian, 57.3 degrees
     units = np.where(assembly.table.slides, 1.0 / DEGREE, 1.0)
@@ -99,7 +107,11 @@ def arm_problem(
         given = ("q_start", start, task.q_start), ("q_goal", goal, task.q_goal)
         for name, q, typed in given:
             clearance = collision.clearance(q[:, None])
-            check_spheres(clearance, f"scenario.{name}", typed, task.length_unit)
+            if clearance.least[0] < 0.0:
+                who = "two arms" if clearance.between_arms[0] < 0.0 else "an arm and an obstacle"
+                depth = f"{-clearance.least[0]:.3g} {task.length_unit}"
+                must = f"free of collision ({who} overlap by {depth})"
+                raise SettingError(f"scenario.{name}", must, [list(arm) for arm in typed])
         bodies = scene(assembly, collision.obstacles)
     own, margin = task.obstacle_margin, task.security_margin
     both = margin, margin if own is None else own
@@ -107,12 +119,7 @@ def arm_problem(
 
 
 def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
-    """Return a task as a motion between configurations, all joints relative to the link before.
-
-    Raises:
-        SettingError: If its goal is a pose, it is silent about a joint, robots stand still, or an
-            obstacle stands on the start or the goal of a grid.
-    """
+    """Return a task as a motion between configurations, all joints relative to the link before."""
     if isinstance(task, GridMotion):
         task.blocked()  # refuses ends that are blocked
         return ArmMotion(
@@ -139,23 +146,6 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
         length_unit=task.length_unit,
         obstacles=task.obstacles,
     )
-
-
-def _within_floor(assembly: Assembly, task: GridMotion) -> Assembly:
-    """Return a platform whose joints slide from the first node of the grid to the last one.
-
-    Raises:
-        SettingError: If the robot does not slide along each direction of the grid.
-    """
-    slides = assembly.table.slides
-    if len(slides) != len(task.size) or not slides.all():
-        must = f"one that slides along the {len(task.size)} directions of the grid"
-        named = [str(name) for name in list(assembly.model.names)[1:]]
-        raise SettingError("robot", must, f"one of joints {', '.join(named)}")
-    model = assembly.model.copy()
-    model.lowerPositionLimit = np.zeros(len(slides))
-    model.upperPositionLimit = np.array(task.size, dtype=np.float64) - 1.0
-    return assembly._replace(model=model)
 
 
 def cover_shapes(
@@ -212,8 +202,7 @@ def _covered(
 ) -> tuple[CoveredCollision, Scene]:
     """Return the covered bodies of a robot, and the exact ones, pairs of one arm included.
 
-    Raises:
-        SettingError: If bodies touch at the start or the goal, or these are beyond limits.
+    Refuse a start or goal beyond limits, or where bodies touch.
     """
     ignored: tuple[tuple[int, int], ...] = ()
     bodies = scene(assembly, task.obstacles, self_pairs=True)
@@ -228,18 +217,6 @@ def _covered(
     for field, q in zip(FIELDS, ends, strict=True):
         check_bodies(bodies, DEGREE * q, field, task.length_unit)
     return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored), bodies
-
-
-def check_spheres(clearance: Clearances, field: str, given: Any, unit: str) -> None:
-    """Refuse a configuration at which the paper's spheres overlap.
-
-    Raises:
-        SettingError: Naming what overlaps.
-    """
-    if clearance.least[0] < 0.0:
-        who = "two arms" if clearance.between_arms[0] < 0.0 else "an arm and an obstacle"
-        must = f"free of collision ({who} overlap by {-clearance.least[0]:.3g} {unit})"
-        raise SettingError(field, must, [list(arm) for arm in given])
 
 
 def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:

@@ -41,11 +41,7 @@ def with_allowed_pairs(assembly: Assembly, task: MoveitTask) -> Assembly:
 
 
 def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
-    """Return a task as a motion between configurations.
-
-    Raises:
-        SettingError: If its goal is a pose, or is silent about a joint.
-    """
+    """Return a task as a motion between configurations; refuse a goal that is a pose."""
     if isinstance(task, ArmMotion):
         return task
     q_goal = task.goal_configuration(assembly.joint_names)
@@ -67,11 +63,7 @@ def arm_motion(assembly: Assembly, task: ArmMotion | MoveitTask) -> ArmMotion:
 
 
 def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureTask:
-    """Return a task as one of reaching a pose of the tool.
-
-    Raises:
-        SettingError: If a joint has no start, or pairs with obstacles may touch.
-    """
+    """Return a task as one of reaching a pose; refuse one whose pairs with obstacles may touch."""
     if not isinstance(task, MoveitTask):
         return task
     world, names = task.world(assembly.frames, loaded_mesh), assembly.joint_names
@@ -84,8 +76,11 @@ def posture_task(assembly: Assembly, task: PostureTask | MoveitTask) -> PostureT
     if q_goal is None:
         link = task.link_goal(world.frames)
     else:
-        tool = _tool_pose(assembly, q_goal)
-        link = LinkGoal("", tool, task.position_tolerance, task.angle_tolerance)
+        tool = assembly.tools[0]
+        local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
+        pose = frame_pose(assembly.table, tool.joint - 1, local, q_goal)
+        place = Pose(pose[:9].reshape(3, 3), pose[9:])
+        link = LinkGoal("", place, task.position_tolerance, task.angle_tolerance)
     x, y, z = link.pose.position.tolist()
     goal: PoseGoal | PointGoal = PointGoal(kind="point", point=(x, y, z))
     if link.angle is not None:
@@ -125,11 +120,3 @@ def hull_notes(names: Sequence[str]) -> tuple[str, ...]:
 def _typed(assembly: Assembly, q: FloatArray) -> FloatArray:
     """Return q (nq,) [rad, m] as scenarios give it [deg, m]."""
     return np.where(assembly.table.slides, q, q / DEGREE)
-
-
-def _tool_pose(assembly: Assembly, q: FloatArray) -> Pose:
-    """Return the pose of the first arm's tool at q (nq,) [rad, m]."""
-    tool = assembly.tools[0]
-    local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
-    pose = frame_pose(assembly.table, tool.joint - 1, local, q)
-    return Pose(pose[:9].reshape(3, 3), pose[9:])

@@ -11,7 +11,6 @@ from typing import (
     TYPE_CHECKING,
     Any,
     ClassVar,
-    Generic,
     Literal,
     NamedTuple,
     Protocol,
@@ -22,7 +21,7 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.scene import Part, Scene
+from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
@@ -37,20 +36,7 @@ Populations = Generator[FloatArray, JudgementArrays, None]
 COPIES = 5
 
 
-class SceneTask(Protocol):
-    """A problem, as far as `PlannerDefaults` reads it."""
-
-    @property
-    def scene(self) -> Scene | None:
-        """The exact bodies; None: nothing to judge by."""
-
-    @property
-    def security_margin(self) -> float:
-        """Clearance that the task requires [length unit of the scene]."""
-
-
 Problem = TypeVar("Problem")
-Task = TypeVar("Task", bound=SceneTask)
 
 
 @runtime_checkable
@@ -170,24 +156,12 @@ class Planner(Protocol[Problem]):
         """
 
 
-if TYPE_CHECKING:
-
-    class _ByProblem(Generic[Task]):
-        """A class that is generic over its problem."""
-else:
-
-    class _ByProblem:
-        """The same when it runs: pydantic takes `typing.Generic` behind its own classes only."""
-
-        def __class_getitem__(cls, problem: Any) -> type:
-            return cls
-
-
-class PlannerDefaults(_ByProblem[Task]):
+class PlannerDefaults:
     """The usual answers of a planner, to be inherited before `Component`.
 
     They need a planner with a field `ga` that has `population_size`, `num_offspring` and
-    `num_generations`.
+    `num_generations`, and a problem with a `scene` (None: nothing to judge by) and a
+    `security_margin`.
     """
 
     reproducibility: ClassVar[Reproducibility] = "bits"
@@ -216,19 +190,19 @@ class PlannerDefaults(_ByProblem[Task]):
         return int(self.ga.num_offspring if index else self.ga.population_size)
 
     def improve(
-        self, problem: Task, population: FloatArray, rng: np.random.Generator
+        self, problem: Any, population: FloatArray, rng: np.random.Generator
     ) -> FloatArray | None:
         """Return None: there is no local operator."""
         return None
 
-    def parts(self, problem: Task, motion: Motion) -> Sequence[Part]:
+    def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
         """Return the whole motion with the problem's scene, or nothing without a scene."""
         bodies = problem.scene
         return () if bodies is None else (Part(bodies, 0, motion.num_segments),)
 
-    def security_margin(self, problem: Task) -> float:
+    def security_margin(self, problem: Any) -> float:
         """Return the problem's margin."""
-        return problem.security_margin
+        return float(problem.security_margin)
 
     def cost_of_terms(self, terms: Mapping[str, float]) -> float:
         """Return the recorded cost of a solution, given its terms as `evaluate` names them.
@@ -237,28 +211,28 @@ class PlannerDefaults(_ByProblem[Task]):
         """
         return terms.get("cost", math.nan)
 
-    def departures(self, problem: Task, solution: FloatArray) -> Sequence[str]:
+    def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
         """Return none: every solution of the documented shape is one of the task."""
         return ()
 
-    def memory(self, problem: Task) -> int:
+    def memory(self, problem: Any) -> int:
         """Return the memory of `COPIES` populations of solutions."""
         individuals = max(self.num_evaluations(0), self.num_evaluations(1))
         return 8 * COPIES * num_values(self.shape(problem)) * individuals
 
-    def prior_queries(self, problem: Task) -> int:
+    def prior_queries(self, problem: Any) -> int:
         """Return 0: a search asks for all that it knows."""
         return 0
 
-    def listing(self, problem: Task, solution: FloatArray) -> Listing | None:
+    def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return None: there is no table."""
         return None
 
-    def notes(self, problem: Task) -> Sequence[str]:
+    def notes(self, problem: Any) -> Sequence[str]:
         """Return no remarks."""
         return ()
 
-    def covers(self, problem: Task) -> Sequence[CoverShape]:
+    def covers(self, problem: Any) -> Sequence[CoverShape]:
         """Return none: the search tests no spheres and capsules."""
         return ()
 
@@ -378,20 +352,3 @@ class Keeper:
             stop_reason,
             arrays,
         )
-
-
-def judged_generations(
-    planner: Planner[Problem], problem: Problem, populations: Populations
-) -> Iterator[Block]:
-    """Yield as many generations as a planner has, each population judged as it judges its own.
-
-    Args:
-        planner: The planner.
-        problem: Its problem.
-        populations: Yields them, individuals last; each one is sent back judged.
-    """
-    keeper, judged = Keeper(), None
-    for _ in range(planner.num_generations + 1):
-        population = next(populations) if judged is None else populations.send(judged)
-        judged = planner.cost(problem, population)
-        yield keeper.record_judged(planner, problem, population, judged)

@@ -32,23 +32,14 @@ class Proofs:
     """Judges whole motions for a search that accepts proven ones only, each solution once.
 
     Answers are the same on every processor; a motion that cannot be decided is not proven.
-
-    Attributes:
-        planner: The planner.
-        problem: Its problem.
-        num_certificates: Motions judged so far.
     """
 
     def __init__(self, planner: Any, problem: Any) -> None:
-        """Begin with no verdict.
-
-        Args:
-            planner: A planner whose field `acceptance` is not `model`.
-        """
+        """Begin with no verdict; the planner's field `acceptance` is not `model`."""
         self.planner, self.problem = planner, problem
         self._known: dict[bytes, bool] = {}
         self._touching: dict[bytes, str] = {}
-        self.num_certificates = 0
+        self.num_certificates = 0  # motions judged so far
 
     def is_proven(self, solution: FloatArray) -> bool:
         """Return whether the certifier proves the motion of a flat solution."""
@@ -78,14 +69,9 @@ class Proofs:
         return self._touching[key]
 
     def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> int | None:
-        """Judge individuals, the cheapest first, until one is proven; refuted ones cost inf.
+        """Judge individuals, the cheapest first, until one is proven; return it, None if none is.
 
-        Args:
-            costs: (individuals,), changed; what costs inf is not judged.
-            solution: Makes a flat solution of an individual.
-
-        Returns:
-            The proven individual; None if none is.
+        In `costs` (individuals,) refuted ones cost inf then; what costs inf is not judged.
         """
         while np.isfinite(costs[k := int(np.argmin(costs))]):
             if self.is_proven(solution(k)):

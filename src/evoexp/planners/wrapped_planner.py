@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import GetPydanticSchema
 
-from evoexp.planners.planner import Planner, PlannerDefaults, Populations, judged_generations
+from evoexp.planners.planner import Keeper, Planner, PlannerDefaults, Populations
 from evoexp.records import Block
 from evoexp.validation import Component
 
@@ -24,7 +24,7 @@ def _as_wrapped(name: str) -> Any:
     return answer
 
 
-class WrappedPlanner(PlannerDefaults[Any], Component):
+class WrappedPlanner(PlannerDefaults, Component):
     """Answers as the wrapped planner does; controls write `populations`, references `evolve`."""
 
     planner: AnyPlanner  # the planner that it stands beside
@@ -35,7 +35,11 @@ class WrappedPlanner(PlannerDefaults[Any], Component):
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a control's populations, judged as the wrapped planner judges its own."""
-        return judged_generations(self.planner, problem, self.populations(problem, rng))
+        keeper, judged, populations = Keeper(), None, self.populations(problem, rng)
+        for _ in range(self.planner.num_generations + 1):
+            population = next(populations) if judged is None else populations.send(judged)
+            judged = self.planner.cost(problem, population)
+            yield keeper.record_judged(self.planner, problem, population, judged)
 
     def populations(self, problem: Any, rng: np.random.Generator) -> Populations:
         """Yield the populations of a control; each is sent back judged."""

@@ -3,17 +3,16 @@
 The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no shortest-path
 algorithm minimises it. The truth is enclosed:
 
-- from above, by valid paths: the frontier of D + μ ΣS over all μ, the best of its paths improved by
-  exchanges of a few nodes (`grid_bounds`);
+- from above, by valid paths: the best of the frontier of D + μ ΣS over all μ, or the best walk if
+  it has no loops;
 - from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
-  ε D + (λ / N) ΣS is additive, so dynamic programming over 1 … N nodes finds the best walk, for
-  every N. That is the exact optimum where nodes may be passed again. Where they may not,
-  multipliers that punish further visits raise the bound, and the walks without their loops are
-  further paths.
+  ε D + (λ / N) ΣS is a sum over moves and nodes, so dynamic programming over (node, number of
+  nodes) finds the best walk. The least cost of all N is the exact optimum where nodes may be passed
+  again, else a bound.
 
 Of the shipped maps better paths and higher bounds are known (`assets/grid_truths.json`): every path
-of the frontier was improved, and the bounds are those of walks that never go straight back.
-`scripts/update-grid-truths` finds both.
+of the frontier was improved by exchanges of a few nodes, and the bounds were raised by Lagrangian
+relaxation. `scripts/update-grid-truths` finds both.
 """
 
 import hashlib
@@ -26,22 +25,92 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
+from evoexp.numeric.compilation import kernel
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from evoexp.records import FloatArray
-from evoexp.references.grid_bounds import (
-    Exchanges,
-    Network,
-    arrivals_of,
-    best_walks,
-    network_of,
-    relaxed,
-)
+from evoexp.records import FloatArray, IntArray
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import LayoutCount, NonNegativeCount, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS that decides among equally short paths only
 REACHED = 1e-9  # of a cost: a bound so close to it is reached
+
+
+class Network(NamedTuple):
+    """The permitted moves as edges."""
+
+    tails: np.ndarray  # (edges,) node where each edge starts
+    heads: np.ndarray  # (edges,) node where it ends
+    lengths: FloatArray  # (edges,) [cell]
+    unsafeness: FloatArray  # (nodes,)
+    ends: tuple[int, int]  # start and goal
+
+
+def network_of(problem: Any) -> Network:
+    """Return the permitted moves of a problem of `grid_path_ga`."""
+    own = problem.fields.grid
+    tails, moves = np.nonzero(own.neighbours >= 0)
+    lengths = np.sqrt(own.changes[moves].astype(np.float64))
+    return Network(
+        tails, own.neighbours[tails, moves], lengths, problem.fields.unsafeness, problem.ends
+    )
+
+
+class Arrivals(NamedTuple):
+    """The permitted moves by the nodes where they end, filled up with moves of infinite length."""
+
+    tails: IntArray  # (nodes, moves) node where each move starts
+    lengths: FloatArray  # (nodes, moves) times ε
+    unsafeness: FloatArray  # (nodes,)
+    ends: tuple[int, int]  # start and goal
+
+
+def arrivals_of(network: Network, epsilon: float) -> Arrivals:
+    """Return the permitted moves by their ends; see `best_walk`."""
+    order = np.argsort(network.heads, kind="stable")
+    heads, count = network.heads[order], len(network.unsafeness)
+    # place of each move among those that end at the same node
+    rank = np.arange(len(heads)) - np.searchsorted(heads, heads)
+    moves = int(rank.max()) + 1
+    tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)
+    tails[heads, rank] = network.tails[order]
+    lengths[heads, rank] = epsilon * network.lengths[order]
+    return Arrivals(tails, lengths, network.unsafeness, network.ends)
+
+
+@kernel
+def best_walks(arrivals: Arrivals, weights: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
+    """Return the least costs of walks of 0 … `count` nodes, and the best walk of `count` nodes.
+
+    Args:
+        weights: (nodes,) cost of passing a node.
+        count: Most nodes.
+
+    Returns:
+        (count + 1,), inf where there is no walk from two nodes on; (count,).
+    """
+    tails, lengths, ends = arrivals.tails, arrivals.lengths, arrivals.ends
+    num = len(weights)
+    costs, before = np.full(count + 1, np.inf), np.zeros((count + 1, num), dtype=np.int32)
+    present, following = np.full(num, np.inf), np.full(num, np.inf)
+    present[ends[0]] = weights[ends[0]]
+    # the best way to every node by k nodes, and the node before on it
+    for k in range(2, count + 1):
+        for node in range(num):
+            least = np.inf
+            for move in range(tails.shape[1]):
+                cost = present[tails[node, move]] + lengths[node, move]
+                if cost < least:
+                    least, before[k, node] = cost, tails[node, move]
+            following[node] = least + weights[node]
+        present, following = following, present
+        costs[k] = present[ends[1]]
+    # the walk, from the goal back
+    walk = np.empty(count, dtype=np.int64)
+    walk[count - 1] = ends[1]
+    for k in range(count, 1, -1):
+        walk[k - 2] = before[k, walk[k - 1]]
+    return costs, walk
 
 
 class Known(NamedTuple):
@@ -74,10 +143,11 @@ class GridFrontier(Reference):
     greatest_weight: Positive  # of μ [cell]
     # of the walks; longer walks are not searched, and cannot be better if ε is not very small
     max_nodes: LayoutCount
+    # The next four are those of `scripts/update-grid-truths`, and tell of the shipped maps' truths:
     # no exchange of at most so many nodes improves the best path known
     exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
-    # of the shipped maps' paths, see `scripts/update-grid-truths`: exchanges of at most so many
-    # nodes are made though they cost more, to improve the path from there
+    # exchanges of at most so many nodes are made though they cost more, to improve the path from
+    # there
     forced_nodes: Annotated[int, Field(ge=0, le=4)]
     # the bound is raised until it is within this part of the best cost known, by every number
     # of nodes [-]
@@ -113,16 +183,11 @@ class GridFrontier(Reference):
                 network, *self.planner.objective.weights, float(rows[:, 4].min()), self.max_nodes
             )
             if self.planner.revisits or len(set(walk.tolist())) == len(walk):
-                best, known = self._better(problem, [walk], best, known)
-            if known_map is None and not self.planner.revisits:
-                exchanges = Exchanges(network, self.planner.objective.weights, self.exchanged_nodes)
-                best, known = self._better(problem, [exchanges.descend(best)], best, known)
+                cost = self.path_cost(problem, walk)
+                best, known = (walk, cost) if cost <= known else (best, known)
             floors, beyond = self.floors(network, known, walks)
             if known_map is not None:
                 floors[2:] = known_map.bounds
-            elif not self.planner.revisits:
-                paths_besides = self._relaxed(network, known, floors)
-                best, known = self._better(problem, paths_besides, best, known)
             bounds = np.column_stack([np.arange(2.0, len(floors)), floors[2:]])
             bound = float(min(floors[2:].min(initial=np.inf), beyond, known))
         terms = {
@@ -169,10 +234,8 @@ class GridFrontier(Reference):
         epsilon, lam = self.planner.objective.weights
         most = most_nodes(network, epsilon, lam, known, self.max_nodes)
         # a path of more nodes costs as much at least; without loops there may be none
-        beyond, present = (
-            epsilon * most + lam * _least_unsafeness(network),
-            np.unique(network.tails),
-        )
+        beyond = epsilon * most + lam * _least_unsafeness(network)
+        present = np.unique(network.tails)
         if not self.planner.revisits and most >= len(present):
             beyond, most = np.inf, len(present)
         # numbers of nodes that are left out have no better walk than the best one
@@ -180,22 +243,6 @@ class GridFrontier(Reference):
         inside = walks[:, 0] <= most
         floors[walks[inside, 0].astype(np.int64)] = walks[inside, 1]
         return floors, beyond
-
-    def _relaxed(self, network: Network, known: float, floors: FloatArray) -> list[np.ndarray]:
-        """Raise the bounds in place; return the paths that were found besides."""
-        epsilon, lam = self.planner.objective.weights
-        enough = (1.0 - self.bound_gap) * known
-        return relaxed(arrivals_of(network, epsilon), lam, known, enough, floors, self.bound_steps)
-
-    def _better(
-        self, problem: Any, paths: list[np.ndarray], best: np.ndarray, known: float
-    ) -> tuple[np.ndarray, float]:
-        """Return the best of some paths and of the one known, and its cost."""
-        for path in paths:
-            cost = self.path_cost(problem, path)
-            if cost <= known:
-                best, known = path, cost
-        return best, known
 
     def _rows(self, problem: Any, paths: list[tuple[float, np.ndarray]]) -> FloatArray:
         return np.array([(mu, *self._judged(problem, path)) for mu, path in paths])
@@ -235,11 +282,7 @@ def geometric_series(first: float, last: float, count: int) -> list[float]:
 
 
 def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndarray]]:
-    """Return the paths that minimise D + μ ΣS (Dijkstra), each with the first μ that leads to it.
-
-    Args:
-        weights: Values of μ [cell].
-    """
+    """Return the paths that minimise D + μ ΣS (Dijkstra), each with the first μ leading to it."""
     from scipy.sparse import csgraph, csr_array
 
     dijkstra: Any = csgraph.dijkstra
@@ -264,19 +307,11 @@ def best_walk(
 ) -> tuple[FloatArray, np.ndarray]:
     """Return the costs of the best walks by their numbers of nodes, and the best walk of all.
 
-    Numbers of nodes whose walks are shown to be no better are left out.
-
-    Args:
-        epsilon: ε [1/cell].
-        lam: λ.
-        known: Cost of some path: numbers of nodes at which no walk can be better are left out.
-        max_nodes: The greatest number of nodes that is searched.
-
-    Returns:
-        (numbers, 2) numbers of nodes and costs; (nodes,) the best walk.
+    These are (numbers, 2) numbers of nodes and costs, and (nodes,). Numbers whose walks are shown
+    to be no better than another walk, or than some path of cost `known`, are left out.
 
     Raises:
-        SettingError: If no walk has as few nodes.
+        SettingError: If no walk has as few nodes as `max_nodes`.
     """
     most = most_nodes(network, epsilon, lam, known, max_nodes)
     arrivals, costs = arrivals_of(network, epsilon), np.full(most + 1, np.inf)

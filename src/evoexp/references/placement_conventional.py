@@ -55,12 +55,23 @@ class PlacementConventional(Reference):
         starts, places = self._starts(problem, model)
         programme = Programme(model)
         method = "bounded" if programme.minimax else "newton"
+        steps = self.first_step / np.sqrt(np.arange(1.0, self.num_steps + 1.0))
+        columns, costs = slide(np.column_stack(starts), steps, model)
+        slid = zip(columns.T.copy(), costs.tolist(), strict=True)
         ends = {
             method: [programme.descend(x) for x in starts],
-            "subgradient": self._slide(model, starts),
+            "subgradient": [End(x, cost, 7 * self.num_steps) for x, cost in slid],
         }
         arrays = {
-            name: np.array([_row(model, programme, end) for end in found])
+            name: np.array(
+                [
+                    [
+                        *np.round(model.theta(end.x), DIGITS),
+                        end.cost if programme.is_legal(end.x, 1e-6) else np.inf,
+                    ]
+                    for end in found
+                ]
+            )
             for name, found in ends.items()
         }
         every = np.concatenate(list(arrays.values()))
@@ -99,12 +110,6 @@ class PlacementConventional(Reference):
         places = np.array(found[: self.num_starts])
         return [model.directions(place[:2], float(place[2])) for place in places], places
 
-    def _slide(self, model: Directions, starts: list[FloatArray]) -> list[End]:
-        steps = self.first_step / np.sqrt(np.arange(1.0, self.num_steps + 1.0))
-        ends, costs = slide(np.column_stack(starts), steps, model)
-        evaluations = 7 * self.num_steps
-        return [End(ends[:, k].copy(), float(costs[k]), evaluations) for k in range(len(starts))]
-
 
 def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArray, FloatArray]:
     """Follow a projected subgradient method from every start; return the best places and E there.
@@ -114,12 +119,8 @@ def slide(x: FloatArray, steps: FloatArray, model: Directions) -> tuple[FloatArr
     against the slope of E along the surface of postures that reach the target, and is followed by
     a projection onto that surface.
 
-    Args:
-        x: (3, starts) directions that reach the target [rad].
-        steps: (steps,) their lengths [rad].
-
-    Returns:
-        (3, starts) and (starts,).
+    From directions x (3, starts) [rad] that reach the target to places (3, starts) and E (starts,),
+    by steps of given lengths (steps,) [rad].
     """
     x, ends, moves = x.copy(), x.copy(), np.ones(x.shape[1])
     costs, units = model.costs(*model.links(x)), np.eye(3)[:, :, None]
@@ -154,9 +155,3 @@ def _height(model: Directions, up: FloatArray) -> FloatArray:
     """Return by how much end-effectors are above their target, by the links' extents (3, n)."""
     found: FloatArray = -model.target[1] + up[0] + up[1] + up[2]
     return found
-
-
-def _row(model: Directions, programme: Programme, end: End) -> FloatArray:
-    """Return θ1, θ2 [deg] and E of an end; E is inf where the end breaks a constraint."""
-    cost = end.cost if programme.is_legal(end.x, 1e-6) else np.inf
-    return np.array([*np.round(model.theta(end.x), DIGITS), cost])

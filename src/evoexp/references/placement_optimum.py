@@ -59,7 +59,13 @@ class PlacementOptimum(Reference):
                 polished = polish(programme, end.x)
                 ends.append(theta if polished is None else model.theta(polished.x))
                 exact += [] if polished is None else ends[-1:]
-        minima = _distinct(problem.model, ends)
+        # distinct feasible minima, the lowest first, by the planner's kernels
+        measured = [(theta, own.posture(*theta)) for theta in ends]
+        rows = [np.array([*theta, best[0]]) for theta, (branch, best, _) in measured if branch >= 0]
+        distinct = list[FloatArray]()
+        for row in sorted(rows, key=lambda row: (round(float(row[2]), 9), *np.round(row[:2], 6))):
+            distinct += [] if _is_among(distinct, row[:2]) else [row]
+        minima = np.array(distinct).reshape(len(distinct), 3)
         num_minima = {"num_minima": float(len(minima))}
         if not len(minima):
             middle, cap = problem.angle_limits.mean(axis=1), problem.model.weights.greatest
@@ -151,18 +157,3 @@ def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:
     return any(
         np.abs((theta - other[:2] + TURN / 2) % TURN - TURN / 2).max() <= SAME for other in known
     )
-
-
-def _distinct(model: Model, found: list[FloatArray]) -> FloatArray:
-    """Return distinct feasible minima, the lowest first: θ1, θ2, and E by the planner's kernels.
-
-    Returns:
-        (minima, 3).
-    """
-    rows: list[FloatArray] = []
-    measured = [(theta, model.posture(*theta)) for theta in found]
-    feasible = [np.array([*theta, own[0]]) for theta, (branch, own, _) in measured if branch >= 0]
-    for row in sorted(feasible, key=lambda row: (round(float(row[2]), 9), *np.round(row[:2], 6))):
-        if not _is_among(rows, row[:2]):
-            rows.append(row)
-    return np.array(rows).reshape(len(rows), 3)

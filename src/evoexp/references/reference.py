@@ -8,7 +8,6 @@ compares its numbers, to 1e-9, and not its digest.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,11 +34,7 @@ class Truth(NamedTuple):
 
 
 class Reference(WrappedPlanner):
-    """Base of every reference; a subclass writes `truth`.
-
-    Attributes:
-        planner: The planner whose problem, cost and solutions it shares.
-    """
+    """Base of every reference; a subclass writes `truth`."""
 
     reproducibility: ClassVar[Reproducibility] = "environment"
     is_reference: ClassVar[bool] = True
@@ -82,14 +77,7 @@ def one_thread() -> Iterator[None]:
     where numpy was loaded with all of them: `reproduce`, `runner=serial`, a notebook.
     """
     import scipy.linalg  # noqa: F401  # it brings a BLAS of its own, limited once it is loaded
+    from threadpoolctl import threadpool_limits
 
-    with _libraries().limit(limits=1, user_api="blas"):
+    with threadpool_limits(limits=1, user_api="blas"):
         yield
-
-
-@cache
-def _libraries() -> Any:
-    """Look once for the libraries that are loaded; it takes some milliseconds."""
-    from threadpoolctl import ThreadpoolController
-
-    return ThreadpoolController()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions, measures
-from evoexp.planners.coevolution.link_problem import Problem
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim, Quantity

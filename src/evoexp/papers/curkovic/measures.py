@@ -3,7 +3,7 @@
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions
-from evoexp.planners.coevolution.link_problem import Problem
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
 from evoexp.report.report_settings import ReportSettings

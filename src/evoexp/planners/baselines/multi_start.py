@@ -26,11 +26,7 @@ class MultiStart(WrappedPlanner):
     num_sweeps: Count  # passes of the local operator per start
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
-        """Prepare the wrapped planner's problem.
-
-        Raises:
-            SettingError: If the planner has no local operator.
-        """
+        """Prepare the wrapped planner's problem."""
         problem = super().prepare(robot, scenario)
         rng = np.random.Generator(np.random.PCG64(0))  # of a trial whose result is thrown away
         sample = self.planner.sample(problem, rng, 1)

@@ -7,8 +7,7 @@ from pydantic import Field
 
 from evoexp.errors import SettingError, nearest
 from evoexp.planners.baselines.real_vectors import RealVectorControl, real_vectors
-from evoexp.planners.planner import JudgementArrays, Populations, Reproducibility
-from evoexp.records import FloatArray
+from evoexp.planners.planner import Populations, Reproducibility
 
 SEEDS = 2**32  # of numpy's older generators
 ENDLESS = 10**9  # generations: this planner counts them itself
@@ -35,11 +34,7 @@ class Nsga2(RealVectorControl):
     objectives: Annotated[tuple[str, ...], Field(min_length=2)]
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
-        """Prepare the wrapped planner's problem.
-
-        Raises:
-            SettingError: If the planner's individuals are no real vectors, or it has no such terms.
-        """
+        """Prepare the wrapped planner's problem."""
         problem = super().prepare(robot, scenario)
         one = self.planner.sample(problem, np.random.Generator(np.random.PCG64(0)), 1)
         names = tuple(self.planner.cost(problem, one).named_terms(0))
@@ -70,14 +65,10 @@ class Nsga2(RealVectorControl):
         while True:
             asked = search.ask()
             judged = yield coding.population(np.asarray(asked.get("X"), dtype=np.float64))
-            asked.set("F", self._values(judged))
+            rows = []
+            for k, cost in enumerate(judged.cost):
+                named = judged.named_terms(k).items()
+                sums = [sum(v for n, v in named if n.startswith(o)) for o in self.objectives]
+                rows.append(sums if np.isfinite(cost) else [np.finfo(float).max] * len(sums))
+            asked.set("F", np.array(rows, dtype=np.float64))
             search.tell(infills=asked)
-
-    def _values(self, judged: JudgementArrays) -> FloatArray:
-        """Return the objectives of judged individuals, (individuals, objectives)."""
-        rows = []
-        for k, cost in enumerate(judged.cost):
-            terms = judged.named_terms(k)
-            own = [sum(v for n, v in terms.items() if n.startswith(o)) for o in self.objectives]
-            rows.append(own if np.isfinite(cost) else [np.finfo(float).max] * len(own))
-        return np.array(rows, dtype=np.float64)

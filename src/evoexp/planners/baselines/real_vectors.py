@@ -47,11 +47,7 @@ class RealVectorControl(WrappedPlanner):
     num_drawn: Count  # individuals drawn for the first vectors and their covariance; not judged
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
-        """Prepare the wrapped planner's problem.
-
-        Raises:
-            SettingError: If the planner's individuals are no real vectors.
-        """
+        """Prepare the wrapped planner's problem."""
         if not getattr(self.planner, "is_real_coded", False):
             of = self.planner.component
             must = f"left out: individuals of {of} are no vectors of real numbers"

@@ -21,23 +21,15 @@ class SpeedLimit(Settings):
     sampling_time: Positive  # T, between two configurations [s]
 
     def greatest_steps(self, lengths: Sequence[float]) -> tuple[float, float]:
-        """Return the largest turn of either link alone between two configurations (Eq. 2) [deg].
-
-        Args:
-            lengths: Of the two links [length unit].
-        """
+        """Return the largest turn of either link alone between two configurations (Eq. 2) [deg]."""
         travel = self.tcp_speed * self.sampling_time
         return travel / (lengths[0] + lengths[1]) / DEGREE, travel / lengths[1] / DEGREE
 
 
 def needed_length(turn: float, greatest_step: float) -> int:
-    """Return the chromosome's length for a turn of a link (Eq. 3): the next even number.
+    """Return the chromosome's length for a turn of a link [deg] (Eq. 3): the next even number.
 
-    A configuration has two genes.
-
-    Args:
-        turn: From the start to the goal [deg].
-        greatest_step: Δφ1,max of Eq. 2 [deg].
+    A configuration has two genes. The greatest step is Δφ1,max of Eq. 2 [deg].
     """
     genes = math.ceil(2.0 * turn / greatest_step * (1.0 - 1e-12))  # a whole number stays whole
     return max(2, genes + genes % 2)

@@ -23,7 +23,6 @@ from evoexp.planners.coevolution.kernels import (
     evaluate_lines,
     renew,
 )
-from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.teams import Evaluated, survey, teamable_costs
 from evoexp.planners.driver import TableSearch, generations_per_call
@@ -31,8 +30,9 @@ from evoexp.planners.planner import Candidate
 from evoexp.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from evoexp.planners.coevolution.planner import Coevolution
+    from evoexp.planners.coevolution.planner import Coevolution, Problem
 
+NOT_FINITE = "points and bases must be finite and below 1e70"
 PER_CALL = 8  # generations that are computed in one call, at most
 CACHED = 1 << 18  # [B] collisions of a call: beyond that, fewer generations are
 
@@ -154,7 +154,7 @@ def per_call(robots: int, count: int) -> int:
 class TeamSearch(TableSearch):
     """One run, and memory for its generations."""
 
-    def __init__(self, planner: "Coevolution", problem: Problem) -> None:
+    def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
         """Begin a run."""
         ga, robots = planner.ga, len(problem.start)
         self._planner, self._problem, self._size = planner, problem, ga.population_size

@@ -152,13 +152,8 @@ def merge_copies(
 def drop_copies(populations: FloatArray, teams: IntArray, fronts: BoolArray) -> None:
     """Take copies of other members, and of the hall's, off the fronts.
 
-    They would fill the hall with one pair.
-
-    Args:
-        populations: (robots, genes, individuals).
-        teams: (teams, robots) members of the hall.
-        fronts: (robots, individuals) changed: of equal genomes the first stays, none if the hall
-            has one.
+    They would fill the hall with one pair. On fronts (robots, individuals), of equal genomes the
+    first stays, none if the hall has one; `teams` (teams, robots) are the members of the hall.
     """
     for robot in range(len(populations)):
         genes, front = populations[robot], fronts[robot]

@@ -12,36 +12,48 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
 
-from evoexp.collision.planar.link_collision import LinkCrossings
-from evoexp.collision.scene import scene
+from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
+from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.answers import of_limits, of_place
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.generations import TeamSearch
+from evoexp.planners.coevolution.generations import NOT_FINITE, TeamSearch
 from evoexp.planners.coevolution.kernels import HALF_TURN, LineTask, evaluate_lines, measure
-from evoexp.planners.coevolution.link_problem import NOT_FINITE, Problem
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
-from evoexp.records import Block, FloatArray
-from evoexp.robots.assembly import Robot
+from evoexp.records import Block, BoolArray, FloatArray
+from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
 PAIR_BYTES = 7  # of a pair of individuals: collisions in two generations, whether they are a team
 
 
-class Coevolution(PlannerDefaults[Problem], Component):
+class Problem(NamedTuple):
+    """Robots and their scenario, prepared."""
+
+    assembly: Assembly  # the robots, built
+    collision: LinkCollision  # the paper's collision model on them
+    arms: FloatArray  # (robots, 4) base x, base y, lengths of both links [length unit]
+    start: FloatArray  # (robots, 2) absolute link angles [rad]
+    goal: FloatArray  # (robots, 2) [rad]
+    moving: BoolArray  # (robots,) false for robots that stand still
+    scene: Scene  # the bodies themselves, for the exact verdict on a motion
+    security_margin: float  # clearance that the task requires [length unit]
+
+
+class Coevolution(PlannerDefaults, Component):
     """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
 
     Methods I–VIII are settings of it.
@@ -81,11 +93,7 @@ class Coevolution(PlannerDefaults[Problem], Component):
         return self.chromosome_length // 2
 
     def prepare(self, robot: Robot, scenario: LinkMotion) -> Problem:
-        """Build the robots and check that start and goal fit them and are free of collision.
-
-        Raises:
-            SettingError: If they are not.
-        """
+        """Build the robots and check that start and goal fit them and are free of collision."""
         assembly = robot.build()
         collision = self.collision.bind(assembly, scenario.obstacles)
         if len(collision.arms) < 2:
@@ -211,9 +219,6 @@ class Coevolution(PlannerDefaults[Problem], Component):
             C1 … C4 (C1 against the team's other robots only), the distance by which the curve
             leaves the range [0, π] of link angles, and the largest turn of a link per sampling
             step, at the curve's fastest instant.
-
-        Raises:
-            ValueError: If the solution has another size than robots × (K + 2) × 2.
         """
         paths = DEGREE * self._paths(problem, solution)
         ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])

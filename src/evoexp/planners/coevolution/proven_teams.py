@@ -7,13 +7,12 @@ import numpy as np
 
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.evolution.best_team import BestTeam, best_team
-from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.planners.coevolution.teams import Evaluated
 from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from evoexp.planners.coevolution.planner import Coevolution
+    from evoexp.planners.coevolution.planner import Coevolution, Problem
 
 MOST = 100  # teams that are judged of one generation; the others are no answer
 
@@ -21,7 +20,7 @@ MOST = 100  # teams that are judged of one generation; the others are no answer
 class ProvenTeams:
     """Judges the cheapest teams of populations, and counts collisions where one is refuted."""
 
-    def __init__(self, planner: "Coevolution", problem: Problem) -> None:
+    def __init__(self, planner: "Coevolution", problem: "Problem") -> None:
         """Begin with no verdict; the planner's `acceptance` is not `model`."""
         self._planner, self._problem = planner, problem
         self._proofs = Proofs(planner, problem)
@@ -38,14 +37,9 @@ class ProvenTeams:
         return self._proofs.num_certificates
 
     def settle(self, populations: FloatArray, found: Evaluated) -> BestTeam:
-        """Judge teams, the cheapest first, until one is proven.
+        """Judge teams, the cheapest first, until one is proven; return it, or one not found.
 
-        Args:
-            populations: (robots, 2 K, individuals).
-            found: Of these; collisions and costs of those who are refuted are raised.
-
-        Returns:
-            The proven team; one that is not found where none is.
+        Collisions and costs of those who are refuted are raised.
         """
         for _ in range(MOST):
             best = best_team(found.collisions, found.teamable)
@@ -56,10 +50,7 @@ class ProvenTeams:
     def settle_each(self, populations: FloatArray, found: Evaluated, costs: FloatArray) -> None:
         """Judge the cheapest teams of the first robot's individuals until one is proven.
 
-        Args:
-            populations: (robots, 2 K, individuals).
-            found: Of these; collisions and costs of those who are refuted are raised.
-            costs: (individuals,) of their cheapest teams; changed.
+        `costs` (individuals,) are those of their cheapest teams; changed. See `settle`.
         """
         for _ in range(MOST):
             k = int(np.argmin(costs))

@@ -11,6 +11,7 @@ import numpy as np
 
 from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
 from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.hall_of_fame import rate_team
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray, IntArray
 
@@ -62,15 +63,8 @@ class Evaluated(NamedTuple):
 
     def cost_of(self, team: IntArray) -> float:
         """Return the summed own cost of a team (robots,); inf if it collides."""
-        if self.collisions_of(team) > 0:
-            return np.inf
-        return float(sum(self.own[r, i] for r, i in enumerate(team)))
-
-    def collisions_of(self, team: IntArray) -> int:
-        """Return the colliding configurations within a team (robots,) and with obstacles."""
-        pairs = enumerate(combinations(range(len(team)), 2))
-        hits = sum(int(self.collisions[pair, team[a], team[b]]) for pair, (a, b) in pairs)
-        return hits + sum(int(self.blocked[r, i]) for r, i in enumerate(team))
+        hits, cost = rate_team(self.collisions, self.own, team)
+        return np.inf if hits or any(self.blocked[range(len(team)), team]) else cost
 
     def terms_of(self, team: IntArray) -> dict[str, float]:
         """Return C1 … C4 of every robot of a team (robots,) by name.

@@ -37,11 +37,7 @@ class PathClimbing(WrappedPlanner):
     num_paths: Count  # paths that climb side by side
 
     def prepare(self, robot: Any, scenario: Any) -> Any:
-        """Prepare the wrapped planner's problem.
-
-        Raises:
-            SettingError: If the planner is none of grid paths, or draws fewer walks at first.
-        """
+        """Prepare the wrapped planner's problem."""
         if not isinstance(self.planner, GridPathGa):
             must = f"left out: {self.planner.component} has no paths over a grid"
             raise SettingError("control", must, self.component)

@@ -68,13 +68,8 @@ class Problem(NamedTuple):
     scene: Scene  # the bodies themselves, for the exact verdict on a motion
     security_margin: float  # clearance that the task requires [length unit]
 
-    def num_words(self, count: int) -> int:
-        """Return how many random words are drawn at first for so many paths."""
-        fewest = int(self.moves.steps[self.ends[0]])
-        return WORDS * (int(STEPS_PER_WALK * count * fewest / LANES) + 1)
 
-
-class GridPathGa(PlannerDefaults[Problem], Component):
+class GridPathGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 2.3."""
 
     component: ClassVar[str] = "grid_path_ga"
@@ -92,11 +87,7 @@ class GridPathGa(PlannerDefaults[Problem], Component):
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorPlatform, scenario: GridMotion) -> Problem:
-        """Work out the fields, and check that the goal can be reached.
-
-        Raises:
-            SettingError: If it cannot, start or goal is blocked, or robot and grid do not fit.
-        """
+        """Work out the fields, and check that the goal can be reached."""
         return _prepared(self.collision, self.acceptance, robot, scenario)
 
     def prior_queries(self, problem: Problem) -> int:
@@ -110,27 +101,19 @@ class GridPathGa(PlannerDefaults[Problem], Component):
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
-        paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
+        nodes, moves, ends = problem.fields.grid.num_nodes, problem.moves, problem.ends
+        paths = np.empty((count, nodes + 1), dtype=np.int32)
         if len(problem.sums):
-            self._fill(problem, rng, paths)
-        else:
-            self._fill_one_by_one(problem, rng, paths)
-        return trimmed(paths)
-
-    def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
-        """Let walkers fill a table of paths, from the start with more words if some lack."""
-        first, moves, ends = problem.num_words(len(paths)), problem.moves, problem.ends
-        walks = first, MORE_WORDS, moves.neighbours, problem.sums, ends, not self.revisits
-        words = rng.bit_generator.random_raw(first)
-        while walk_all(words, *walks, paths) < 0:
-            words = np.concatenate([words, rng.bit_generator.random_raw(MORE_WORDS)])
-
-    def _fill_one_by_one(
-        self, problem: Problem, rng: np.random.Generator, paths: NodeArray
-    ) -> None:
-        """Fill a table of paths where walkers do not take turns."""
-        draws, place = Draws(BLOCK), np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
-        task = problem.moves, problem.world.sums[:0], problem.ends, not self.revisits
+            # walkers fill the table, from the start with more words if some lack
+            fewest = int(moves.steps[ends[0]])
+            first = WORDS * (int(STEPS_PER_WALK * count * fewest / LANES) + 1)
+            walks = first, MORE_WORDS, moves.neighbours, problem.sums, ends, not self.revisits
+            words = rng.bit_generator.random_raw(first)
+            while walk_all(words, *walks, paths) < 0:
+                words = np.concatenate([words, rng.bit_generator.random_raw(MORE_WORDS)])
+            return trimmed(paths)
+        draws, place = Draws(BLOCK), np.zeros(nodes, dtype=np.int32)
+        task = moves, problem.world.sums[:0], ends, not self.revisits
         for path in paths:
             before = draws.block.taken.item(0)
             walk(draws.block, *task, path, place)
@@ -138,13 +121,10 @@ class GridPathGa(PlannerDefaults[Problem], Component):
                 draws.block.taken[0], before = before, 0
                 draws.extend(rng)
                 walk(draws.block, *task, path, place)
+        return trimmed(paths)
 
     def cost(self, problem: Problem, population: np.ndarray) -> JudgementArrays:
-        """Judge paths (individuals, longest + 1), which are valid by construction.
-
-        Raises:
-            ValueError: If a path is empty or longer than the table is wide.
-        """
+        """Judge paths (individuals, longest + 1), which are valid by construction."""
         if (
             population.ndim != 2
             or not 1 <= population[:, 0].min() <= population[:, 0].max() < population.shape[1]
@@ -169,11 +149,7 @@ class GridPathGa(PlannerDefaults[Problem], Component):
         return Motion(np.ascontiguousarray(self._nodes(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return D, S and cost of a path, and the numbers of its faults; with faults it costs inf.
-
-        Raises:
-            SettingError: If it has fewer than two nodes, or a node outside the grid.
-        """
+        """Return D, S and cost of a path, and the numbers of its faults; with one it costs inf."""
         nodes, own = self._nodes(problem, solution), problem.fields.grid
         last = np.array(own.free.shape) - 3
         if len(nodes) < 2:
@@ -320,7 +296,12 @@ def _prepared(
         _weigh_moves(fields),
     )
     moves = Moves(own.neighbours, fields.potentials, steps)
-    return Problem(fields, moves, _goal_sums(moves), (start, goal), world, bodies, margin)
+    # toward the goal; walkers take turns on grids of few nodes whose sums are small whole numbers
+    exact = weigh_all(moves)
+    sums = np.minimum(exact, MOST_WEIGHT).astype(np.uint16)
+    if len(sums) > MOST_NODES or (sums != exact).any():
+        sums = sums[:0]
+    return Problem(fields, moves, sums, (start, goal), world, bodies, margin)
 
 
 def _weigh_moves(fields: Fields) -> SumArray:
@@ -340,14 +321,3 @@ def _weigh_moves(fields: Fields) -> SumArray:
         if not np.array_equal(table, sums):
             return tables[:0]
     return tables
-
-
-def _goal_sums(moves: Moves) -> SumArray:
-    """Return the sums of the weights of moves toward the goal, (nodes, moves).
-
-    There are no nodes on large grids, nor where the sums are no small whole numbers: there walkers
-    do not take turns.
-    """
-    sums = weigh_all(moves)
-    fits = len(sums) <= MOST_NODES and sums.max() <= MOST_WEIGHT and (sums == np.floor(sums)).all()
-    return sums[: len(sums) if fits else 0].astype(np.uint16)

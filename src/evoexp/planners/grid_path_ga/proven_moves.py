@@ -38,26 +38,17 @@ def only_proven(grid: Grid, scene: Scene, security_margin: float, by_margin: boo
         neighbours[line[0], move] = -1
         neighbours[line[1], neighbours[line[1]] == line[0]] = -1
 
-    for move in _one_of_each_pair(grid):
-        for line in _lines(grid.neighbours[:, move]):
-            judge(line, move)
+    for move, targets in enumerate(grid.neighbours.T):
+        # moves to nodes of greater index; the others are their ways back
+        first = np.flatnonzero(targets >= 0)[:1]
+        if len(first) and targets[first[0]] > first[0]:
+            for line in _lines(targets):
+                judge(line, move)
     return grid._replace(neighbours=neighbours)
 
 
-def _one_of_each_pair(grid: Grid) -> Iterator[int]:
-    """Yield the moves that lead to nodes of greater index; the others are their ways back."""
-    for move, targets in enumerate(grid.neighbours.T):
-        first = np.flatnonzero(targets >= 0)[:1]
-        if len(first) and targets[first[0]] > first[0]:
-            yield move
-
-
 def _lines(targets: NodeArray) -> Iterator[NodeArray]:
-    """Yield the nodes of each longest line of one move, in order.
-
-    Args:
-        targets: (nodes,) where the move leads to, −1 where it is not permitted.
-    """
+    """Yield the nodes of each longest line of one move, which leads to `targets` (nodes,) or −1."""
     is_target = np.zeros(len(targets), dtype=bool)
     is_target[targets[targets >= 0]] = True
     for node in np.flatnonzero((targets >= 0) & ~is_target):

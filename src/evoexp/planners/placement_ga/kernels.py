@@ -17,20 +17,15 @@ GENES = 2  # θ1, θ2
 ROWS = GENES + CRITERIA + 1  # angles [deg], criteria, branch of θ3
 
 
-class Breeding(NamedTuple):
-    """Settings of the operators."""
-
-    multiple: float  # copies that the best one expects, in units of the mean
-    crossover_rate: float  # probability per pair
-    mutation_rate: float  # probability per bit
-
-
 class Coding(NamedTuple):
-    """The meaning of strings."""
+    """The meaning of strings, and settings of the operators."""
 
     bits: int  # bits per gene
     gray: bool  # whether they are Gray codes
     limits: FloatArray  # (2, 2) of the angles [deg]
+    multiple: float  # copies that the best one expects, in units of the mean
+    crossover_rate: float  # probability per pair
+    mutation_rate: float  # probability per bit
 
 
 class Population(NamedTuple):
@@ -43,8 +38,7 @@ class Population(NamedTuple):
 @kernel
 def advance(
     draws: Block,  # uniform numbers
-    breeding: Breeding,  # settings of the operators
-    coding: Coding,  # the meaning of strings
+    coding: Coding,  # the meaning of strings, and settings of the operators
     model: Model,  # task, weights and limits of the criteria
     population: Population,
     following: Population,  # written
@@ -59,14 +53,14 @@ def advance(
     )
     strings, rows, children = population.strings, population.rows, following.strings
     parents, elites, bits, count = chosen.parents, chosen.elites, coding.bits, len(chosen.parents)
-    if not choose_parents(draws, rows[GENES + COST], breeding.multiple, chosen):
+    if not choose_parents(draws, rows[GENES + COST], coding.multiple, chosen):
         return False
     crossing = draw_many(draws, 2 * (count // 2))
     if used_up(draws):
         return False
     # crossover, mutation, criteria
-    cross_strings(crossing, strings, bits, parents, breeding.crossover_rate, children)
-    flip_strings(draws, children, bits, count, breeding.mutation_rate)
+    cross_strings(crossing, strings, bits, parents, coding.crossover_rate, children)
+    flip_strings(draws, children, bits, count, coding.mutation_rate)
     if used_up(draws):
         return False
     judge(children, coding, model, count, following.rows)

@@ -25,7 +25,7 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.answers import of_limits
 from evoexp.planners.driver import ScaledSearch
 from evoexp.planners.placement_ga import kernels
-from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
+from evoexp.planners.placement_ga.kernels import GENES, ROWS, Coding, Population
 from evoexp.planners.planner import Candidate, JudgementArrays, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.records import Block, FloatArray, IntArray
@@ -52,7 +52,7 @@ class Problem(NamedTuple):
     security_margin: float  # clearance that the task requires [length unit]
 
 
-class PlacementGa(PlannerDefaults[Problem], Component):
+class PlacementGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 3.2."""
 
     component: ClassVar[str] = "placement_ga"
@@ -75,11 +75,7 @@ class PlacementGa(PlannerDefaults[Problem], Component):
         return self
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
-        """Build the robot and check that the end-effector can reach its target.
-
-        Raises:
-            SettingError: If it cannot, or settings contradict each other.
-        """
+        """Build the robot and check that the end-effector can reach its target."""
         check_range("planner.angle_range", self.angle_range)
         reach = sum(robot.link_lengths)
         if abs(scenario.target[1]) > reach:
@@ -120,8 +116,9 @@ class PlacementGa(PlannerDefaults[Problem], Component):
         return rows
 
     def strings_of(self, problem: Problem) -> Coding:
-        """Return the meaning of strings, as the kernels take it."""
-        return Coding(self.bits_per_gene, self.coding == "gray", problem.angle_limits)
+        """Return the meaning of strings and the operators' settings, as the kernels take them."""
+        coding, ga = (self.bits_per_gene, self.coding == "gray", problem.angle_limits), self.ga
+        return Coding(*coding, ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the posture of a solution as a motion that stays there; None if it is infeasible.
@@ -140,9 +137,6 @@ class PlacementGa(PlannerDefaults[Problem], Component):
 
         `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. Out of
         reach, θ3, X_p and the torques are NaN, criteria and cost E_m.
-
-        Raises:
-            ValueError: If the solution has another size than 2.
         """
         branch, *both = problem.model.posture(*_two(solution))
         one, two = solution.tolist()
@@ -185,8 +179,6 @@ class _Search(ScaledSearch):
             np.empty((self.num_places, ROWS, size)),
         )
         self.costs = self._table.rows[:, FIRST_CRITERION]
-        breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
-        self._settings = breeding, *self._judging
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
@@ -202,7 +194,7 @@ class _Search(ScaledSearch):
             Population(strings[g % num], rows[g % num]) for g in (generation, generation + 1)
         )
         suffices = kernels.advance(
-            self.draws.block, *self._settings, present, following, self.chosen
+            self.draws.block, *self._judging, present, following, self.chosen
         )
         if suffices:
             kernels.summarise_rows(following.rows, self.summaries[(generation + 1) % num])

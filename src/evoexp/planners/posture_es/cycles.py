@@ -51,19 +51,6 @@ class Ancestry:
 class Search:
     """One phase being searched."""
 
-    offspring: FloatArray  # (nq, individuals) [rad] of the last cycle; one array for a size
-    costs: FloatArray  # (individuals,) of the last cycle
-    least: float  # least cost of any feasible individual so far
-    lowest: float  # lowest cost of the cycle, feasible or not
-    mean: float  # mean cost of the feasible
-    std: float  # standard deviation of these costs
-    num_feasible: int  # feasible individuals of the cycle
-    best: int  # node of the best so far: the winner once there is one
-    best_row: FloatArray  # (ROWS,) its terms and cost
-    cycles: int  # so far
-    idle: int  # cycles since the last improvement
-    won: bool  # whether somebody meets the goal
-
     def __init__(
         self,
         ga: StrategySettings,
@@ -89,13 +76,17 @@ class Search:
             edge_check,
         )
         # the posture that the phase begins with is judged, and is the first parent
-        self.offspring = ancestry.posture(node)[:, None].copy()
+        self.offspring = ancestry.posture(node)[:, None].copy()  # (nq, individuals) of a cycle
         judged = stage.judge(self.offspring)
         costs = np.full(ga.num_parents, judged.cost[0])
         self._members = Members(np.repeat(self.offspring, ga.num_parents, axis=1), costs, 1)
         self._nodes = [node]  # of the parents
-        self.costs, self.best_row, self.best = judged.cost, judged.rows[:, 0], node
+        self.costs = judged.cost  # (individuals,) of the last cycle
+        # of the best so far, the winner once there is one: terms and cost (ROWS,), and node
+        self.best_row, self.best = judged.rows[:, 0], node
+        # least cost of any feasible individual so far; lowest of the cycle, feasible or not
         self.least = self.lowest = float(judged.cost[0])
+        # cycles so far, and since the last improvement; whether somebody meets the goal
         self.cycles, self.idle, self.won = 0, 0, bool(judged.met[0])
         self._count(np.where(judged.feasible, judged.cost, np.inf))
 

@@ -98,14 +98,9 @@ class Memory(NamedTuple):
 def judge(
     q: FloatArray, judging: Judging, rows: FloatArray, feasible: BoolArray, met: BoolArray
 ) -> None:
-    """Write terms and cost of postures, whether they are feasible, and whether they meet the goal.
+    """Write terms and cost (ROWS, …) of postures q (nq, postures) [rad].
 
-    Args:
-        q: (nq, postures) [rad].
-        judging: Terms and limits.
-        rows: (ROWS, postures) written.
-        feasible: (postures,) written.
-        met: (postures,) written.
+    And whether each is feasible, and meets the goal.
     """
     weights, reach, tables = judging.weights, judging.reach, judging.tables
     count = q.shape[1]
@@ -155,11 +150,7 @@ def judge(
 def judge_edges(parents: FloatArray, num_between: int, judging: Judging, memory: Memory) -> None:
     """Mark children as infeasible that an infeasible configuration separates from their parent.
 
-    Args:
-        parents: (nq, ≥ parents).
-        num_between: Configurations tested between the two.
-        judging: Terms and limits.
-        memory: Offspring and origin; `feasible` is changed.
+    Tested are `num_between` configurations between it, one of `parents` (nq, any), and the child.
     """
     offspring, origin, feasible = memory.offspring, memory.origin, memory.feasible
     nq, count = offspring.shape

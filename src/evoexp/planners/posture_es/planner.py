@@ -34,10 +34,10 @@ from evoexp.planners.answers import CoverShape, Listing, joint_names, of_limits,
 from evoexp.planners.arm_tasks import cover_shapes
 from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, JudgementArrays, Keeper, PlannerDefaults
-from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
 from evoexp.planners.posture_es.phases import Problem, Span, Stage
+from evoexp.planners.posture_es.problem import prepare
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import Block, FloatArray
@@ -51,12 +51,7 @@ DENSE = 50  # configurations per step at which tilts of the continuous motion ar
 OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
 
 
-def _one_or_several(value: Any) -> Any:
-    """Return one number as a tuple of one."""
-    return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
-
-
-class PostureEs(PlannerDefaults[Problem], Component):
+class PostureEs(PlannerDefaults, Component):
     """The evolution strategy of Corsépius, section 4."""
 
     component: ClassVar[str] = "posture_es"
@@ -64,7 +59,11 @@ class PostureEs(PlannerDefaults[Problem], Component):
 
     # how far a joint may step at most: one number for all joints, or one per joint [rad],
     # lengths for sliding joints
-    scope: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_one_or_several)]
+    scope: Annotated[
+        tuple[Positive, ...],
+        Field(min_length=1),
+        BeforeValidator(lambda scope: (scope,) if type(scope) in (int, float) else scope),
+    ]
     # configurations tested between a parent and its child; 0: none, as in the paper
     edge_check: NonNegativeCount
     ga: StrategySettings  # parents, offspring, selection, mutation, when to stop
@@ -75,12 +74,8 @@ class PostureEs(PlannerDefaults[Problem], Component):
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PostureTask | MoveitTask) -> Problem:
-        """Build the robot and check the task against it.
-
-        Raises:
-            SettingError: If robot and task do not fit each other, see `problem.prepare`.
-        """
-        return posture_problem.prepare(robot, scenario, self.scope, self.objective, self.collision)
+        """Build the robot and check the task against it."""
+        return prepare(robot, scenario, self.scope, self.objective, self.collision)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
@@ -148,9 +143,6 @@ class PostureEs(PlannerDefaults[Problem], Component):
 
         `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not
         reached.
-
-        Raises:
-            ValueError: If the solution is no list of postures.
         """
         postures = self._postures(problem, solution)
         found, several = problem.spans(postures), len(problem.phases) > 1
@@ -188,7 +180,8 @@ class PostureEs(PlannerDefaults[Problem], Component):
 
     def parts(self, problem: Problem, motion: Motion) -> list[Part]:
         """Return the motion phase by phase: what is held changes the bodies."""
-        return problem.parts(motion)
+        spans = problem.spans(motion.q)
+        return [Part(problem.scene_of(span.stage), span.first, span.last) for span in spans]
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of a cycle's postures and their terms, and of all parents so far."""
@@ -203,10 +196,9 @@ class PostureEs(PlannerDefaults[Problem], Component):
 
     def notes(self, problem: Problem) -> tuple[str, ...]:
         """Describe the collision model and list the body pairs that it skips."""
-        task = problem.task
-        named = zip(task.names, task.objects, strict=True)
-        hulls = [name for name, each in named if each.shape == "hull"]
-        return (*posture_problem.notes(problem), *hull_notes(hulls))
+        objects = zip(problem.task.names, problem.task.objects, strict=True)
+        hulls = [name for name, each in objects if each.shape == "hull"]
+        return (*problem.bodies.notes(problem.task.length_unit, is_complete=True), *hull_notes(hulls))
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the spheres or capsules around the robot's bodies."""
@@ -218,7 +210,7 @@ class PostureEs(PlannerDefaults[Problem], Component):
         terms = {}
         for term in (term for term, limit in limits.items() if limit is not None):
             name, at, between = TERMS[term], [0.0], [0.0]
-            for span in (span for span in found if span.stage.weight(name) > 0.0):
+            for span in (span for span in found if span.stage.judging.weights[term] > 0.0):
                 at.append(float(span.judged.rows[term].max()))
                 on_the_way = dense(postures[span.first : span.last + 1])
                 between.append(float(span.stage.judge(on_the_way).rows[term].max()))

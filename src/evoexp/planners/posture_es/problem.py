@@ -82,43 +82,36 @@ def prepare(
     )
     _check_contacts(task, (*bodies.names, *task.all_names))
     if task.check_reach:
-        _check_goals(problem, scenario)
+        _check_reach(problem, isinstance(scenario, MoveitTask))
     stage = problem.begin(0, start, problem.first_situation)
     problem = replace(problem, scene=problem.scene_of(stage))
     goal = None
     if isinstance(scenario, MoveitTask):
         goal = scenario.goal_configuration(assembly.joint_names)
-    return _started(problem, goal)
+    return _fitted(problem, goal)
 
 
-def _started(problem: Problem, goal: FloatArray | None) -> Problem:
+def _fitted(problem: Problem, goal: FloatArray | None) -> Problem:
     """Return the problem with covers that its start, and a goal of joints, do not bring in contact.
 
-    Raises:
-        SettingError: If the start is infeasible all the same.
+    Where the bodies do not touch there; refuse a start that is infeasible all the same.
     """
-    start = problem.start
     if goal is None and _is_feasible(problem):
         return problem
-    fitted = _fitted(problem, [start] if goal is None else [start, goal])
-    if not _is_feasible(fitted):
-        raise _infeasible(fitted, start)
-    return fitted
+    ends = [problem.start] if goal is None else [problem.start, goal]
+    free = [q for q in ends if _distances(problem, q).min(initial=np.inf) > 0.0]
+    if free:
+        table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
+        bodies = problem.bodies.fitted(table, ignored, np.column_stack(free))
+        problem = replace(problem, bodies=bodies, memory={})
+    if not _is_feasible(problem):
+        raise _infeasible(problem, problem.start)
+    return problem
 
 
 def _is_feasible(problem: Problem) -> bool:
     stage = problem.begin(0, problem.start, problem.first_situation)
     return bool(stage.judge(problem.start[:, None]).feasible[0])
-
-
-def _fitted(problem: Problem, ends: list[FloatArray]) -> Problem:
-    """Return the problem with covers that do not touch at start and goal, where bodies do not."""
-    free = [q for q in ends if _distances(problem, q).min(initial=np.inf) > 0.0]
-    if not free:
-        return problem
-    table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
-    bodies = problem.bodies.fitted(table, ignored, np.column_stack(free))
-    return replace(problem, bodies=bodies, memory={})
 
 
 def _distances(problem: Problem, q: FloatArray) -> FloatArray:
@@ -141,11 +134,6 @@ def _bodies(
 ) -> BodyModel:
     """Return a robot's bodies; kept, since finding pairs that never touch takes longest."""
     return collision.bind(_built(robot)._replace(disabled=disabled))
-
-
-def notes(problem: Problem) -> tuple[str, ...]:
-    """Describe the collision model and list the body pairs that it skips."""
-    return tuple(problem.bodies.notes(problem.task.length_unit, is_complete=True))
 
 
 def _limits(assembly: Assembly) -> FloatArray:
@@ -297,18 +285,7 @@ def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
     return float(stroke) if table.prismatic[joint] else 0.0
 
 
-def _check_goals(problem: Problem, given: PostureTask | MoveitTask) -> None:
-    """Refuse goals out of reach, in the words of the task as it was given."""
-    try:
-        _check_reach(problem)
-    except SettingError as error:
-        if isinstance(given, PostureTask):
-            raise
-        must = error.must.partition(" (check_reach")[0]  # which these tasks do not have
-        raise SettingError("scenario.request", must, f"a goal {error.was}") from None
-
-
-def _check_reach(problem: Problem) -> None:
+def _check_reach(problem: Problem, is_moveits: bool) -> None:
     """Refuse goals out of the stretched arm's reach, in the first scene, with nothing held."""
     task = problem.task
     center, far = reach(problem.assembly, problem.limits)
@@ -321,18 +298,16 @@ def _check_reach(problem: Problem) -> None:
             size = 0.0 if isinstance(goal, PoseGoal) else goal.radius
         elif isinstance(goal, SurfaceGoal):
             index = task.names.index(goal.object)
-            point, field = (
-                problem.obstacles.center[index],
-                f"scenario.phases[{k - ways}].goal.object",
-            )
-            size = float(
-                np.sum(problem.obstacles.size[index])
-            )  # no point of it is farther from its middle
+            point, field = problem.obstacles.center[index], field.replace("point", "object")
+            # no point of it is farther from its middle
+            size = float(np.sum(problem.obstacles.size[index]))
         if point is not None:
             away = float(np.sqrt(np.sum((point - center) ** 2))) - size
             if away - task.position_tolerance > far:
                 where = ", ".join(f"{value:g}" for value in center)
                 must = f"within reach, {far:.4g} {task.length_unit} from ({where})"
+                if is_moveits:  # such a task has no check_reach
+                    raise SettingError("scenario.request", must, f"a goal {away:.4g} away")
                 must = f"{must} (check_reach=false searches it anyway)"
                 raise SettingError(field, must, f"{away:.4g} away")
         held = {"attach": True, "detach": False}.get(phase.then, held)

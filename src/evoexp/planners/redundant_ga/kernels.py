@@ -103,11 +103,9 @@ def begin(
 def draw(
     uniforms: FloatArray, count: int, sub_path: SubPath, table: FloatArray, checks: PathChecks
 ) -> None:
-    """Draw and judge the first `count` individuals, uniform within the limits or bit by bit.
+    """Write and judge `count` individuals, uniform within the limits or bit by bit.
 
-    Args:
-        uniforms: (genes · count,) in [0, 1).
-        table: A population, written.
+    By numbers (genes · count,) in [0, 1).
     """
     num_genes, limits, lanes = sub_path.num_genes, sub_path.limits, sub_path.lanes
     for gene in range(num_genes):

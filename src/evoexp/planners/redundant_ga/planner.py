@@ -39,7 +39,7 @@ from evoexp.validation import Component, Count, Positive
 CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellipses.Contact`
 
 
-class RedundantGa(PlannerDefaults[Problem], Component):
+class RedundantGa(PlannerDefaults, Component):
     """The algorithm of Lavoie & Boudreau, sections 3 to 5.
 
     Random search takes the generations and evaluations of one search, those of `ga`; sequential
@@ -63,11 +63,7 @@ class RedundantGa(PlannerDefaults[Problem], Component):
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
-        """Build the robot and check that the start fits it and is free of collision.
-
-        Raises:
-            SettingError: If it is not, or the robot has no joint limits to draw postures from.
-        """
+        """Build the robot and check that the start fits it and is free of collision."""
         if not isinstance(self.ga, RealGenetic | BinaryGenetic):
             raise SettingError("ga", "a real_genetic or a binary_genetic", self.ga.component)
         return reaching_problem(robot, scenario, self.collision)
@@ -81,9 +77,7 @@ class RedundantGa(PlannerDefaults[Problem], Component):
     ) -> Iterator[Block]:
         """Yield the generations of SP1 and SP2 in turn, until both are successful.
 
-        Args:
-            rng: Source of all random numbers.
-            kind: What searches a sub-path: the genetic algorithm, or a control in its place.
+        By a kind of search: the genetic algorithm, or a control in its place.
         """
         search = kind(self, problem, rng)
         for _ in range(self.num_attempts):
@@ -155,9 +149,6 @@ class RedundantGa(PlannerDefaults[Problem], Component):
         """Return the terms of both sub-paths, and the first contact of each.
 
         Positions, links and obstacles are counted from 1; 0: the sub-path is free.
-
-        Raises:
-            ValueError: If the solution has another size than 3 × joints.
         """
         postures = self._postures(problem, solution)
         terms = self.judge_plan(problem, solution)

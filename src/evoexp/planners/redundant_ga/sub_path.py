@@ -42,14 +42,10 @@ class BestEnd(NamedTuple):
 
 
 class Search(GeneticSearch):
-    """One run: searches for the ends of SP1 and SP2 in turn, in the same memory.
-
-    Attributes:
-        end: The best end of the present search.
-    """
+    """One run: searches for the ends of SP1 and SP2 in turn, in the same memory."""
 
     evolving = True
-    end: BestEnd
+    end: BestEnd  # of the present search
 
     def __init__(self, planner: "RedundantGa", problem: Problem, rng: np.random.Generator) -> None:
         """Take memory."""
@@ -78,8 +74,7 @@ class Search(GeneticSearch):
     def sub_path(self, *postures: FloatArray) -> Generator[Block, None, BestEnd]:
         """Search the end of SP1, or of SP2 behind a posture A; return the best one.
 
-        Args:
-            postures: (joints,) the start, and the posture A if SP2 is searched [rad].
+        The postures (joints,) are the start, and A if SP2 is searched [rad].
         """
         self._postures, self._path = postures, len(postures) - 1
         if self._path == 0:
@@ -138,34 +133,25 @@ class Search(GeneticSearch):
     def improve(self, places: IntArray) -> list[Best]:
         """Keep the best plan of the generations at some places; return the bests of their block."""
         bests = {0: self.keeper.standing}
+        keeper, problem = self.keeper, self._problem
         for k, place in enumerate(places.tolist()):
-            self.end = self._best_end(place)
-            if self._improves():
-                bests[k] = self.keeper.standing._replace(place=k)
+            end = self.end = self._best_end(place)
+            if self._path == 1 and end.cost < keeper.cost:
+                cost, via, terms = end.cost, self._via, np.array([self._via.terms, end.terms])
+                plan = np.concatenate([problem.start, via.posture, end.posture])
+            elif self._path == 0 and (
+                keeper.index < 0 or (keeper.cost == np.inf and end.cost < self._via_cost)
+            ):
+                # without a plan of finite cost, the best posture A is a plan that stays there
+                cost, self._via_cost = np.inf, end.cost
+                plan = np.concatenate([problem.start, end.posture, end.posture])
+                terms = self._planner.judge_plan(problem, plan)
+            else:
+                continue
+            named = dict(zip(TERMS, terms.ravel().tolist(), strict=True)) | self._counts
+            keeper.keep(cost, Candidate(plan, named, bool(self._planner.successful(1, cost))))
+            bests[k] = keeper.standing._replace(place=k)
         return [*bests.values()]
-
-    def _improves(self) -> bool:
-        """Keep the plan with the best end if it is better than the one that is kept.
-
-        Without a plan of finite cost, the best posture A is kept as a plan that stays there.
-        """
-        keeper, end = self.keeper, self.end
-        if self._path == 1:
-            if end.cost < keeper.cost:
-                self._keep(end.cost, self._via, end, np.array([self._via.terms, end.terms]))
-                return True
-        elif keeper.index < 0 or (keeper.cost == np.inf and end.cost < self._via_cost):
-            self._via_cost, problem = end.cost, self._problem
-            plan = np.concatenate([problem.start, end.posture, end.posture])
-            self._keep(np.inf, end, end, self._planner.judge_plan(problem, plan))
-            return True
-        return False
-
-    def _keep(self, cost: float, via: BestEnd, goal: BestEnd, terms: FloatArray) -> None:
-        plan = np.concatenate([self._problem.start, via.posture, goal.posture])
-        named = dict(zip(TERMS, terms.ravel().tolist(), strict=True)) | self._counts
-        solved = bool(self._planner.successful(1, cost))
-        self.keeper.keep(cost, Candidate(plan, named, solved))
 
     def _best_end(self, place: int) -> BestEnd:
         """Return the best individual of a generation; elites keep it the best so far."""

@@ -72,13 +72,7 @@ def distance(one: FloatArray, two: FloatArray) -> float:
 
 @kernel
 def step_toward(q: FloatArray, target: FloatArray, step: float) -> FloatArray:
-    """Return the configuration one step from q on the line to a target, or the target if nearer.
-
-    Args:
-        q: (nq,) [deg].
-        target: (nq,) [deg].
-        step: Length of the step [deg].
-    """
+    """Return the configuration one step from q on the line to a target, or the target if nearer."""
     far = distance(q, target)
     if far <= step:
         return target.copy()
@@ -100,15 +94,7 @@ def tested_configurations(one: FloatArray, two: FloatArray, resolution: float) -
 
     The configuration k of s is ((s − k) · one + k · two) / s, the same bits from either side. They
     come in an order in which each `LANES` neighbours are spread over the whole edge: a test that
-    leaves at the first contact finds it early (Thomason et al. 2024).
-
-    Args:
-        one: (nq,) one end [deg].
-        two: (nq,) the other end.
-        resolution: Greatest distance of neighbours [deg].
-
-    Returns:
-        (nq, s).
+    leaves at the first contact finds it early (Thomason et al. 2024). Returns (nq, s).
     """
     parts = _num_parts(distance(one, two), resolution)
     rounds = (parts + LANES - 1) // LANES
@@ -128,14 +114,8 @@ def edge_is_free(
 ) -> tuple[bool, int]:
     """Return whether an edge is free where it is tested, and how many configurations were asked.
 
-    They are asked for eight at a time, up to the first contact; the second end is the first.
-
-    Args:
-        num_free: The kernel of a `FreeTest`.
-        tables: Its tables.
-        one: (nq,) one end, known to be free [deg].
-        two: (nq,) the other end.
-        resolution: Greatest distance of tested neighbours [deg].
+    They are asked for eight at a time, up to the first contact; the second end is the first, and
+    the first end known to be free. `num_free` and `tables` are those of a `FreeTest`.
     """
     q = DEGREE * tested_configurations(one, two, resolution)
     free = num_free(tables, q)
@@ -190,14 +170,12 @@ def grow(
 ) -> tuple[Trees, int, int, int]:
     """Let one tree step toward a configuration, and the other connect to its end (Fig. 5).
 
+    Where a tree has no room left, the result has arrays of twice the size.
+
     Args:
-        num_free: The kernel of a `FreeTest`.
-        tables: Its tables.
-        trees: Both trees; where a tree has no room left, the result has arrays of twice the size.
         tree: The one that steps, 0 or 1.
         target: (nq,) q_rand [deg].
         step: The paper's ε [deg].
-        resolution: Greatest distance of tested neighbours [deg].
 
     Returns:
         The trees; where they met, the node of the tree that stepped and that of the other one, the
@@ -271,12 +249,9 @@ def shortcut(
     A line begins and ends at the tested configurations next to its places.
 
     Args:
-        num_free: The kernel of a `FreeTest`.
-        tables: Its tables.
         path: (nodes, nq) [deg].
         lengths: (nodes,) of `lengths_along`.
         ends: (lines, 2) the places, as shares of the length.
-        resolution: Greatest distance of tested neighbours [deg].
 
     Returns:
         The path and its lengths, new ones where it became shorter; how many lines were tried;

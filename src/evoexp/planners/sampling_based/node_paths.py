@@ -36,18 +36,14 @@ MOST_STEPS = 10_000  # of a line through the whole space of configurations
 MOST_TESTED = 1_000_000  # configurations on such a line
 
 
-class TreePaths(PlannerDefaults[Any]):
+class TreePaths(PlannerDefaults):
     """The answers that all planners of such paths share, whatever unit their solutions have."""
 
     component: ClassVar[str]
     unit: ClassVar[float] = DEGREE  # [rad] of a solution
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
-        """Refuse: trees are grown, paths are not drawn one by one.
-
-        Raises:
-            SettingError: Always.
-        """
+        """Refuse: trees are grown, paths are not drawn one by one."""
         raise SettingError("planner", "one that draws paths one by one", self.component)
 
     def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
@@ -67,6 +63,33 @@ class TreePaths(PlannerDefaults[Any]):
         """Return the documented shape of a solution: any number of nodes × nq."""
         return ..., (len(problem.start),)
 
+    def batches(self, search: "IteratedSearch", rng: np.random.Generator) -> Iterator[Block]:
+        """Yield a record per batch of iterations, until the search comes to its end."""
+        keeper = Keeper()
+        for index in range(self.num_generations + 1):
+            costs, asked = np.empty(0), search.edges.queries
+            left = self.num_evaluations(index)
+            while left > len(costs) and not search.stop_reason:
+                some = search.iterate(rng, left - len(costs))
+                if len(some) == 0:
+                    break
+                costs = np.concatenate([costs, some])
+            costs = costs if len(costs) else np.full(1, np.inf)
+            best = search.candidate()  # may take the best path over
+            keeper.keep(search.best_cost, best)
+            yield keeper.record(
+                cost_statistics(costs),
+                costs,
+                search.population,
+                lowest=float(costs.min()),
+                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
+                evaluations=len(costs),
+                collision_queries=search.edges.queries - asked,
+                stop_reason=search.stop_reason,
+            )
+            if search.stop_reason:
+                return
+
     def _path(self, problem: Any, solution: FloatArray) -> FloatArray:
         """Return a flat solution as a path (nodes, nq)."""
         nq = len(problem.start)
@@ -79,12 +102,7 @@ class NodePaths(TreePaths, EdgeSettings):
     """The usual answers of a planner of paths in degrees, to be inherited before `Component`."""
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
-        """Build the robot, and check that start and goal fit it and are free of collision.
-
-        Raises:
-            SettingError: If they do not, or are not, or if steps are too short for the joints'
-                ranges.
-        """
+        """Build the robot, and check that start and goal fit it and are free of collision."""
         problem = arm_problem(robot, scenario, self.collision)
         low, high = self.box(problem)
         through, substeps = distance(low, high), self.collision.collision_substeps
@@ -132,11 +150,7 @@ class NodePaths(TreePaths, EdgeSettings):
         return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
 
     def evaluate(self, problem: ArmProblem, solution: FloatArray) -> dict[str, float]:
-        """Return length, segments and contacts of a path; its length beside the straight line's.
-
-        Raises:
-            ValueError: If the solution is no list of configurations.
-        """
+        """Return length, segments and contacts of a path; its length beside the straight line's."""
         path = self._path(problem, solution)
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         straight = distance(problem.start, problem.goal)
@@ -176,7 +190,7 @@ class NodePaths(TreePaths, EdgeSettings):
         return low <= -most, high >= most
 
 
-class InIterations:
+class InIterations(TreePaths):
     """Counts the iterations of a search that goes on in batches of them, one per record."""
 
     ga: TreeGrowth
@@ -197,39 +211,15 @@ class InIterations:
         size = self.ga.iterations_per_generation
         return max(0, min(size, self.most_iterations - index * size))
 
-    def batches(self, search: "IteratedSearch", rng: np.random.Generator) -> Iterator[Block]:
-        """Yield a record per batch of iterations, until the search comes to its end."""
-        keeper = Keeper()
-        for index in range(self.num_generations + 1):
-            costs, asked = np.empty(0), search.edges.queries
-            left = self.num_evaluations(index)
-            while left > len(costs) and not search.stop_reason:
-                some = search.iterate(rng, left - len(costs))
-                if len(some) == 0:
-                    break
-                costs = np.concatenate([costs, some])
-            costs = costs if len(costs) else np.full(1, np.inf)
-            best = search.candidate()  # may take the best path over
-            keeper.keep(search.best_cost, best)
-            yield keeper.record(
-                cost_statistics(costs),
-                costs,
-                search.population,
-                lowest=float(costs.min()),
-                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
-                evaluations=len(costs),
-                collision_queries=search.edges.queries - asked,
-                stop_reason=search.stop_reason,
-            )
-            if search.stop_reason:
-                return
-
 
 class IteratedSearch(Protocol):
     """The state of a run that goes on iteration by iteration."""
 
     edges: EdgeTest  # tests edges and counts
-    best_cost: float  # length of the shortest path so far [deg], inf without one
+
+    @property
+    def best_cost(self) -> float:
+        """Length of the shortest path so far [deg], inf without one."""
 
     @property
     def stop_reason(self) -> str:

@@ -18,9 +18,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.planners.arm_tasks import ArmProblem, ArmTask
-from evoexp.planners.planner import Candidate, Keeper, Reproducibility
+from evoexp.planners.planner import Candidate, Reproducibility
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
 from evoexp.planners.sampling_based.settings import OmplSettings
@@ -45,15 +44,13 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
     reproducibility: ClassVar[Reproducibility] = "environment"
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
-        """Build the robot, and check start, goal and settings.
-
-        Raises:
-            SettingError: If they do not fit, or OMPL is not installed.
-        """
+        """Build the robot, and check start, goal and settings."""
         if importlib.util.find_spec("ompl") is None:
             must = "another planner: ompl needs pip install 'evoexp[baselines]'"
             raise SettingError("planner", must, self.component)
-        if not _has(self.algorithm):
+        from ompl import geometric  # of its Python packages some have more algorithms than others
+
+        if not hasattr(geometric, self.algorithm):
             must = (
                 f"another algorithm: the OMPL that is installed has no {self.algorithm} in Python"
             )
@@ -66,24 +63,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield a record per chunk of the search, then of the shortcuts, until it is done."""
-        search, keeper = _Search(self, problem, int(rng.integers(1, SEEDS))), Keeper()
-        for index in range(self.num_generations + 1):
-            asked = search.edges.queries
-            search.go_on(rng, (index + 1) * self.ga.queries_per_generation)
-            cost = np.array([search.cost])
-            keeper.keep(search.cost, search.candidate())
-            yield keeper.record(
-                cost_statistics(cost),
-                cost,
-                search.nodes,
-                lowest=search.cost,
-                num_feasible=int(np.isfinite(search.cost)),
-                evaluations=1,
-                collision_queries=search.edges.queries - asked,
-                stop_reason=search.stop_reason,
-            )
-            if search.stop_reason:
-                return
+        return self.batches(_Search(self, problem, int(rng.integers(1, SEEDS))), rng)
 
     def num_evaluations(self, index: int) -> int:
         """Return 1: a record judges the path in hand."""
@@ -98,39 +78,43 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
 
 
 class _Search:
-    """A planner of OMPL at work on one problem, then shortcuts of its path.
+    """A planner of OMPL at work on one problem, then shortcuts of its path; see `IteratedSearch`.
 
-    Attributes:
-        edges: Tests edges and counts.
-        nodes: (nodes, nq) the path in hand [deg]; the start alone before there is one.
-        stop_reason: Why the run ends now; empty while it goes on.
+    An iteration is a chunk of the search; `population` is the path in hand, the start alone before
+    there is one.
     """
 
     def __init__(self, planner: OmplPlanner, problem: ArmProblem, seed: int) -> None:
-        self._settings, self.stop_reason = planner, ""
+        self._settings, self.stop_reason, self._most = planner, "", 0
         self.edges = planner.edge_test(problem)
         kind = _Roadmap if planner.algorithm in ROADMAPS else _Library
         self._library = kind(planner, problem, self.edges, seed)
-        self.nodes, self._shown = problem.start[None], problem.start.copy()
+        self.population, self._shown = problem.start[None], problem.start.copy()
         self._path: ShortenedPath | None = None
 
     @property
-    def cost(self) -> float:
+    def best_cost(self) -> float:
         """Length of the path in hand [deg], inf without one."""
-        return path_length(self.nodes)
+        return path_length(self.population)
 
-    def go_on(self, rng: np.random.Generator, most: int) -> None:
+    def iterate(self, rng: np.random.Generator, most: int) -> FloatArray:
+        """Go on by a chunk; return the length of the path in hand then [deg]."""
+        self._most += self._settings.ga.queries_per_generation
+        self._go_on(rng, self._most)
+        return np.array([self.best_cost])
+
+    def _go_on(self, rng: np.random.Generator, most: int) -> None:
         """Search until so many configurations were asked for since the start, or to the end."""
         if self._path is None:
             found = self._library.solve(most)
-            shorter = found is not None and path_length(found) < self.cost
+            shorter = found is not None and path_length(found) < self.best_cost
             if found is not None and shorter and self.edges.unproven(found) is None:
-                self.nodes, self._shown = found, found.flatten()
+                self.population, self._shown = found, found.flatten()
             if self._library.is_done:
-                self.stop_reason = "solution" if len(self.nodes) > 1 else "no solution"
-            if self._settings.algorithm not in DONE_WITH_A_PATH or len(self.nodes) == 1:
+                self.stop_reason = "solution" if len(self.population) > 1 else "no solution"
+            if self._settings.algorithm not in DONE_WITH_A_PATH or len(self.population) == 1:
                 return
-            self._path = ShortenedPath(self.nodes, self.edges)
+            self._path = ShortenedPath(self.population, self.edges)
         while self._path.num_attempts < self._settings.num_improvements:
             if self.edges.queries >= most:
                 break
@@ -138,21 +122,17 @@ class _Search:
         else:
             self.stop_reason = "solution"
         self._path.settle()
-        if self._path.nodes is not self.nodes:
-            self.nodes, self._shown = self._path.nodes, self._path.nodes.flatten()
+        if self._path.nodes is not self.population:
+            self.population, self._shown = self._path.nodes, self._path.nodes.flatten()
 
     def candidate(self) -> Candidate:
         """Return the path in hand as it is recorded; the same array as long as it is the same."""
-        terms = {"length_deg": self.cost} | self.edges.certificates()
-        return Candidate(self._shown, terms, len(self.nodes) > 1)
+        terms = {"length_deg": self.best_cost} | self.edges.certificates()
+        return Candidate(self._shown, terms, len(self.population) > 1)
 
 
 class _Library:
-    """OMPL's objects for one run: space, motion tests, problem, and planner.
-
-    Attributes:
-        is_done: Whether the planner has come to ask for no further configuration.
-    """
+    """OMPL's objects for one run: space, motion tests, problem, and planner."""
 
     def __init__(
         self, planner: OmplPlanner, problem: ArmProblem, edges: EdgeTest, seed: int
@@ -162,7 +142,7 @@ class _Library:
         util.setLogLevel(getattr(util, "LogLevel", util).LOG_NONE)  # OMPL 2, 1
         util.RNG.setSeed(seed)
         self._edges, self._base, nq = edges, base, len(problem.start)
-        self.is_done = False
+        self.is_done = False  # whether the planner has come to ask for no further configuration
         low, high = planner.box(problem)
         space, bounds = base.RealVectorStateSpace(nq), base.RealVectorBounds(nq)
         for joint in range(nq):
@@ -254,13 +234,6 @@ class _Roadmap(_Library):
         while before[found[-1]] >= 0:
             found.append(int(before[found[-1]]))
         return nodes[found[::-1]] if found[-1] == start else None
-
-
-def _has(algorithm: str) -> bool:
-    """Whether the installed OMPL has an algorithm; its Python packages have not the same ones."""
-    from ompl import geometric
-
-    return hasattr(geometric, algorithm)
 
 
 def _function(kind: str, function: Callable[..., bool]) -> Any:

@@ -52,13 +52,7 @@ class RrtConnect(InIterations, NodePaths, RrtSettings, Component):
 
 
 class _Search:
-    """The state of one run: the trees until they meet, then the path, and so at each start.
-
-    Attributes:
-        pair: The trees.
-        edges: Tests edges and counts.
-        best_cost: Length of the shortest path so far [deg], inf without one.
-    """
+    """The state of one run: the trees until they meet, then the path, and so at each start."""
 
     def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
         self._planner, self._ends = planner, (problem.start, problem.goal)

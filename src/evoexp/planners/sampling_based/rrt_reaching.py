@@ -51,12 +51,7 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
     unit: ClassVar[float] = 1.0
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
-        """Build the robot and check that the start fits it and is free of collision.
-
-        Raises:
-            SettingError: If it is not, the robot has no joint limits, or the goal is not in the
-                box.
-        """
+        """Build the robot and check that the start fits it and is free of collision."""
         problem = reaching_problem(robot, scenario, self.collision)
         (x, y), (left, right, bottom, top) = problem.targets[1], problem.boxes[1]
         if not (left <= x <= right and bottom <= y <= top):
@@ -82,11 +77,7 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
         return judge_paths(edges, population.transpose(2, 1, 0) / DEGREE)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return length and contacts of a path, and how near its postures come to both places.
-
-        Raises:
-            ValueError: If the solution is no list of postures.
-        """
+        """Return length and contacts of a path, and how near its postures come to both places."""
         path = self._path(problem, solution)
         terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
         via, goal = self._errors(problem, path)
@@ -120,14 +111,7 @@ class RrtReaching(InIterations, TreePaths, ReachingSettings, Component):
 
 
 class _Search:
-    """The state of one run.
-
-    Attributes:
-        edges: Tests edges and counts.
-        best_cost: Length of the shortest plan so far [deg], inf without one.
-        population: (postures, joints) the shortest plan [rad]; the start alone without one.
-        stop_reason: Why the run ends now; empty while it goes on.
-    """
+    """The state of one run; its population is the shortest plan (postures, joints) [rad]."""
 
     def __init__(self, planner: RrtReaching, problem: Problem) -> None:
         self._planner, self._problem = planner, problem
@@ -157,7 +141,10 @@ class _Search:
     def steps(self, rng: np.random.Generator) -> Iterator[float]:
         """Yield after every iteration: the length of the plan that it completes [deg], or inf."""
         for _ in range(1 + self._planner.num_restarts):
-            nodes = yield from self._plan(rng)
+            # a path (postures, joints) [deg] to the via point and on to the goal point
+            nodes: FloatArray | None = self._problem.start[None] / DEGREE
+            for target in self._problem.targets:
+                nodes = None if nodes is None else (yield from self._extended(rng, nodes, target))
             if nodes is None:
                 continue
             length, plan = path_length(nodes), np.ascontiguousarray(DEGREE * nodes)
@@ -166,16 +153,6 @@ class _Search:
             if shorter and (self._proofs is None or self._proofs.is_proven(plan.ravel())):
                 self.best_cost, self.population = length, plan
             yield length
-
-    def _plan(self, rng: np.random.Generator) -> Generator[float, None, FloatArray | None]:
-        """Search a path (postures, joints) [deg] to the via point and on to the goal point."""
-        nodes = self._problem.start[None] / DEGREE
-        for target in self._problem.targets:
-            found = yield from self._extended(rng, nodes, target)
-            if found is None:
-                return None
-            nodes = found
-        return nodes
 
     def _extended(
         self, rng: np.random.Generator, nodes: FloatArray, target: FloatArray

@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from evoexp.planners.sampling_based.kernels import lengths_along
+from evoexp.planners.sampling_based.kernels import lengths_along, shortcut
 from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray
@@ -16,15 +16,10 @@ CUT = 0.25  # [-] of a segment, from a corner to where it is cut
 
 
 class ShortenedPath:
-    """A path that becomes shorter, attempt by attempt.
+    """A path that becomes shorter, attempt by attempt; its `nodes` are never changed in place.
 
     A shortcut begins and ends at configurations that were tested on the path: so only the line
     between them is new, and what is left of the segments that it cuts in two is known to be free.
-
-    Attributes:
-        nodes: (nodes, nq) [deg]; never changed in place.
-        lengths: (nodes,) from the start to each [deg].
-        num_attempts: Attempts so far.
 
     Where edges are proven, too, shorter paths are taken by the model first; `settle` judges the
     one in hand.
@@ -59,14 +54,16 @@ class ShortenedPath:
         return self.lengths[-1:]
 
     def attempt(self, uniforms: FloatArray) -> FloatArray:
-        """Try straight lines between places of the path; return its length after each [deg].
+        """Try straight lines between places (attempts, 2), shares of the path's length [0, 1).
 
-        Args:
-            uniforms: (attempts, 2) the places, as shares of the length.
+        Return its length after each [deg].
         """
-        lengths, done = np.empty(len(uniforms)), 0
+        lengths, done, edges = np.empty(len(uniforms)), 0, self._edges
         while done < len(uniforms):
-            nodes, along, tried = self._edges.shortcut(self.nodes, self.lengths, uniforms[done:])
+            nodes, along, tried, asked = shortcut(
+                *edges.test, self.nodes, self.lengths, uniforms[done:], edges.resolution
+            )
+            edges.queries += asked
             lengths[done : done + tried - 1] = self.length
             self._take(nodes, along)
             done += tried

@@ -12,7 +12,6 @@ from evoexp.planners.sampling_based.kernels import (
     Trees,
     edge_is_free,
     grow,
-    shortcut,
     tested_configurations,
 )
 from evoexp.records import FloatArray
@@ -23,8 +22,7 @@ ROOM = 256  # nodes that a tree has room for at first
 class EdgeTest:
     """Tests straight edges, and counts the configurations that were asked for.
 
-    Attributes:
-        queries: Configurations looked at so far: none behind the eight of an edge's first contact.
+    None behind the eight of an edge's first contact is.
     """
 
     def __init__(
@@ -36,12 +34,12 @@ class EdgeTest:
     ) -> None:
         """Begin with no query."""
         self._collision, self.resolution, self.queries = collision, resolution, 0
-        self._test, self._proofs = collision.free_test, proofs
+        self.test, self._proofs = collision.free_test, proofs  # a kernel and its tables; proofs
         self._is_doubtful = False  # whether the last path was refuted
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
         """Whether an edge is free at the configurations tested; its first end is known to be."""
-        is_free, asked = edge_is_free(*self._test, one, two, self.resolution)
+        is_free, asked = edge_is_free(*self.test, one, two, self.resolution)
         self.queries += asked
         return bool(is_free)
 
@@ -49,32 +47,13 @@ class EdgeTest:
         """Whether one configuration (nq,) [deg] is free."""
         return self.is_free(q, q)
 
-    def grow(
-        self, trees: Trees, tree: int, target: FloatArray, step: float
-    ) -> tuple[Trees, int, int]:
-        """Grow the trees by the kernel `grow`, and count the configurations that it tests."""
-        trees, end, met, asked = grow(*self._test, trees, tree, target, step, self.resolution)
-        self.queries += asked
-        return trees, end, met
-
-    def shortcut(
-        self, path: FloatArray, lengths: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, FloatArray, int]:
-        """Try lines by the kernel `shortcut`, and count the configurations that it tests."""
-        path, lengths, tried, asked = shortcut(*self._test, path, lengths, ends, self.resolution)
-        self.queries += asked
-        return path, lengths, tried
-
     def unproven(self, path: FloatArray) -> FloatArray | None:
         """Return a node (1, nq) or an edge (2, nq) of a path that is not proven; None if all are.
 
-        All are where no proof is asked for. A path is judged whole, but by pieces behind one that
-        was refuted: no piece is judged twice. Nodes come first: a contact that the model does not
-        see, as of bodies whose covers always touch, mostly lasts longer than an edge, and a node
-        costs a fraction of one.
-
-        Args:
-            path: (nodes, nq) [deg].
+        All are where no proof is asked for. A path (nodes, nq) [deg] is judged whole, but by pieces
+        behind one that was refuted: no piece is judged twice. Nodes come first: a contact that the
+        model does not see, as of bodies whose covers always touch, mostly lasts longer than an
+        edge, and a node costs a fraction of one.
         """
         if self._proofs is None or (not self._is_doubtful and self._proofs.is_proven(path.ravel())):
             return None
@@ -88,9 +67,7 @@ class EdgeTest:
 
     def certificates(self) -> dict[str, float]:
         """Return how many paths and edges were judged as a term; none where none are."""
-        return (
-            {} if self._proofs is None else {"certificates": float(self._proofs.num_certificates)}
-        )
+        return {"certificates": float(self._proofs.num_certificates)} if self._proofs else {}
 
     def num_contacts(self, path: FloatArray) -> int:
         """Return how many of the configurations tested on a path (nodes, nq) collide."""
@@ -104,21 +81,10 @@ class EdgeTest:
 
 
 class TreePair:
-    """RRT-Connect (Kuffner & LaValle 2000, Figs. 2 and 5), one iteration at a time.
-
-    Attributes:
-        num_iterations: Iterations so far.
-    """
+    """RRT-Connect (Kuffner & LaValle 2000, Figs. 2 and 5), one iteration at a time."""
 
     def __init__(self, start: FloatArray, goal: FloatArray, edges: EdgeTest, step: float) -> None:
-        """Plant both trees.
-
-        Args:
-            start: (nq,) [deg].
-            goal: (nq,) [deg].
-            edges: Tests edges.
-            step: Length of a step, the paper's ε [deg].
-        """
+        """Plant both trees, at start and goal (nq,); a step is as long as the paper's ε [deg]."""
         self._edges, self._step, self.num_iterations = edges, step, 0
         nodes, parents = np.empty((2, len(start), ROOM)), np.full((2, ROOM), -1)
         nodes[:, :, 0] = start, goal
@@ -133,10 +99,7 @@ class TreePair:
     def iterate(self, target: FloatArray) -> FloatArray | None:
         """Let one tree make a step toward a configuration, and the other connect to its end.
 
-        The trees take turns in making the step (SWAP).
-
-        Args:
-            target: (nq,) q_rand [deg].
+        The trees take turns in making the step (SWAP) toward q_rand (nq,) [deg].
 
         Returns:
             The path from start to goal (nodes, nq) if the trees have met and it is proven, where
@@ -144,14 +107,18 @@ class TreePair:
         """
         turn = self.num_iterations % 2
         self.num_iterations += 1
-        self._trees, end, met = self._edges.grow(self._trees, turn, target, self._step)
+        edges = self._edges
+        self._trees, end, met, asked = grow(
+            *edges.test, self._trees, turn, target, self._step, edges.resolution
+        )
+        edges.queries += asked
         if met < 0:
             return None
         # both branches end at the same configuration, which stays once
         branches = self._branch(turn, end), self._branch(1 - turn, met)
         first, last = branches if turn == 0 else branches[::-1]
         path = np.concatenate([first, last[-2::-1]])
-        piece = self._edges.unproven(path)
+        piece = edges.unproven(path)
         if piece is None:
             return path
         for tree in range(2):

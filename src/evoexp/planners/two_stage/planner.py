@@ -45,7 +45,7 @@ class Problem(NamedTuple):
     security_margin: float  # clearance that the task requires [length unit]
 
 
-class TwoStage(PlannerDefaults[Problem], Component):
+class TwoStage(PlannerDefaults, Component):
     """The placement search, then the path search."""
 
     component: ClassVar[str] = "two_stage"
@@ -58,11 +58,7 @@ class TwoStage(PlannerDefaults[Problem], Component):
     acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
-        """Prepare both stages.
-
-        Raises:
-            SettingError: If one of them cannot be solved, or the grid is not of a floor.
-        """
+        """Prepare both stages."""
         if len(scenario.grid.size) != 2:
             raise SettingError(
                 "scenario.grid.size", "of a floor, two numbers", list(scenario.grid.size)
@@ -190,11 +186,7 @@ class TwoStage(PlannerDefaults[Problem], Component):
         return Motion(q)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the terms of posture and path, the last leg to the docking place, and the cost.
-
-        Raises:
-            SettingError: If there is no path, or it leaves the grid.
-        """
+        """Return the terms of posture and path, the last leg to the docking place, and the cost."""
         angles, nodes = self._parts(solution)
         path = self.path.evaluate(self._path_problem(problem, angles), nodes.ravel())
         posture = self._posture_terms(problem, angles)

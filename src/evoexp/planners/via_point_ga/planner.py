@@ -14,7 +14,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.bodies.body_collision import Clearances
 from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
@@ -30,7 +29,6 @@ from evoexp.planners.arm_tasks import (
 )
 from evoexp.planners.planner import COPIES, JudgementArrays, PlannerDefaults, num_values
 from evoexp.planners.proofs import Proofs
-from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
 from evoexp.planners.via_point_ga.search import ProvenSearch, Search, settle
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import Problem, Strings
@@ -41,19 +39,14 @@ from evoexp.validation import Component
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
-class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
+class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4."""
 
     component: ClassVar[str] = "via_point_ga"
     is_real_coded: ClassVar[bool] = True
 
     def prepare(self, robot: Robot, scenario: ArmTask) -> Problem:
-        """Build the robot and check that start and goal fit it and are free of collision.
-
-        Raises:
-            SettingError: If they do not, or if more new trajectories are asked for than there are
-                offspring.
-        """
+        """Build the robot and check that start and goal fit it and are free of collision."""
         if self.num_new_trajectories > self.ga.num_offspring:
             must = f"at most the offspring of a generation ({self.ga.num_offspring})"
             raise SettingError("planner.num_new_trajectories", must, self.num_new_trajectories)
@@ -68,15 +61,15 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Block]:
         """Yield the initial population, then one generation after the other."""
         kind = ProvenSearch if self.answers_are_proven else Search
-        return kind(self, problem, self._strings(problem)).blocks(rng)
+        return kind(self, problem, Strings(self, problem)).blocks(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
-        return self._strings(problem).drawn(rng, count)[:, :, :count]
+        return Strings(self, problem).drawn(rng, count)[:, :, :count]
 
     def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
         """Judge a population (nq, N + 1, individuals); if so asked, its cheapest ones by proof."""
-        strings = self._strings(problem)
+        strings = Strings(self, problem)
         padded = strings.padded(population)
         judged = strings.judge(padded, population.shape[2])
         if self.answers_are_proven:
@@ -87,7 +80,7 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
 
     def bounds(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
         """Return the least and the greatest value of an individual's numbers, each (nq, N + 1)."""
-        strings, shape = self._strings(problem), (len(problem.start), self.num_via_points + 1)
+        strings, shape = Strings(self, problem), (len(problem.start), self.num_via_points + 1)
         low, high = (np.broadcast_to(limit[..., 0], shape) for limit in strings.limits)
         return low, high
 
@@ -98,7 +91,7 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
 
         Section 3.4 (c) as every offspring goes through it; nothing is drawn.
         """
-        strings, count = self._strings(problem), population.shape[2]
+        strings, count = Strings(self, problem), population.shape[2]
         improved = strings.padded(population)
         strings.smooth(improved, count)
         return improved[:, :, :count]
@@ -118,11 +111,7 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
         return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the named terms of a solution, its clearances at and between via-points included.
-
-        Raises:
-            ValueError: If the solution has another size than arms × (N + 1) × joints.
-        """
+        """Return the named terms of a solution, and its clearances at and between via-points."""
         strings = self._strings_of(problem, solution)
         judged = self.cost(problem, strings[:, :, None])
         terms = judged.named_terms(0) | {"fitness": float(self.objective.fitness(judged.cost)[0])}
@@ -131,9 +120,20 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
         if straight > 0.0:
             lengths = [value for name, value in terms.items() if name.startswith("length_arm_")]
             terms["path_length_ratio"] = float(np.sum(lengths)) / straight
+        # least distances as in Fig. 7: of circle centres, to those of another arm and to an
+        # obstacle's surface; of covered bodies the clearances of covers
         at = problem.collision.clearance(strings)
         between = problem.collision.clearance(sampled(strings, SAMPLES_BETWEEN))
-        return terms | _least_distances(problem, at, between)
+        is_covered = isinstance(problem.collision, CoveredCollision)
+        radius = 0.0 if is_covered else problem.sphere_radius
+        for name, via, dense, own in (
+            ("arm", at.between_arms, between.between_arms, 2.0 * radius),
+            ("obstacle", at.to_obstacles, between.to_obstacles, radius),
+        ):
+            if np.isfinite(via).any():
+                terms[f"{name}_distance_at_via_points"] = float(np.min(via)) + own
+                terms[f"{name}_distance_between_sampled"] = float(np.min(dense)) + own
+        return terms
 
     def cost_of_terms(self, terms: Mapping[str, float]) -> float:
         """Return the cost that gives the fitness (Eq. 7)."""
@@ -166,10 +166,6 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
         """Describe the covers of bodies, where bodies are covered."""
         return cover_notes(problem.collision, problem.scene, problem.length_unit)
 
-    def _strings(self, problem: Problem) -> Strings:
-        is_covered = isinstance(problem.collision, CoveredCollision)
-        return (CoveredStrings if is_covered else Strings)(self, problem)
-
     def _strings_of(self, problem: Problem, solution: FloatArray) -> FloatArray:
         """Return a flat solution as strings (nq, N + 1)."""
         sizes = [rows * joints for rows, joints in self.shape(problem)]
@@ -182,34 +178,8 @@ class ViaPointGa(PlannerDefaults[Problem], ViaPointSettings, Component):
 
 
 def sampled(strings: FloatArray, samples: int) -> FloatArray:
-    """Return configurations on a string's straight segments, via-points included.
-
-    Args:
-        strings: (nq, N + 1).
-        samples: Configurations per segment.
-
-    Returns:
-        (nq, N · samples + 1).
-    """
+    """Return configurations (nq, N · samples + 1) on the segments of strings (nq, N + 1)."""
     before, after = strings[:, :-1, None], strings[:, 1:, None]
     inside = before + np.arange(1, samples + 1) / samples * (after - before)
     inside[:, :, -1] = strings[:, 1:]
     return np.hstack([strings[:, :1], inside.reshape(len(strings), -1)])
-
-
-def _least_distances(problem: Problem, at: Clearances, between: Clearances) -> dict[str, float]:
-    """Return least distances as in the paper's Fig. 7.
-
-    They are of circle centres, to those of another arm and to an obstacle's surface; of covered
-    bodies the clearances of covers.
-    """
-    is_covered = isinstance(problem.collision, CoveredCollision)
-    radius, distances = 0.0 if is_covered else problem.sphere_radius, {}
-    for name, via, dense, own in (
-        ("arm", at.between_arms, between.between_arms, 2.0 * radius),
-        ("obstacle", at.to_obstacles, between.to_obstacles, radius),
-    ):
-        if np.isfinite(via).any():
-            distances[f"{name}_distance_at_via_points"] = float(np.min(via)) + own
-            distances[f"{name}_distance_between_sampled"] = float(np.min(dense)) + own
-    return distances

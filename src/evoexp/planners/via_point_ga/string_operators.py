@@ -81,20 +81,6 @@ class StringCrossover(Crossover):
                         after[k] = before[source[k]]
 
 
-@kernel
-def shuffle_head(uniforms: FloatArray, slots: IntArray) -> None:
-    """Draw distinct indices in random order: the head of a Fisher–Yates shuffle.
-
-    Args:
-        uniforms: (draws,) in [0, 1), at most as many as there are indices.
-        slots: (indices,) 0, 1, 2, … at first, changed: its head is the draw.
-    """
-    num = len(slots)
-    for k in range(len(uniforms)):
-        other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
-        slots[k], slots[other] = slots[other], slots[k]
-
-
 class NewTrajectories(Mutation):
     """Replaces offspring by new random walks (section 3.4 d).
 
@@ -122,9 +108,12 @@ class NewTrajectories(Mutation):
         new, step, max_turn = int(context.settings[0]), context.settings[1], context.settings[2]
         if new == 0:
             return
-        # distinct places, each with the mutation's probability
+        # distinct places in random order: the head of a Fisher–Yates shuffle
         slots, num = np.arange(count), 0
-        shuffle_head(uniforms[: min(new, count)], slots)
+        for k in range(min(new, count)):
+            other = k + min(int(uniforms[k] * (count - k)), count - k - 1)
+            slots[k], slots[other] = slots[other], slots[k]
+        # each with the mutation's probability
         walks = uniforms[2 * new :].reshape((new, -1))
         for k in range(min(new, count)):
             if uniforms[new + k] < context.rate:

@@ -1,4 +1,9 @@
-"""Populations of strings of via-points: the problem they solve, and the steps they go through."""
+"""Populations of strings of via-points: the problem they solve, and the steps they go through.
+
+Strings of robots whose bodies are covered keep within the joints' limits. A generation of them goes
+through the same steps, each a call of its own: testing covered bodies takes far longer than Python
+takes between the steps.
+"""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -6,10 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.bodies.covered_bodies import CoveredCollision
 from evoexp.collision.bodies.touching_spheres import SphereCollision
+from evoexp.evolution.operators.breeding import breed
 from evoexp.evolution.operators.operator import Genome
+from evoexp.evolution.succession import choose_elites
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringTerms
+from evoexp.objectives.string_fitness import StringTerms, count_collisions, weigh
+from evoexp.paths.interpolation import interpolate_linear
+from evoexp.paths.lengths import measure_paths
 from evoexp.paths.walk import num_uniforms, walk_strings
 from evoexp.paths.workspace import Redistribution
 from evoexp.planners.answers import JudgementArrays
@@ -45,14 +55,7 @@ class Problem(ArmProblem):
         return self.collision
 
     def sphere_centres(self, q: FloatArray) -> list[FloatArray]:
-        """Return the centres of the circles or spheres at one configuration.
-
-        Args:
-            q: (nq,) [deg].
-
-        Returns:
-            One array (spheres, 3) [length unit] per arm.
-        """
+        """Return the centres (spheres, 3) of each arm's circles or spheres at q (nq,) [deg]."""
         model, shapes = self.assembly.model, self._spheres.shapes
         data, spheres = model.createData(), zip(shapes.joint.tolist(), shapes.start, strict=True)
         pin.forwardKinematics(model, data, DEGREE * q)
@@ -62,23 +65,12 @@ class Problem(ArmProblem):
     def centre_distances(self, q: FloatArray) -> FloatArray:
         """Return the least distance between centres of two arms, as the paper's Figs. 7 and 13 do.
 
-        Args:
-            q: (nq, configurations) [deg].
-
-        Returns:
-            (configurations,) [length unit].
+        (configurations,) [length unit] of q (nq, configurations) [deg].
         """
         return np.asarray(self.collision.clearance(q).between_arms + 2.0 * self.sphere_radius)
 
     def obstacle_distances(self, q: FloatArray) -> FloatArray:
-        """Return the least distance from a centre to the surface of an obstacle.
-
-        Args:
-            q: (nq, configurations) [deg].
-
-        Returns:
-            (configurations,) [length unit].
-        """
+        """Return the least distance from a centre to an obstacle's surface; see the one above."""
         return np.asarray(self.collision.clearance(q).to_obstacles + self.sphere_radius)
 
 
@@ -87,6 +79,14 @@ class Strings:
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         self.planner, self.problem = planner, problem
+        collision, most = problem.collision, np.full(len(problem.start), np.inf)
+        self.covered = collision if isinstance(collision, CoveredCollision) else None
+        low, high = (-most, most) if self.covered is None else problem.limits.T
+        # ends that lie on a limit lie within it, whatever the last bit of the conversion is
+        low = np.minimum(low, np.minimum(problem.start, problem.goal))
+        high = np.maximum(high, np.maximum(problem.start, problem.goal))
+        # least and greatest angle of each joint, each (nq, 1, 1) [deg]
+        self.limits = low[:, None, None], high[:, None, None]
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
         self.settings = kernels.Settings(
             arm_slices=problem.arm_slices,
@@ -101,6 +101,8 @@ class Strings:
     @property
     def generations_per_call(self) -> int:
         """Generations that are best computed at once."""
+        if self.covered is not None:
+            return 1
         return generations_per_call(
             PER_CALL, self.empty(self.planner.ga.population_size).nbytes, CACHED
         )
@@ -113,12 +115,6 @@ class Strings:
         limits[...] = problem.limits[:, None]
         limits[:, 0], limits[:, -1] = problem.start[:, None], problem.goal[:, None]
         return Genome(limits.reshape(-1, 2), problem.arm_slices, shape[1])
-
-    @property
-    def limits(self) -> tuple[FloatArray, FloatArray]:
-        """Least and greatest angle of each joint, each (nq, 1, 1) [deg]; here there are none."""
-        most = np.full((len(self.problem.start), 1, 1), np.inf)
-        return -most, most
 
     def padded(self, strings: FloatArray) -> FloatArray:
         """Return a copy of strings (nq, N + 1, count), padded to whole vectors by zeros."""
@@ -143,8 +139,11 @@ class Strings:
         return strings
 
     def smooth(self, strings: FloatArray, count: int) -> None:
-        """Redistribute and relax the first `count` strings."""
+        """Redistribute and relax the first `count` strings; what leaves the limits is put there."""
         kernels.smooth(strings, count, self.settings)
+        if self.covered is not None:
+            own, (low, high) = strings[:, :, :count], self.limits
+            np.minimum(np.maximum(own, low, out=own), high, out=own)
 
     def judge(self, strings: FloatArray, count: int) -> JudgementArrays:
         """Judge the first `count` strings: the terms are C1 … C5 of Eqs. 2–6."""
@@ -160,7 +159,16 @@ class Strings:
 
     def write_terms(self, strings: FloatArray, terms: StringTerms) -> None:
         """Write the terms of strings (Eqs. 2–7)."""
-        kernels.judge(strings, self.settings, terms)
+        if self.covered is None:
+            kernels.judge(strings, self.settings, terms)
+            return
+        count, substeps = len(terms.cost), self.settings.substeps
+        measure_paths(strings, self.problem.arm_slices, terms.lengths, terms.unevenness)
+        between = interpolate_linear(np.ascontiguousarray(strings[:, :, :count]), substeps)
+        collides = self.covered.collides(between.reshape(len(between), -1))
+        hits = np.where(collides, -1.0, 1.0).reshape(1, -1, substeps, count)
+        count_collisions(hits, terms.collisions[:count])
+        weigh(self.settings.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)
 
     def table(self, places: int) -> kernels.Population:
         """Return memory for the populations of some generations; the padding holds zeros."""
@@ -176,9 +184,24 @@ class Strings:
         first: int,  # the present generation
     ) -> None:
         """Go on from a generation to those behind it (section 3.4)."""
-        arguments = run.breeding, self.settings, run.table, run.scratch, run.summaries
-        select, cross, mutate = run.operators
-        kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
+        (select, cross, mutate), rules = run.operators, run.breeding
+        if self.covered is None:
+            arguments = rules, self.settings, run.table, run.scratch, run.summaries
+            kernels.evolve(select, cross, mutate, uniforms, normals, first, *arguments)
+            return
+        offspring, terms, elites, parents = run.scratch
+        here, there = first % len(run.summaries), (first + 1) % len(run.summaries)
+        before, after = (
+            kernels.Population(*(array[place] for array in run.table)) for place in (here, there)
+        )
+        choose_elites(before.costs, elites)
+        genomes, out = kernels.by_gene(before.strings), kernels.by_gene(offspring)
+        rest = first, rules.mutation_rate, rules, before.costs, genomes, parents, out
+        breed(select, cross, mutate, uniforms[0], normals, *rest)
+        self.smooth(offspring, len(parents))
+        self.write_terms(offspring, terms)
+        kernels.follow(before, run.scratch, after)
+        kernels.summarise_strings(*after[1:], run.summaries[there])
 
     def no_terms(self, strings: FloatArray, count: int) -> StringTerms:
         """Return memory for the terms of the first `count` strings; all but costs are padded."""

@@ -111,7 +111,8 @@ def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> li
     places = enumerate(tool_places(problem, own), first)
     goal = _row(GOAL, span.last, span.stage.phase.name, *span.stage.target_position)
     rows = [*links, *(_row(TIP, n, "tool", *place) for n, place in places), goal]
-    for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(span.stage))):
+    obstacles = problem.placed_obstacles(span.stage.situation)
+    for k, (shape, placement) in enumerate(obstacle_shapes(obstacles)):
         name, held = problem.task.names[k], k == span.stage.situation.held
         for instant in [first, span.last] if held else [span.last]:
             where = _held_pose(problem, span, postures[instant]) if held else placement

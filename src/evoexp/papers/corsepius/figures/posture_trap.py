@@ -62,9 +62,11 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
     rows += [*_cells(stuck, failed[-1], a, b), *_escape(stuck, failed[-1])]
     problem = measures.problem(stuck)
-    goal = dict(zip("xyz", problem.last_stage.target_position, strict=True))
+    last, situation = len(problem.phases) - 1, problem.first_situation
+    stage = problem.begin(last, problem.start, situation)
+    goal = dict(zip("xyz", stage.target_position, strict=True))
     rows.append({"element": GOAL, "order": 0} | goal)
-    shapes = obstacle_shapes(problem.obstacles_in(problem.last_stage))
+    shapes = obstacle_shapes(problem.placed_obstacles(situation))
     standing = [solids.solid(*shape) for shape in shapes]
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
     names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS]

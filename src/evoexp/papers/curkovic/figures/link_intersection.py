@@ -10,7 +10,7 @@ from matplotlib.patches import Arc
 from evoexp.collision.planar.closed_form import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
-from evoexp.planners.coevolution.link_problem import Problem
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.report.figures import marks, records, rounded, style
 from evoexp.report.results.stored_results import ConditionResults
 

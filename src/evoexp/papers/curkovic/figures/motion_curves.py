@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
-from evoexp.planners.coevolution.link_problem import Problem
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style
 from evoexp.report.results import motion_geometry

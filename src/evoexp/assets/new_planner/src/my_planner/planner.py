@@ -35,7 +35,7 @@ class SearchSettings(Component):
     num_generations: Count  # generations after the initial one
 
 
-class MyPlanner(PlannerDefaults[ArmProblem], Component):
+class MyPlanner(PlannerDefaults, Component):
     """The search."""
 
     component: ClassVar[str] = "my_planner"

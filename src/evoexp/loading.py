@@ -87,13 +87,9 @@ def load(
     root = Path(outputs) if outputs is not None else outputs_root()
     with searched_first(map(str, config_dir)):
         known = options("experiment")
-        experiments = (
-            compose.expand(
-                [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
-            )
-            if what in known or is_file(what)
-            else []
-        )
+        words = [f"experiment={what}", f"budget={budget}", *overrides]
+        is_experiment = what in known or is_file(what)
+        experiments = compose.expand(words, multirun=multirun) if is_experiment else []
     if experiments:
         labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
         runs = [RunDirectory(root, key) for key in dict.fromkeys(key for _, key in labels)]

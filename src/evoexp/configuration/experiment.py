@@ -83,7 +83,7 @@ class Experiment(NamedTuple):
         return f"{PAPER}, capped" if self.budget == PAPER else self.budget
 
     def origin(self, label: str, command: str) -> dict[str, Any]:
-        """Return what a run's manifest records of a condition's origin; no part of its identity.
+        """Return a condition's origin for the manifest of its run; no part of its identity.
 
         Options are recorded as group → name and origin of the option taken.
         """

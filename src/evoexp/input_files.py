@@ -149,7 +149,7 @@ def read_npy(content: bytes) -> NDArray[Any]:
     except (*_UNREADABLE, RecursionError, MemoryError):
         raise ValueError("its header is damaged") from None
     if kind.kind not in "biuf":
-        raise ValueError(f"it holds no numbers but {str(kind)[:40]!r}")
+        raise ValueError(f"it holds no numbers but {kind.str!r}")
     if not all(type(n) is int and 0 <= n < 2**63 for n in shape):
         raise ValueError("its header tells no shape")
     data = file.read()

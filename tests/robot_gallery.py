@@ -16,7 +16,7 @@ from evoexp.records import FloatArray, ReplicateSummary
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.robots.robot_data import ROBOT_DATA
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 
 TRIES = 60  # random configurations, of which one must be free
 DRAWS = 5  # of a start and a goal

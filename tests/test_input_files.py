@@ -41,7 +41,7 @@ def test_arrays_are_those_of_numpy(array: np.ndarray) -> None:
 @pytest.mark.parametrize("shape", ["(-2, -4)", "(8, -1)", "(8, 1.0)", "(8, True)", "8", "(8, 'a')"])
 def test_a_shape_is_whole_numbers(shape: str) -> None:
     assert read_npy(with_header("(8, 1)")).shape == (8, 1)
-    with pytest.raises(ValueError, match="tells no shape"):
+    with pytest.raises(ValueError, match="tells no shape|header is damaged"):
         read_npy(with_header(shape))
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from evoexp.errors import SettingError
 from evoexp.mesh_files import mesh_content, package_folders
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 
 ROBOT = (
     '<robot name="r"><link name="a"/><joint name="j" type="continuous"><parent link="a"/>'

@@ -35,11 +35,7 @@ class File(Settings):
 
     @property
     def content(self) -> bytes:
-        """The content.
-
-        Raises:
-            MissingFile: If this process never saw it.
-        """
+        """The content; `MissingFile` if this process never saw it."""
         if self.sha256 not in _contents:
             raise MissingFile(
                 f"file of sha256 {self.sha256[:12]}…: its content is not there; give the file again"
@@ -68,32 +64,17 @@ def keep_all(contents: Iterable[bytes]) -> None:
 
 
 def read(path: Any, folders: Sequence[Path], field: str) -> str:
-    """Read a file as a configuration gives it and keep its content; return the SHA-256.
-
-    Args:
-        folders: Where it is looked for if it is not there from the current directory.
-        field: Dotted path of the setting, for errors.
-
-    Raises:
-        SettingError: If it cannot be read.
-    """
+    """Read a file, also one that lies in a folder, and keep its content; return the SHA-256."""
     places = [Path(str(path)), *(folder / str(path) for folder in folders)]
-    try:
-        return keep(read_bounded(next((place for place in places if place.exists()), places[0])))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
+    existing = [place for place in places if place.exists()]
+    return keep(file_content(existing[0] if existing else path, field))
 
 
 def file_content(path: Any, field: str, limit: int = MAX_INPUT) -> bytes:
-    """Read a file, which may be one that evoexp ships.
-
-    Args:
-        field: That names it, for errors.
-        limit: [B] of the largest file that is read.
+    """Read a file of at most `limit` bytes, which may be one that evoexp ships.
 
     Raises:
-        SettingError: If it cannot be read.
+        SettingError: Of the field, if it cannot be read.
     """
     try:
         return read_bounded(located(str(path)), limit)
@@ -103,10 +84,7 @@ def file_content(path: Any, field: str, limit: int = MAX_INPUT) -> bytes:
 
 
 def attached(config: Any) -> dict[str, bytes]:
-    """Return the contents that a plain configuration refers to and this process has.
-
-    The keys are their names in a log.
-    """
+    """Return the contents that plain data refers to and this process has, by names in a log."""
     return {PREFIX + sha256: _contents[sha256] for sha256 in hashes(config) if sha256 in _contents}
 
 

@@ -79,11 +79,7 @@ def _run(words: Sequence[str], is_process: bool) -> int:
 
 
 def _explain(error: BaseException, words: Sequence[str], interruption: Interruption) -> int:
-    """Say in one line why a command ended; return its exit code.
-
-    Raises:
-        BaseException: The error again, if it is a programming error, or leaves on purpose.
-    """
+    """Say in one line why a command ended; return its exit code."""
     if isinstance(error, SystemExit):
         raise error
     kept = f"; {KEPT}" if words[:1] == ["run"] else ""

@@ -40,11 +40,8 @@ def read_files(
         adjust: Changes the data once files are read, before pairs of the robot's bodies are
             derived: by what a file of the scenario says of the robot.
     """
-    return _with_pairs(adjust(_with_contents(config, folders, "")))
-
-
-def _with_pairs(config: Any) -> Any:
-    """Return plain data whose robot has the pairs of bodies derived that need no test."""
+    config = adjust(_with_contents(config, folders, ""))
+    # derive the pairs of the robot's bodies that need no test
     robot = config.get("robot") if isinstance(config, dict) else None
     if not isinstance(robot, dict) or not isinstance(robot.get(TARGET), str):
         return config
@@ -84,9 +81,6 @@ def stored_config(text: bytes) -> dict[str, Any]:
     """Return the plain data of the canonical form that a run or a log stores.
 
     Whether its components are installed here, in the revision that they had, is not looked at.
-
-    Raises:
-        SettingError: If the text is no condition.
     """
     try:
         config = json.loads(text)
@@ -123,11 +117,7 @@ class Condition(NamedTuple):
 
     @classmethod
     def from_config(cls, config: Any) -> "Condition":
-        """Build a condition from plain data.
-
-        Args:
-            config: Mapping with `robot`, `scenario`, `planner` (each with its `_target_`), `seed`
-                and, if need be, `max_collision_queries`.
+        """Build a condition from plain data with `KEYS`, the last of which may be left out.
 
         Raises:
             SettingError: For any value that cannot be.
@@ -214,13 +204,14 @@ class Condition(NamedTuple):
             np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(replicate,)))
         )
 
+    @functools.lru_cache(maxsize=64)  # noqa: B019  # conditions are values
     def prepare(self) -> Prepared:
         """Build the robot, check the scenario against it, and let the planner prepare, once.
 
         Raises:
             SettingError: If the parts contradict each other (a start in collision, say).
         """
-        return _prepare(self)
+        return Prepared(self.planner, self.planner.prepare(self.robot, self.scenario))
 
     def notes(self) -> list[str]:
         """Return the remarks of robot, planner and scenario, one per line."""
@@ -244,37 +235,26 @@ def _nested(planner: Any) -> Iterator[Any]:
 
 def _check_roles(robot: Component, scenario: Component, planner: Component) -> None:
     """Refuse a planner that is none, or that takes no such robot or scenario."""
+    from evoexp.planners.planner import Planner  # and pinocchio, which `evoexp list` needs not
+
+    members = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
     *_, inner = planners = list(_nested(planner))
     for each in planners:
         if not isinstance(each, Component) or not hasattr(each, "prepare"):
             raise SettingError("planner", "a planner", getattr(each, "component", each))
-        if lacking := _lacking(type(each)):
-            name = f"{type(each).__module__}.{type(each).__qualname__}"
-            must = f"a planner; {name} lacks {', '.join(lacking)}"
+        kind = type(each)
+        lacking = [m for m in members if m not in kind.model_fields and not hasattr(kind, m)]
+        if lacking:
+            must = f"a planner; {kind.__module__}.{kind.__qualname__} lacks {', '.join(lacking)}"
             raise SettingError("planner", must, each.component)
     with contextlib.suppress(NameError):  # of a type that is not imported when the planner runs
         hints = get_type_hints(inner.prepare)
         for part, value in (("robot", robot), ("scenario", scenario)):
-            kind = hints.get(part, Any)
-            if isinstance(kind, type | UnionType) and not isinstance(value, kind):
-                kinds = " or ".join(each.__name__ for each in get_args(kind) or (kind,))
+            hint = hints.get(part, Any)
+            if isinstance(hint, type | UnionType) and not isinstance(value, hint):
+                kinds = " or ".join(each.__name__ for each in get_args(hint) or (hint,))
                 must = f"one that {inner.component} takes ({kinds})"
                 raise SettingError(part, must, value.component)
-
-
-@functools.cache
-def _lacking(kind: type[Component]) -> list[str]:
-    """Return the members of the planners' protocol that a class does not have."""
-    from evoexp.planners.planner import Planner  # and pinocchio, which `evoexp list` needs not
-
-    members = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
-    return [name for name in members if name not in kind.model_fields and not hasattr(kind, name)]
-
-
-@functools.lru_cache(maxsize=64)
-def _prepare(condition: Condition) -> Prepared:
-    prepared = condition.planner.prepare(condition.robot, condition.scenario)
-    return Prepared(condition.planner, prepared)
 
 
 def revisions(config: Any) -> Iterator[tuple[str, Any, int]]:

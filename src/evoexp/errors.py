@@ -98,11 +98,7 @@ class RegistrationError(EvoexpError):
 
 
 class MissingDistribution(EvoexpError):
-    """Stored results need packages that are not installed.
-
-    Attributes:
-        packages: Distribution and version of each, `my-planner 0.3`.
-    """
+    """Stored results need packages (`my-planner 0.3`) that are not installed."""
 
     def __init__(self, log: str, packages: Iterable[str]) -> None:
         self.packages = sorted(packages)

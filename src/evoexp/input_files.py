@@ -4,7 +4,6 @@ Whatever such a file claims, reading it takes memory in proportion to its size, 
 limited.
 """
 
-import ast
 import csv
 import errno
 import io
@@ -12,10 +11,12 @@ import math
 import os
 import re
 import stat
+import tokenize
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 MEGABYTE = 1_000_000
@@ -23,25 +24,20 @@ MEGABYTE = 1_000_000
 # every log of the condition. The largest meshes in robots' own packages take some 20 MB.
 MAX_INPUT = 64 * MEGABYTE
 
-_NPY = b"\x93NUMPY"
-_MAX_HEADER = 10_000  # [B] of an array file, as numpy has it
+# errors of numpy for a header that cannot be read
+_UNREADABLE = (ValueError, SyntaxError, TypeError, LookupError, tokenize.TokenError)
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
 """A number in the cell of a table."""
 
 _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+([eE][-+]?[0-9]{1,3})?")
 _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
-_NUMBERS = re.compile(r"[<>|=]?[biuf]\d{1,2}")  # kinds of plain numbers, as numpy names them
 
 
 def read_bounded(path: str | Path, limit: int = MAX_INPUT) -> bytes:
-    """Return the content of a file.
-
-    Args:
-        path: Of a regular file: reading a device or a pipe might never end.
-        limit: [B] of the largest file that is read.
+    """Return the content of a regular file of at most `limit` bytes.
 
     Raises:
-        OSError: If it cannot be read, is no regular file, or is larger.
+        OSError: If it cannot be read, is larger, or a device or pipe, which might never end.
     """
     name = str(path)
     if "\0" in name:
@@ -143,36 +139,23 @@ def read_npy(content: bytes) -> NDArray[Any]:
     Raises:
         ValueError: If the bytes are no such file, in one line.
     """
-    if content[:6] != _NPY or len(content) < 12:
+    if not content.startswith(npy_format.MAGIC_PREFIX):
         raise ValueError("it does not begin as one")
-    width = 2 if content[6] == 1 else 4
-    start = 8 + width
-    length = int.from_bytes(content[8:start], "little")
-    if content[6] not in (1, 2, 3) or length > _MAX_HEADER or start + length > len(content):
-        raise ValueError("its header is damaged")
-    kind, columns_first, shape = _header(content[start : start + length])
-    data = memoryview(content)[start + length :]
+    file = io.BytesIO(content)
+    try:
+        is_first = npy_format.read_magic(file) == (1, 0)
+        reads = npy_format.read_array_header_1_0 if is_first else npy_format.read_array_header_2_0
+        shape, columns_first, kind = reads(file)
+    except (*_UNREADABLE, RecursionError, MemoryError):
+        raise ValueError("its header is damaged") from None
+    if kind.kind not in "biuf":
+        raise ValueError(f"it holds no numbers but {kind.str!r}")
+    if not all(type(n) is int and 0 <= n < 2**63 for n in shape):
+        raise ValueError("its header tells no shape")
+    data = file.read()
     if math.prod(shape) * kind.itemsize != len(data):
         numbers = f"{' × '.join(map(str, shape))[:60]} numbers of {kind.itemsize} bytes"
         told = numbers if shape else "one number"
         raise ValueError(f"its header tells {told}, {len(data)} bytes follow")
     order: Any = "F" if columns_first else "C"
     return np.frombuffer(data, kind).reshape(shape, order=order).copy()
-
-
-def _header(text: bytes) -> tuple[np.dtype[Any], bool, tuple[int, ...]]:
-    """Return kind of numbers, whether columns come first, and shape."""
-    try:
-        header = ast.literal_eval(text.decode("latin1").strip())
-        kind, columns_first, shape = header["descr"], header["fortran_order"], header["shape"]
-    except (ValueError, SyntaxError, TypeError, LookupError, RecursionError, MemoryError):
-        raise ValueError("its header is damaged") from None
-    if not isinstance(kind, str) or not _NUMBERS.fullmatch(kind):
-        raise ValueError(f"it holds no numbers but {str(kind)[:40]!r}")
-    is_shape = isinstance(shape, tuple) and len(shape) <= 16
-    if not is_shape or not all(type(n) is int and 0 <= n < 2**63 for n in shape):
-        raise ValueError("its header tells no shape")
-    try:
-        return np.dtype(kind), bool(columns_first), shape
-    except TypeError:
-        raise ValueError(f"it holds numbers of no known kind, {kind!r}") from None

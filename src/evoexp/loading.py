@@ -35,8 +35,11 @@ class Frames(NamedTuple):
             f"  {label}  {key[:12]}  {count} replicates"
             for label, key, count in keys.itertuples(index=False)
         ]
-        sizes = f"generations: {_size(self.generations)}, summaries: {_size(self.summaries)}"
-        return "\n".join([sizes, *rows])
+        sizes = [
+            f"{name}: {len(frame)} rows × {len(frame.columns)} columns"
+            for name, frame in self._asdict().items()
+        ]
+        return "\n".join([", ".join(sizes), *rows])
 
     def _repr_html_(self) -> str:
         """Return the conditions with medians, for a notebook."""
@@ -84,35 +87,29 @@ def load(
     root = Path(outputs) if outputs is not None else outputs_root()
     with searched_first(map(str, config_dir)):
         known = options("experiment")
-        experiments = (
-            compose.expand(
-                [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
-            )
-            if what in known or is_file(what)
-            else []
-        )
+        words = [f"experiment={what}", f"budget={budget}", *overrides]
+        is_experiment = what in known or is_file(what)
+        experiments = compose.expand(words, multirun=multirun) if is_experiment else []
     if experiments:
         labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
-        runs = [
-            RunDirectory(root, condition_id)
-            for condition_id in dict.fromkeys(key for _, key in labels)
-        ]
+        runs = [RunDirectory(root, key) for key in dict.fromkeys(key for _, key in labels)]
         runs = [run for run in runs if run.completed() or run.failed()]
         if not runs:
             raise NothingStored(
                 f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}"
             )
     else:
-        run = _run(root, what, known)
+        try:
+            run = resolve(root, what)
+        except UnknownHash:
+            if re.fullmatch("[0-9a-fA-F]{1,64}", what):
+                raise
+            raise UnknownOption("experiment or hash", what, known) from None
         label = origin_of(run)["label"] or run.hash12
         runs, labels = [run], [(label, run.condition_id)]
     summaries = read_summaries(runs, thorough=True)  # first: what is damaged is left out
     summaries = summaries.assign(**_settings(runs, summaries))
     return Frames(_labelled(read_generations(runs), labels), _labelled(summaries, labels))
-
-
-def _size(frame: pd.DataFrame) -> str:
-    return f"{len(frame)} rows × {len(frame.columns)} columns"
 
 
 def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str, pd.Series]:
@@ -133,20 +130,8 @@ def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str
     }
 
 
-def _run(outputs: Path, what: str, experiments: Sequence[str]) -> RunDirectory:
-    try:
-        return resolve(outputs, what)
-    except UnknownHash:
-        if re.fullmatch("[0-9a-fA-F]{1,64}", what):
-            raise
-        raise UnknownOption("experiment or hash", what, experiments) from None
-
-
 def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:
     """Add the label in front, with the rows in the order of the labels."""
-    parts = [
-        frame[frame["condition"] == condition_id].assign(label=label)
-        for label, condition_id in labels
-    ]
+    parts = [frame[frame["condition"] == key].assign(label=label) for label, key in labels]
     whole = pd.concat(parts, ignore_index=True)
     return whole[["label", *frame.columns]]

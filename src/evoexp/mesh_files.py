@@ -1,5 +1,6 @@
 """Meshes that a URDF or a planning scene names: beside it, or in a package of meshes."""
 
+import contextlib
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -19,12 +20,7 @@ MOST_PLACES = 4000  # characters of a message
 
 
 def package_folders(setting: Any, field: str) -> dict[str, Path]:
-    """Check the setting that tells where packages lie.
-
-    Args:
-        setting: Name of each package → its folder; None: none is told.
-        field: That names it, for errors.
-    """
+    """Check the setting, name of each package → its folder, that tells where packages lie."""
     if setting is None:
         return {}
     if not isinstance(setting, Mapping):
@@ -44,12 +40,6 @@ def mesh_content(name: str, file: Path, packages: Mapping[str, Path], field: str
     `package://NAME/REST` lies in the folder that `packages` tells for NAME; else in a directory
     above the file, with or without NAME; else in a package below `ROS_PACKAGE_PATH`. Any other
     name is a path, from the directory of the file.
-
-    Args:
-        name: As the file gives it.
-        file: The URDF or planning scene.
-        packages: Folders by the names of packages, see `package_folders`.
-        field: That names the file, for errors.
 
     Raises:
         SettingError: If it is not there, lists the places that were tried; or if it cannot be read.
@@ -102,17 +92,12 @@ def _places(name: str, file: Path, packages: Mapping[str, Path], field: str) -> 
 def _workspace_folders(folder: Path, package: str) -> Iterator[Path]:
     """Yield the folders, in and below one, whose manifest gives them the name of a package."""
     for place, folders, files in os.walk(folder):
-        here = Path(place)
-        if MANIFEST in files and _manifest_name(here / MANIFEST) == package:
+        here, name = Path(place), None
+        with contextlib.suppress(OSError):
+            if MANIFEST in files:
+                name = re.search(rb"<name>\s*([^<\s]+)\s*</name>", read_bounded(here / MANIFEST))
+        if name is not None and name[1].decode(errors="replace") == package:
             yield here
         if MANIFEST in files or len(here.relative_to(folder).parts) >= DEEPEST:
             folders.clear()  # packages do not contain packages
         folders.sort()
-
-
-def _manifest_name(manifest: Path) -> str:
-    try:
-        found = re.search(rb"<name>\s*([^<\s]+)\s*</name>", read_bounded(manifest))
-    except OSError:
-        return ""
-    return "" if found is None else found[1].decode(errors="replace")

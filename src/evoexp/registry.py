@@ -76,11 +76,7 @@ class Registration(NamedTuple):
 
 
 def registrations(group: str) -> tuple[Registration, ...]:
-    """Return all registrations of an entry-point group, in alphabetical order.
-
-    Raises:
-        RegistrationError: If evoexp itself registers nothing, because it is not installed.
-    """
+    """Return all registrations of an entry-point group, in alphabetical order."""
     return _registrations()[group]
 
 
@@ -171,21 +167,13 @@ def guests(config_json: bytes) -> dict[str, str]:
 
 
 def missing(components: Mapping[str, str]) -> list[str]:
-    """Return the packages of components that are not registered here, as a log recorded them.
-
-    Args:
-        components: As `guests` returned them when the log was written.
-    """
+    """Return the packages of components (as `guests` gave them) that are not registered here."""
     known = names(COMPONENTS)
     return sorted({package for name, package in components.items() if name not in known})
 
 
 def lacking(config_json: bytes) -> str:
-    """Return how to install the missing packages of a condition; nothing if none is missing.
-
-    Args:
-        config_json: The condition's canonical form.
-    """
+    """Return how to install what a condition (canonical form) needs; nothing if all is there."""
     for component, (package, extra) in EXTRAS.items():
         is_used = f'"_target_":"{component}"'.encode() in config_json
         if is_used and importlib.util.find_spec(package) is None:

@@ -64,26 +64,9 @@ def shipped() -> tuple[Shipped, ...]:
     return tuple(Shipped(**row) for row in orjson.loads(content))
 
 
-def rows_by_condition() -> dict[str, list[Shipped]]:
-    """Return hash → the rows of the table that have it."""
-    return _indexed(shipped())[0]
-
-
-def labels_by_experiment() -> dict[str, set[str]]:
-    """Return the labels of every shipped experiment, at any budget."""
-    return _indexed(shipped())[1]
-
-
-@functools.lru_cache(maxsize=1)
-def _indexed(
-    table: tuple[Shipped, ...],
-) -> tuple[dict[str, list[Shipped]], dict[str, set[str]]]:
-    rows: dict[str, list[Shipped]] = {}
-    labels: dict[str, set[str]] = {}
-    for row in table:
-        rows.setdefault(row.condition_id, []).append(row)
-        labels.setdefault(row.experiment, set()).add(row.label)
-    return rows, labels
+def rows_of(condition_id: str) -> list[Shipped]:
+    """Return the rows of the table that a condition has."""
+    return [row for row in shipped() if row.condition_id == condition_id]
 
 
 def find(prefix: str) -> list[Shipped]:

@@ -7,7 +7,7 @@ by its path; nothing is coerced but whole numbers into float fields and lists in
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Annotated, Any, ClassVar, get_args
+from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -53,6 +53,9 @@ class Settings(BaseModel):
         }
 
 
+AnySettings = TypeVar("AnySettings", bound=Settings)
+
+
 class Component(Settings):
     """Settings with a registered name, which `_target_` in a YAML option refers to."""
 
@@ -85,8 +88,7 @@ def build(
     Args:
         data: A mapping with `_target_`, or any nesting of mappings, lists and scalars around such
             mappings.
-        lookup: Gives the class of a registered name; its second argument is the field, for its
-            error.
+        lookup: Gives the class of a registered name, whose field its error names.
         field: Dotted path of `data`, for errors.
         largest: No number may be larger than that, of either sign.
 
@@ -102,7 +104,8 @@ def build(
         }
         if TARGET not in data:
             return children
-        return _construct(lookup(str(data[TARGET]), field), children, field)
+        children.pop("revision", None)  # as stored; whoever reads a stored one compares it
+        return construct(lookup(str(data[TARGET]), field), children, field)
     if isinstance(data, list | tuple):
         return tuple(build(value, lookup, f"{field}[{k}]", largest) for k, value in enumerate(data))
     if isinstance(data, int | float):
@@ -123,35 +126,27 @@ def _number(value: float, field: str, largest: float) -> float:
         return value + 0.0  # -0.0 and 0.0 are one setting
     if abs(value) > min(largest, 2**62):
         most = f"{min(largest, 1e18):g}"
-        raise SettingError(field, f"between -{most} and {most}", _digits(value))
+        bits = value.bit_length()
+        was = value if bits < 1000 else f"one of some {bits * 3 // 10}"  # of its digits
+        raise SettingError(field, f"between -{most} and {most}", was)
     return value
 
 
-def _digits(value: int) -> object:
-    return value if value.bit_length() < 1000 else f"one of some {value.bit_length() * 3 // 10}"
-
-
-def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> Component:
-    settings.pop("revision", None)  # as stored; whoever reads a stored configuration compares it
+def construct(kind: type[AnySettings], values: Mapping[str, Any], field: str) -> AnySettings:
+    """Return settings of a kind; an error names their field."""
     try:
-        return kind(**settings)
+        return kind(**values)
     except ValidationError as error:
-        raise settings_error(kind, error, settings, field) from None
+        raise _settings_error(kind, error, values, field) from None
     except SettingError as error:
-        raise SettingError(_join(field, error.field), error.must, error.was, error.hint) from None
+        path = _join(field, error.field)
+        raise SettingError(path, error.must, error.was, error.hint) from None
 
 
-def settings_error(
+def _settings_error(
     kind: type[Settings], error: ValidationError, settings: Any, field: str
 ) -> SettingError | UnknownSetting:
-    """Return the first thing that is wrong with some settings, as an error of one line.
-
-    Args:
-        kind: The class that refused the settings.
-        error: Of its validation.
-        settings: As they were given.
-        field: Dotted path of the settings, as it was typed.
-    """
+    """Return the first thing that is wrong with settings, which a class refused, as one line."""
     first = error.errors(include_url=False)[0]
     path, here, kinds = field, settings, {kind}
     for part in first["loc"]:
@@ -180,9 +175,9 @@ def settings_error(
 
 def _members(value: Any) -> Mapping[str, Any]:
     """Return the settings in a value, none if it has none."""
-    return (
-        value if isinstance(value, Mapping) else vars(value) if isinstance(value, Settings) else {}
-    )
+    if isinstance(value, Settings):
+        return vars(value)
+    return value if isinstance(value, Mapping) else {}
 
 
 def _inner(kinds: set[type[Settings]], part: int | str) -> set[type[Settings]]:
@@ -193,7 +188,9 @@ def _inner(kinds: set[type[Settings]], part: int | str) -> set[type[Settings]]:
         if part in each.model_fields
         for own in _settings_in(each.model_fields[str(part)].annotation)
     }
-    tagged = {each for each in kinds if part in _tags(each)}
+    # words by which a union may tell a class from others
+    words = {each: [field.annotation for field in each.model_fields.values()] for each in kinds}
+    tagged = {each for each in kinds if any(part in get_args(word) for word in words[each])}
     is_leaf = any(part in each.model_fields for each in kinds)
     return inner if is_leaf else tagged or kinds
 
@@ -204,11 +201,6 @@ def _settings_in(annotation: Any) -> Iterator[type[Settings]]:
         yield annotation
     for inner in get_args(annotation):
         yield from _settings_in(inner)
-
-
-def _tags(kind: type[Settings]) -> set[Any]:
-    """Return the words by which a union may tell a class from others."""
-    return {word for field in kind.model_fields.values() for word in get_args(field.annotation)}
 
 
 _MUST = {
@@ -243,14 +235,10 @@ def check_range(field: str, limits: tuple[float, float]) -> None:
 def _must(error: Any) -> tuple[str, str]:
     context = error.get("ctx", {})
     template = _MUST.get(error["type"])
-    must = template.format(**context) if template else str(error["msg"])
-    hint = (
-        nearest(
-            error["input"], context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
-        )
-        if (error["type"] == "literal_error" and isinstance(error["input"], str))
-        else ""
-    )
+    must, hint = template.format(**context) if template else str(error["msg"]), ""
+    if error["type"] == "literal_error" and isinstance(error["input"], str):
+        expected = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
+        hint = nearest(error["input"], expected)
     return must, hint
 
 

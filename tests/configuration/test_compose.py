@@ -16,9 +16,10 @@ from omegaconf import OmegaConf
 
 from evoexp import shipped
 from evoexp.configuration import compose
+from evoexp.configuration.assignment import assigned
 from evoexp.configuration.compose import expand
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.overrides import Override, collect
+from evoexp.configuration.overrides import collect
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from matrix import examples
@@ -95,34 +96,8 @@ def test_settings_are_as_hydra_itself_sets_them(words: tuple[str, ...]) -> None:
     chosen = collect(map(compose.parse, words))
     experiment = find("experiment", chosen.pop("experiment").typed)
     with TemporaryDirectory() as root:
-        composed = compose.Composer(Path(root), experiment)(chosen)
-    assert composed.config == by_hydra
-
-
-def test_compositions_are_joined_where_each_changes_other_groups(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    experiment = find("experiment", "chen_placement")
-    known, asked = compose.Composer(tmp_path, experiment), list[list[str]]()
-    by_hydra = known.by_hydra
-    monkeypatch.setattr(known, "by_hydra", lambda words: asked.append(words) or by_hydra(words))
-
-    def choices(*words: str) -> dict[str, Override]:
-        return collect(map(compose.parse, words))
-
-    link = ("objective=chen_minimax", "scenario=chen_docking_link")
-    single = (
-        "objective=chen_manipulability",
-        "control=random_search",
-        "reference=placement_optimum",
-    )
-    for words in ((), link, *((word,) for word in single)):
-        known.chosen(choices(*words))
-    for words in ((*link, "control=random_search"), single[:2]):
-        with TemporaryDirectory() as root:
-            fresh = compose.Composer(Path(root), experiment)
-            assert known.chosen(choices(*words)) == fresh.chosen(choices(*words))
-    assert len(asked) == 5
+        options = compose.Composer(Path(root), experiment).chosen(chosen)
+    assert assigned(options.config, chosen) == by_hydra
 
 
 def test_an_option_may_choose_another_by_the_name_of_a_third(

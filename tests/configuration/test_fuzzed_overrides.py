@@ -3,7 +3,6 @@
 Overrides of every setting of several experiments are mutated at random, with a fixed seed.
 """
 
-import copy
 import random
 import string
 from collections.abc import Iterator
@@ -14,11 +13,11 @@ from typing import Any
 import pytest
 
 from evoexp.configuration import compose
-from evoexp.configuration.assignment import assign_all
+from evoexp.configuration.assignment import assigned
 from evoexp.configuration.building import condition_of
 from evoexp.configuration.experiment import Budget
 from evoexp.configuration.overrides import collect
-from evoexp.configuration.search_path import find, groups
+from evoexp.configuration.search_path import find
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from matrix import counts, first
 
@@ -100,7 +99,7 @@ def test_a_mutated_override_is_refused_in_one_line_or_taken(experiment: str) -> 
     rng = random.Random(experiment)
     num_cases = counts(400, 4000)
     with TemporaryDirectory() as root:
-        base = compose.Composer(Path(root), find("experiment", experiment))({}).config
+        base = compose.Composer(Path(root), find("experiment", experiment)).chosen({}).config
     paths = [path for path in places(base, "") if not path.startswith(("report", "conditions"))]
     taken = 0
     for _ in range(num_cases):
@@ -110,9 +109,7 @@ def test_a_mutated_override_is_refused_in_one_line_or_taken(experiment: str) -> 
             text += rng.choice(rng.choice((VALUES, PLAUSIBLE)))
         try:
             given = collect([compose.parse(text)])
-            config = copy.deepcopy(base)
-            chosen = {key for key in given if key in groups()}
-            assign_all(config, {key: each for key, each in given.items() if key not in chosen})
+            config = assigned(base, given)
             if not any(each.is_swept for each in given.values()):
                 condition_of(config, BUDGET)
                 taken += 1

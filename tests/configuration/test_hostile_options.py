@@ -7,7 +7,7 @@ import pytest
 
 from confinement import confined, no_longer
 from evoexp.configuration import compose
-from evoexp.configuration.option_files import check_file
+from evoexp.configuration.refusals import check_file
 from evoexp.configuration.search_path import searched_first
 from evoexp.errors import EvoexpError
 

@@ -83,7 +83,7 @@ def test_an_option_may_replace_a_shipped_one_and_says_so(tmp_path: Path) -> None
         assert taken["robot"].source == "conf/robot/two_planar_2r.yaml"
         assert taken["experiment"].name == "rana_obstacles"
         assert "control" not in taken
-        names = experiment.option_names("rana_obstacles")
+        names = experiment.origin("rana_obstacles", "")["options"]
         assert names["ga"] == {"name": "rana_planar", "origin": str(folder)}
     assert population_size("experiment=rana_obstacles") == 50
 
@@ -91,7 +91,8 @@ def test_an_option_may_replace_a_shipped_one_and_says_so(tmp_path: Path) -> None
 def test_options_of_every_label_are_recorded() -> None:
     (experiment,) = compose.expand(["experiment=rana_planar"])
     assert set(experiment.options) == {"via-point GA", "random search", "multi-start"}
-    controls = [experiment.option_names(label).get("control") for label, _ in experiment.conditions]
+    origins = [experiment.origin(label, "") for label, _ in experiment.conditions]
+    controls = [origin["options"].get("control") for origin in origins]
     assert controls == [
         None,
         {"name": "random_search", "origin": "evoexp"},

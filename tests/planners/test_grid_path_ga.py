@@ -16,7 +16,7 @@ from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 from matrix import num_cases
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 

@@ -14,7 +14,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners import arm_tasks as tasks
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 
 ASSETS = Path(evoexp.__file__).parent / "assets" / "motionbenchmaker"
 

@@ -12,7 +12,7 @@ from evoexp.condition import Condition
 from evoexp.configuration.building import build_condition
 from evoexp.errors import EvoexpError
 from evoexp.mesh_files import MESHES
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 from matrix import counts, matrices_are_asked_for
 
 DATA = Path(__file__).parent / "data" / "ur5_like"

@@ -23,7 +23,7 @@ from evoexp.robots.robot_data import ROBOT_DATA
 from evoexp.robots.urdf import Urdf
 from evoexp.robots.urdf_model import JointRules, urdf_model
 from evoexp.robots.urdf_reading import urdf_file
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 
 DATA = Path(__file__).parent / "data"
 SHIPPED = [located(f"evoexp:motionbenchmaker/{name}/{name}.urdf") for name in ("panda", "ur5")]

@@ -23,7 +23,7 @@ from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicChain
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.robots.urdf import Urdf
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 from robots.joint_frames import forward_kinematics
 
 DATA = Path(__file__).parent / "data" / "two_arms"

@@ -20,7 +20,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.planners.moveit_tasks import arm_motion
 from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 from moveit_samples import COVERED, body, request, scene, write_problem, write_robot
 from moveit_semantics import MoveitScene, PlacedShape
 

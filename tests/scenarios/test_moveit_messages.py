@@ -17,7 +17,7 @@ from evoexp.numeric.convex_hull import hull_of
 from evoexp.planners.moveit_tasks import arm_motion, links_of_bodies, with_allowed_pairs
 from evoexp.scenarios.moveit_messages import FIELDS, REQUEST, SCENE
 from evoexp.scenarios.moveit_scene import read_allowed, read_state, read_world
-from evoexp.testing.small_conditions import conditions
+from evoexp.testing import conditions
 from moveit_samples import COVERED, body, request, scene, write_problem, write_robot
 
 TEXT = yaml.safe_dump(scene(body("sphere", [0.1], [3, 0, 0])))

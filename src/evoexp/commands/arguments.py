@@ -63,11 +63,14 @@ def add_config_dir_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_json_argument(parser: argparse.ArgumentParser, content: str) -> None:
+    """Add `--json`, which prints the content as JSON instead of tables."""
+    parser.add_argument("--json", action="store_true", help=f"print JSON: {content}")
+
+
 def _labels(text: str) -> tuple[str, ...]:
     """Split labels at their commas, but for those inside brackets: `q=[0,1]` is one label."""
-    labels = tuple(
-        label.strip() for label in re.split(r",(?![^\[\](){}]*[\])}])", text) if label.strip()
-    )
-    if not labels:
-        raise argparse.ArgumentTypeError(f"must name a condition, was '{text}'")
-    return labels
+    labels = map(str.strip, re.split(r",(?![^\[\](){}]*[\])}])", text))
+    if named := tuple(filter(None, labels)):
+        return named
+    raise argparse.ArgumentTypeError(f"must name a condition, was '{text}'")

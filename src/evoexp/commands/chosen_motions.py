@@ -4,14 +4,14 @@ import argparse
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
-from evoexp.commands.stored_runs import stored_run
+from evoexp.commands.stored_runs import finished_replicate, stored_run
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import (
@@ -44,8 +44,6 @@ class FittingMotion(NamedTuple):
 
     label: str  # of the condition
     condition: Condition
-    planner: Any
-    problem: Any
     solution: FloatArray  # flat; empty: the file holds a joint trajectory
     motion: Motion | None  # None: the solution has none
     remarks: tuple[str, ...] = ()  # on how a trajectory was read
@@ -104,41 +102,21 @@ def named_log(word: str, choice: str | int | None) -> tuple[Path, RunDirectory |
 
 
 def chosen_log(run: RunDirectory, choice: str | int) -> Path:
-    """Return the log of one replicate of a run.
-
-    Args:
-        choice: Index of the replicate, or "best" or "worst" (by cost), or "refuted": the first
-            replicate that the certifier refutes.
-
-    Raises:
-        NothingStored: If there is no such replicate.
-    """
+    """Return the log of one replicate of a run, chosen by its index or by one of `CHOICES`."""
     if isinstance(choice, int):
-        finished = sorted(run.completed())
-        if choice not in finished:
-            names = [*map(str, finished[:8]), *(["…"] if finished[8:] else [])]
-            there = ", ".join(names) or "none"
-            raise NothingStored(
-                f"run {run.hash12}: no finished replicate {choice} (finished: {there})"
-            )
-        return run.log_path(choice)
+        return run.log_path(finished_replicate(run, choice))
     table = summary_table(run, thorough=True).to_pylist()
     done = [row for row in table if row["status"] == "done"]
     if choice == "refuted":
         rows = [row for row in done if row["certified"] is False]
     else:
-        sign = 1.0 if choice == "best" else -1.0
-        rows = sorted(done, key=lambda row: _rank(row["best_cost"], sign))
+        sign = 1.0 if choice == "best" else -1.0  # those of no finite cost come last
+        finite = [row for row in done if math.isfinite(row["best_cost"])]
+        rows = sorted(finite, key=lambda row: sign * row["best_cost"]) or done
     if not rows:
         what = "refuted replicate" if choice == "refuted" else "finished replicate"
         raise NothingStored(f"run {run.hash12}: no {what} among {len(done)}")
     return run.log_path(rows[0]["replicate"])
-
-
-def _rank(cost: float | None, sign: float) -> tuple[bool, float]:
-    """Return the key by which replicates are sorted: those of no finite cost come last."""
-    is_finite = cost is not None and math.isfinite(cost)
-    return not is_finite, sign * cost if cost is not None and is_finite else 0.0
 
 
 def recordings(arguments: argparse.Namespace) -> list[Recording]:
@@ -228,18 +206,10 @@ def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
 def fitting_motions(
     words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
 ) -> tuple[Path, list[FittingMotion]]:
-    """Read the motion file among some words, and fit it into the conditions that the others choose.
-
-    Args:
-        words: One motion file, and overrides as `run` takes them.
-        multirun: Whether values with commas are swept over.
-        only: Labels of the conditions to keep.
+    """Fit the motion file among words into the conditions that the others choose.
 
     Returns:
         The file, and the conditions whose shape the motion has.
-
-    Raises:
-        MotionFileError: If there is not one file, if it cannot be read, or if it fits no condition.
     """
     files = [word for word in words if is_motion(word) or Path(word).exists()]
     overrides = [word for word in words if word not in files]
@@ -255,9 +225,12 @@ def fitting_motions(
             planner, problem = condition.prepare()
             if is_trajectory:
                 try:
-                    fitting.append(_trajectory(label, condition, values))
+                    motion, remarks = _trajectory(label, condition, values)
                 except ValueError as error:
                     misfits[str(error)] = None
+                else:
+                    own = FittingMotion(label, condition, np.empty(0), motion, remarks)
+                    fitting.append(own)
                 continue
             shape = planner.shape(problem)
             solution = flatten(values, shape)
@@ -277,12 +250,7 @@ def fitting_motions(
 
 
 def stored_motion(log: Path) -> FittingMotion:
-    """Return the best solution of a log, in the condition that is attached to it.
-
-    Raises:
-        CorruptLog: If the log cannot be trusted.
-        RevisionMismatch: If it was made by another revision of a component.
-    """
+    """Return the best solution of a log, in the condition that is attached to it."""
     contents = read_log(log)
     label = f"{contents.condition_id[:12]} #{contents.replicate}"
     return _solved(label, _condition_of(contents), contents.solutions[-1].values)
@@ -291,11 +259,7 @@ def stored_motion(log: Path) -> FittingMotion:
 def initial_motion(
     words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
 ) -> FittingMotion:
-    """Return the best of an initial population, in the first of the conditions that words choose.
-
-    Raises:
-        MotionFileError: If their solutions have different shapes.
-    """
+    """Return the best of an initial population, in the first of conditions of one shape."""
     experiments = compose.expand(words, multirun=multirun, only=only)
     conditions = [each for experiment in experiments for each in experiment.conditions]
     prepared = [each.condition.prepare() for each in conditions]
@@ -312,14 +276,13 @@ def initial_motion(
 
 def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMotion:
     planner, problem = condition.prepare()
-    motion = planner.motion(problem, solution)
-    return FittingMotion(label, condition, planner, problem, solution, motion)
+    return FittingMotion(label, condition, solution, planner.motion(problem, solution))
 
 
 def _trajectory(
     label: str, condition: Condition, given: Columns | JointTrajectory
-) -> FittingMotion:
-    """Return a trajectory as a motion of a condition's robot."""
+) -> tuple[Motion, tuple[str, ...]]:
+    """Return a trajectory as a motion of a condition's robot, and remarks."""
     planner, problem = condition.prepare()
     if not isinstance(condition.robot, Robot):
         raise ValueError(f"{label}: its robot has no joints for a trajectory")
@@ -330,5 +293,4 @@ def _trajectory(
             f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
             "tell; give the solution (evaluate HASH --write FILE.json)"
         )
-    remarks = (JUDGED, *remarks)
-    return FittingMotion(label, condition, planner, problem, np.empty(0), motion, remarks)
+    return motion, (JUDGED, *remarks)

@@ -6,29 +6,18 @@ from typing import Any
 
 from rich.table import Column, Table
 
+from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.report_requests import request_of
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages import page_of
-from evoexp.report.pages.page_parts import Claim
 from evoexp.report.statistics.claim_rules import Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 
-KEYS = (
-    "paper",
-    "name",
-    "claim",
-    "source",
-    "rule",
-    "evidence",
-    "n",
-    "verdict",
-    "experiment",
-    "command",
-)
-NOT_RUN = "not run"
+_OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "n", "verdict")
+KEYS = ("paper", *_OF_CLAIM, "experiment", "command")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,14 +28,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         help=f"papers ({', '.join(names(CLAIMS))}); all of them if none is named",
     )
-    parser.add_argument(
-        "--json", action="store_true", help=f"print JSON: a list of claims ({', '.join(KEYS)})"
-    )
+    add_json_argument(parser, f"a list of claims ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Print the claims that stored runs judge, then those that need a run."""
-    papers = {paper: _rules(paper) for paper in arguments.papers or names(CLAIMS)}
+    papers: dict[str, Rules] = {}
+    for paper in arguments.papers or names(CLAIMS):
+        if (registration := registered(CLAIMS, paper)) is None:
+            raise UnknownOption("paper", paper, names(CLAIMS))
+        papers[paper] = registered_rules(registration)
     found = [row for paper, rules in papers.items() for row in claims_of(paper, rules)]
     if arguments.json:
         print_json(found)
@@ -68,36 +59,17 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
     experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
     for experiment in experiments:
         try:
-            rows = [
-                (c.name, c.text, c.source, c.rule, c.evidence, c.n, c.verdict)
-                for c in judged(experiment)
-            ]
+            (expanded,) = compose.expand([f"experiment={experiment}"])
+            request, settings, num_replicates = request_of(expanded, [])
+            claims = page_of(request.results(outputs_root(), num_replicates), settings).claims
+            rows = [(c.name, c.text, c.source, c.rule, c.evidence, c.n, c.verdict) for c in claims]
             command = f"evoexp report {experiment}"
         except NothingStored:
             waiting = [r.unjudged() for r in rules.values() if experiment in r.experiments]
-            rows = [(r.name, r.claim, r.source, r.text, "–", "0", NOT_RUN) for r in waiting]
+            rows = [(r.name, r.claim, r.source, r.text, "–", "0", "not run") for r in waiting]
             command = f"evoexp run experiment={experiment}"
         for row in rows:
             yield dict(zip(KEYS, (paper, *row, experiment, command), strict=True))
-
-
-def judged(name: str) -> tuple[Claim, ...]:
-    """Return the claims that an experiment's stored runs judge.
-
-    Raises:
-        NothingStored: If nothing of it has been run.
-    """
-    (experiment,) = compose.expand([f"experiment={name}"])
-    request, settings, num_replicates = request_of(experiment, [])
-    return page_of(request.results(outputs_root(), num_replicates), settings).claims
-
-
-def _rules(paper: str) -> Rules:
-    """Return the claims that are registered under the name of a paper."""
-    found = registered(CLAIMS, paper)
-    if found is None:
-        raise UnknownOption("paper", paper, names(CLAIMS))
-    return registered_rules(found)
 
 
 def _block(row: dict[str, Any]) -> Table:

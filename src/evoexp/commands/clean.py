@@ -1,12 +1,14 @@
 """`evoexp clean`: files that no command needs, named and, if told so, deleted."""
 
 import argparse
+import contextlib
 import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.condition import revisions
 from evoexp.errors import Busy, StoreError, UnknownOption
@@ -46,9 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"{told} (by default {', '.join(USUAL)}; all: every kind)",
     )
     parser.add_argument("--yes", action="store_true", help="delete; without it nothing is changed")
-    parser.add_argument(
-        "--json", action="store_true", help=f"print JSON: a list of files ({', '.join(KEYS)})"
-    )
+    add_json_argument(parser, f"a list of files ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -78,9 +78,11 @@ def waste(outputs: Path) -> Iterator[Waste]:
             if all(is_temporary(each.name) for each in others):
                 yield Waste("empty", path, _size(path))
             continue
-        if _is_old(path):
-            yield Waste("old_revision", path, _size(path))
-            continue
+        with contextlib.suppress(StoreError, ValueError, TypeError):  # of what is damaged
+            config = json.loads(read(path / CONFIG))
+            if any(stored != installed for _, stored, installed in revisions(config)):
+                yield Waste("old_revision", path, _size(path))
+                continue
         for folder in (path, path / REPLICATES):
             for each in sorted(folder.iterdir()) if folder.is_dir() else ():
                 if kind := _kind(each):
@@ -93,15 +95,6 @@ def _kind(path: Path) -> str:
     if is_set_aside(path.name):
         return "damaged"
     return "failed" if path.name.endswith(".failed.json") else ""
-
-
-def _is_old(path: Path) -> bool:
-    """Return whether a run's components have other revisions here."""
-    try:
-        config = json.loads(read(path / CONFIG))
-        return any(stored != installed for _, stored, installed in revisions(config))
-    except (StoreError, ValueError, TypeError):
-        return False
 
 
 def _size(path: Path) -> int:

@@ -105,11 +105,7 @@ def command_parser(name: str) -> CommandParser:
 def whole_parser(
     *, with_arguments: bool = False
 ) -> tuple[argparse.ArgumentParser, list[argparse.Action]]:
-    """Return the parser of all commands, and the arguments of all of them.
-
-    Args:
-        with_arguments: Whether the arguments of every command are added; all are imported then.
-    """
+    """Return the parser of all commands, if asked for with the arguments of all, and these."""
     parser = CommandParser(
         prog="evoexp", description="A laboratory for evolutionary robot motion planning."
     )

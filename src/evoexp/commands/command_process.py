@@ -64,11 +64,7 @@ def remove_abandoned(place: Path) -> None:
 
 
 def refuse_too_little_memory() -> None:
-    """Refuse limits with which libraries or the compiler end the process, or never come back.
-
-    Raises:
-        MemoryError: If a limit is below `LEAST_MB`.
-    """
+    """Refuse limits with which libraries or the compiler end the process, or never come back."""
     allowed = allowed_addresses()
     if allowed is not None and allowed < LEAST_MB * MEGABYTE:
         raise MemoryError(f"a command needs {LEAST_MB:,} MB of addresses at least")
@@ -76,7 +72,18 @@ def refuse_too_little_memory() -> None:
 
 def memory_shortage(error: BaseException) -> str:
     """Describe the lack of memory that an error means; empty if it means something else."""
-    texts = [text for each in _chain(error) if (text := _shortage(each))]
+    chain: list[BaseException] = []
+    cause: BaseException | None = error
+    while cause is not None and cause not in chain:
+        chain.append(cause)
+        cause = cause.__cause__ or cause.__context__
+    texts = [
+        _first_line(each) or "the system gives no more"
+        for each in chain
+        if isinstance(each, MemoryError)
+        or (isinstance(each, OSError) and each.errno == errno.ENOMEM)
+        or any(text in str(each).lower() for text in _TEXTS)
+    ]
     allowed = allowed_addresses()
     if not texts and isinstance(error, ImportError | OSError | RuntimeError | SystemError):
         is_little = allowed is not None and allowed - used_addresses() < LARGEST_MB * MEGABYTE
@@ -85,24 +92,6 @@ def memory_shortage(error: BaseException) -> str:
         return ""
     limit = f" (`ulimit -v` allows {allowed // MEGABYTE:,} MB)" if allowed is not None else ""
     return f"out of memory: {texts[-1]}{limit}"
-
-
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error, and those that led to it."""
-    seen = set[int]()
-    while error is not None and id(error) not in seen:
-        seen.add(id(error))
-        yield error
-        error = error.__cause__ or error.__context__
-
-
-def _shortage(error: BaseException) -> str:
-    is_shortage = (
-        isinstance(error, MemoryError)
-        or (isinstance(error, OSError) and error.errno == errno.ENOMEM)
-        or any(text in str(error).lower() for text in _TEXTS)
-    )
-    return (_first_line(error) or "the system gives no more") if is_shortage else ""
 
 
 def _first_line(error: BaseException) -> str:

@@ -5,11 +5,10 @@ import hashlib
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from rich.table import Table
 
-from evoexp.commands.arguments import add_experiment_arguments, folder_words
+from evoexp.commands.arguments import add_experiment_arguments, add_json_argument, folder_words
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.commands.pack import unpacked
 from evoexp.commands.report_requests import MAX_NAMED, ReportRequest, chosen
@@ -25,8 +24,6 @@ from evoexp.report.results.ioh_format import ioh_files
 from evoexp.report.results.planner_runs import PlannerRuns, of_results
 from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root
-
-PAGE = "comparison"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,17 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ioh", metavar="FOLDER", help="write the runs for IOHanalyzer and iohinspector"
     )
-    parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
-
-
-class Drawn(NamedTuple):
-    """A comparison before it is written."""
-
-    files: build.ReportFiles
-    request: build.Request
-    settings: ReportSettings
-    runs: list[PlannerRuns]  # of all planners, those given by `--data` included
-    strange: list[str]  # lines on problems that only the given data know
+    add_json_argument(parser, "an object per condition")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -72,9 +59,18 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.ioh and folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
         raise SettingError("--ioh", "a folder that is empty or not there yet", arguments.ioh)
     files, request, settings, runs, strange = drawn(arguments)
-    path = build.write_report(files)
+    page = build.write_report(files)
     rows = comparison.rated(runs, settings)
-    _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
+    if arguments.csv:
+        write_file(Path(arguments.csv), as_csv(rows))
+    if arguments.latex:
+        command = f"evoexp compare {request.words}"
+        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
+    if arguments.ioh:
+        written = {folder / name: content for name, content in ioh_files(runs).items()}
+        for path in written:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_files(written)
     if arguments.json:
         print_json(
             [
@@ -88,14 +84,21 @@ def main(arguments: argparse.Namespace) -> int:
     for line in strange:
         say(line)
     for kind in ("csv", "latex", "ioh"):
-        if written := getattr(arguments, kind):
-            say(f"{kind}: {written}")
-    say(f"compare: {path}")
+        if place := getattr(arguments, kind):
+            say(f"{kind}: {place}")
+    say(f"compare: {page}")
     return 0
 
 
-def drawn(arguments: argparse.Namespace) -> Drawn:
-    """Draw the page that is asked for; nothing is written."""
+def drawn(
+    arguments: argparse.Namespace,
+) -> tuple[build.ReportFiles, build.Request, ReportSettings, list[PlannerRuns], list[str]]:
+    """Draw the page that is asked for; nothing is written.
+
+    Returns:
+        Files, request, settings, the runs of all planners, and lines on problems that only the
+        given data know.
+    """
     given = read_given(arguments.data) if arguments.data else None
     known = shipped_best_known()
     if arguments.best_known:
@@ -112,7 +115,7 @@ def drawn(arguments: argparse.Namespace) -> Drawn:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
     page = comparison.page_of_runs(runs, found, settings, given)
-    return Drawn(build.page_files(request, page, found, settings), request, settings, runs, strange)
+    return build.page_files(request, page, found, settings), request, settings, runs, strange
 
 
 def _table(rows: Sequence[comparison.Rated], title: str) -> Table:
@@ -129,33 +132,13 @@ def _table(rows: Sequence[comparison.Rated], title: str) -> Table:
     return table
 
 
-def _write_files(
-    arguments: argparse.Namespace,
-    runs: Sequence[PlannerRuns],
-    rows: Sequence[comparison.Rated],
-    command: str,
-    settings: ReportSettings,
-) -> None:
-    """Write the files that `--csv`, `--latex` and `--ioh` ask for."""
-    if arguments.csv:
-        write_file(Path(arguments.csv), as_csv(rows))
-    if arguments.latex:
-        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
-    if arguments.ioh:
-        folder = Path(arguments.ioh)
-        files = {folder / name: content for name, content in ioh_files(runs).items()}
-        for parent in {path.parent for path in files}:
-            parent.mkdir(parents=True, exist_ok=True)
-        write_files(files)
-
-
 def _asked(arguments: argparse.Namespace) -> ReportRequest:
     """Return the request of the page."""
     words = shlex.join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
     words += f" --only {shlex.quote(','.join(arguments.only))}" if arguments.only else ""
     words = " ".join([words, *folder_words(arguments.config_dir)])
     runs, experiments, _, settings = chosen(arguments)
-    settings = settings.model_copy(update={"figures": PAGE})
+    settings = settings.model_copy(update={"figures": "comparison"})
     if runs:
         name = _name("+".join(runs), len(runs))
         request = build.Request(name, "", "", tuple(runs.items()), words, None, "compare")

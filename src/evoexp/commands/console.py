@@ -52,11 +52,7 @@ def say(*parts: str | Text | Table) -> None:
 
 
 def say_each(draws: Iterable[Callable[[], object]]) -> None:
-    """Draw reports, and say where each is; one that cannot be drawn keeps no other from it.
-
-    Raises:
-        EvoexpError: Once all others are drawn, why some could not be.
-    """
+    """Draw reports, and say where each is; one that cannot be drawn keeps no other from it."""
     errors = []
     for draw in draws:
         try:

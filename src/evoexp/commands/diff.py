@@ -2,11 +2,12 @@
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
@@ -41,9 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             help="any unique prefix of a run's hash, or of a shipped condition's; or an archive of "
             "runs, RUNS.tar[:HASH]",
         )
-    parser.add_argument(
-        "--json", action="store_true", help=f"print JSON: one mapping ({', '.join(KEYS)})"
-    )
+    add_json_argument(parser, f"one mapping ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -54,7 +53,10 @@ def main(arguments: argparse.Namespace) -> int:
     one, two = _side(arguments.a), _side(arguments.b)
     settings = list(changed(one.settings, two.settings))
     environment = _environment(one, two)
-    results = list(_results(one, two))
+    names = dict.fromkeys(k for side in (one, two) for row in side.rows.values() for k in row)
+    terms = [name for name in names if name.startswith("term_")]
+    medians = [_results(side.rows.values(), terms) for side in (one, two)]
+    results = [(name, value, medians[1][name]) for name, value in medians[0].items()]
     common = sorted(one.rows.keys() & two.rows.keys())
     same = [k for k in common if _measured(one.rows[k]) == _measured(two.rows[k])]
     if arguments.json:
@@ -97,12 +99,7 @@ def _is_around(outer: Any, inner: Any) -> bool:
 
 
 def _side(prefix: str) -> Side:
-    """Find a condition: in an archive, stored here, else shipped.
-
-    Raises:
-        UnknownHash: If it is nowhere, or in an archive of several runs of which none is chosen.
-        AmbiguousHash: If a prefix means several.
-    """
+    """Find a condition: in an archive, stored here, else shipped."""
     if packed := in_archive(prefix):
         with looked_into(*packed) as runs:
             if len(runs) > 1:
@@ -117,17 +114,14 @@ def _side(prefix: str) -> Side:
 
 
 def _stored(run: RunDirectory) -> Side:
-    return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), _rows(run))
+    table = summary_table(run).to_pylist()
+    rows = {int(row["replicate"]): row for row in table if row["status"] == "done"}
+    return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), rows)
 
 
 def _measured(row: Mapping[str, Any]) -> str:
     """Return a replicate's row as text, to the last bit; without condition and times."""
     return repr({k: v for k, v in row.items() if k not in (*TIMES, "condition") and v is not None})
-
-
-def _rows(run: RunDirectory) -> dict[int, dict[str, Any]]:
-    rows = summary_table(run).to_pylist()
-    return {int(row["replicate"]): row for row in rows if row["status"] == "done"}
 
 
 def _environment(one: Side, two: Side) -> list[tuple[str, Any, Any]]:
@@ -143,24 +137,14 @@ def _environment(one: Side, two: Side) -> list[tuple[str, Any, Any]]:
     return [*found, *(changed(*code, "git"))]
 
 
-def _results(one: Side, two: Side) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the counts and medians of two runs, the same ones, too."""
-    yield "replicates", len(one.rows), len(two.rows)
-    for name in ("solved", "certified"):
-        yield name, _count(one, name), _count(two, name)
-    terms = [key for side in (one, two) for row in side.rows.values() for key in row]
-    for name in dict.fromkeys([*QUANTITIES, *(key for key in terms if key.startswith("term_"))]):
-        yield name.removeprefix("term_"), _median(one, name), _median(two, name)
-
-
-def _count(side: Side, name: str) -> int:
-    return sum(row[name] is True for row in side.rows.values())
-
-
-def _median(side: Side, name: str) -> float | None:
-    values = [row.get(name) for row in side.rows.values()]
-    known = [float(value) for value in values if value is not None]
-    return float(np.median(known)) if known else None
+def _results(rows: Collection[Mapping[str, Any]], terms: Sequence[str]) -> dict[str, Any]:
+    """Return the counts of a run's replicates, and the medians of their quantities and terms."""
+    counts = {name: sum(row[name] is True for row in rows) for name in ("solved", "certified")}
+    results: dict[str, Any] = {"replicates": len(rows), **counts}
+    for name in (*QUANTITIES, *terms):
+        values = [row[name] for row in rows if row.get(name) is not None]
+        results[name.removeprefix("term_")] = float(np.median(values)) if values else None
+    return results
 
 
 def _print(title: str, heads: tuple[str, str], rows: list[tuple[str, Any, Any]]) -> None:

@@ -61,14 +61,15 @@ def main(arguments: argparse.Namespace) -> int:
     """Print terms and exact verdict of the motion; conditions that say the same share a column."""
     fitting = _motions(arguments)
     if arguments.write is not None:
-        _, _, planner, problem, solution, *_ = fitting[0]
         if fitting[0].is_trajectory:
             raise MotionFileError("--write: must go with a solution, was given with a trajectory")
-        lists = nested(solution, planner.shape(problem))
+        planner, problem = fitting[0].condition.prepare()
+        lists = nested(fitting[0].solution, planner.shape(problem))
         write(arguments.write, json.dumps(lists).encode(), is_said=not arguments.json)
     rows: list[dict[str, Any]] = []
     listings: list[Listing | None] = []
-    for label, condition, planner, problem, solution, motion, remarks in fitting:
+    for label, condition, solution, motion, remarks in fitting:
+        planner, problem = condition.prepare()
         head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
         verdict = judge_motion(planner, problem, motion)._asdict()
         if remarks:  # of a trajectory a planner knows neither terms nor departures
@@ -81,16 +82,19 @@ def main(arguments: argparse.Namespace) -> int:
         rows.append(head | terms | of_task | verdict | {DEPARTURES: departures})
         listings.append(planner.listing(problem, solution))
     if arguments.json:
-        whole = [
-            row if listing is None else row | {"rows": _configurations(listing)}
-            for row, listing in zip(rows, listings, strict=True)
-        ]
-        print_json(whole if len(whole) > 1 else whole[0])
+        for row, listing in zip(rows, listings, strict=True):
+            if listing is not None:
+                names, cells = listing
+                row["rows"] = [dict(zip(names, values, strict=True)) for values in cells]
+        print_json(rows if len(rows) > 1 else rows[0])
         return 0
     groups = _alike(list(zip(rows, listings, strict=True)))
     for group in groups:
-        if (listing := group[0][1]) is not None:
-            say(_listing(_labels(group), listing))
+        if (listing := group[0][1]) is not None:  # a row per configuration of the motion
+            table = new_table(_labels(group), *right(*listing.names))
+            for cells in listing.rows:
+                table.add_row(*map(_cell, cells))
+            say(table)
     for table in _tables([[row for row, _ in group] for group in groups], plain_console().width):
         say(table)
     for group in groups:
@@ -130,18 +134,6 @@ def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
     if arguments.write is not None and not any(is_motion(word) for word in words):
         return [initial_motion(words, **asked)]
     return fitting_motions(words, **asked)[1]
-
-
-def _configurations(listing: Listing) -> list[dict[str, Any]]:
-    return [dict(zip(listing.names, cells, strict=True)) for cells in listing.rows]
-
-
-def _listing(label: str, listing: Listing) -> Table:
-    """Return a table with one row per configuration of the motion."""
-    table = new_table(label, *right(*listing.names))
-    for row in listing.rows:
-        table.add_row(*(_cell(value) for value in row))
-    return table
 
 
 def _tables(columns: list[list[dict[str, Any]]], width: int) -> list[Table]:

@@ -15,9 +15,8 @@ from evoexp.commands.chosen_motions import (
 )
 from evoexp.commands.console import say
 from evoexp.errors import SettingError
-from evoexp.playback.joint_limits import JointLimits, joint_limits
-from evoexp.playback.recording import Recording
-from evoexp.playback.trajectory import Trajectory, as_csv, as_json, as_ros, trajectory
+from evoexp.playback.joint_limits import joint_limits
+from evoexp.playback.trajectory import as_csv, as_json, as_ros, trajectory
 
 ANSWERS = {True: "yes", False: "no", None: "undecided"}
 
@@ -61,7 +60,10 @@ def main(arguments: argparse.Namespace) -> int:
     if not 0.0 < arguments.ramp < math.inf:
         raise SettingError("--ramp", "greater than 0", arguments.ramp)
     found = single(arguments)
-    limits = _limits(found, arguments)
+    prismatic = np.array([joint.prismatic for joint in found.joints])
+    speeds = speed_limits(arguments).of(prismatic, found.size)
+    names = tuple(joint.name for joint in found.joints)
+    limits = joint_limits(names, arguments.limits, speeds, found.velocity_limits, arguments.ramp)
     timed = trajectory(found, arguments.timing, limits)
     if arguments.format == "ros":
         content = as_ros(timed)
@@ -69,20 +71,7 @@ def main(arguments: argparse.Namespace) -> int:
         content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
     ending = ".csv" if arguments.format == "csv" else ".json"
     write(output_path(arguments, [found], ending), content)
-    say(_described(timed, limits))
-    return 0
-
-
-def _limits(found: Recording, arguments: argparse.Namespace) -> JointLimits:
-    """Return the limits that the file, the robot or the command line set."""
-    prismatic = np.array([joint.prismatic for joint in found.joints])
-    speeds = speed_limits(arguments).of(prismatic, found.size)
-    names = tuple(joint.name for joint in found.joints)
-    return joint_limits(names, arguments.limits, speeds, found.velocity_limits, arguments.ramp)
-
-
-def _described(timed: Trajectory, limits: JointLimits) -> str:
-    """Say how long the motion takes, how near it comes to the limits, and what is proven of it."""
+    # how long the motion takes, how near it comes to the limits, and what is proven of it
     speed, acceleration = (
         float((rate / limit).max()) for rate, limit in zip(timed.rates(), limits, strict=True)
     )
@@ -91,7 +80,8 @@ def _described(timed: Trajectory, limits: JointLimits) -> str:
     else:
         rates = f"at most {speed:.0%} of a joint's speed, {acceleration:.0%} of its acceleration"
     verdict = timed.verdict
-    return (
+    say(
         f"{timed.times[-1]:.2f} s, {len(timed.times)} points; {rates}; certified: "
         f"{ANSWERS[verdict.certified]}, margin kept: {ANSWERS[verdict.certified_margin]}"
     )
+    return 0

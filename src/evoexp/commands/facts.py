@@ -47,27 +47,16 @@ def composed_facts(
 ) -> dict[str, Any]:
     """Return the facts about one condition of an experiment, whether or not it was run here.
 
-    Args:
-        command: That runs it.
-        noted: Whether the facts include notes, for which the planner prepares its problem.
-
-    Raises:
-        EvoexpError: If the condition cannot be built: its parts do not fit.
+    A command runs it. For notes the planner prepares its problem.
     """
     condition = next(each.condition for each in experiment.conditions if each.label == label)
-    origin = {
-        "experiment": experiment.name,
-        "label": label,
-        "budget": experiment.budget_of(label),
-        "command": command,
-        "options": experiment.option_names(label),
-    }
+    origin = experiment.origin(label, command)
     run = RunDirectory(outputs_root(), condition.id)
     rows = summary_table(run).to_pylist() if run.completed() or run.failed() else []
     planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
     around = run.manifest() if rows else None
     config_json = condition.to_json()
-    is_shipped = condition.id in shipped.rows_by_condition()  # the parts of these fit
+    is_shipped = bool(shipped.rows_of(condition.id))  # whose parts fit
     if (noted or not is_shipped) and not lacking(config_json):  # else a note says how to install it
         condition.notes()  # raises where the parts do not fit
     return _facts(config_json, origin, around, rows, planned, noted=noted)
@@ -90,11 +79,7 @@ def stored_facts(run: RunDirectory) -> dict[str, Any]:
 
 
 def log_facts(path: Path) -> dict[str, Any]:
-    """Return the facts about a replicate's log, wherever it comes from.
-
-    Raises:
-        CorruptLog: If the log cannot be trusted.
-    """
+    """Return the facts about a replicate's log, wherever it comes from."""
     log = read_log(path)
     keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
     rows = [flatten(log.summary)]
@@ -119,6 +104,12 @@ def _facts(
     noted: bool = True,
 ) -> dict[str, Any]:
     """Return the facts of all keys."""
+    notes = []
+    if noted:
+        try:
+            notes = Condition.from_json(config_json).notes()
+        except EvoexpError as error:  # of another revision, or a package that is not installed
+            notes = [str(error)]
     config = stored_config(config_json)
     condition_id = hashlib.sha256(config_json).hexdigest()
     stored = None if around is None else {k: around.get(k) for k in ("versions", "platform", "cpu")}
@@ -128,7 +119,7 @@ def _facts(
         "condition": condition_id,
         "shipped_as": [
             {"experiment": row.experiment, "label": row.label, "budget": row.budget}
-            for row in shipped.rows_by_condition().get(condition_id, ())
+            for row in shipped.rows_of(condition_id)
         ],
         "components": list(_components(config)),
         "origin": origin,
@@ -136,7 +127,7 @@ def _facts(
         "result": _result(rows, planned) if rows else None,
         "verdict": _verdict([row for row in rows if row["status"] == "done"]) if rows else None,
         "settings": config,
-        "notes": _notes(config_json) if noted else [],
+        "notes": notes,
     }
 
 
@@ -160,6 +151,8 @@ def _result(rows: Sequence[dict[str, Any]], planned: int | None) -> dict[str, An
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] != "done"]
     best = min(done, key=lambda row: row["best_cost"], default=None)
+    names = ("best_cost", "evaluations", "collision_queries", "cpu_s")
+    medians = [float(np.median([row[name] for row in done])) if done else None for name in names]
     return {
         "planned": planned,
         "done": len(done),
@@ -170,23 +163,14 @@ def _result(rows: Sequence[dict[str, Any]], planned: int | None) -> dict[str, An
         "solved": sum(bool(row["solved"]) for row in done),
         "best_cost": best and best["best_cost"],
         "best_replicate": best and best["replicate"],
-        "median_cost": _median(done, "best_cost"),
-        "median_evaluations": _median(done, "evaluations"),
-        "median_collision_queries": _median(done, "collision_queries"),
-        "median_cpu_s": _median(done, "cpu_s"),
+        **{f"median_{n.removeprefix('best_')}": m for n, m in zip(names, medians, strict=True)},
     }
-
-
-def _median(rows: Sequence[dict[str, Any]], name: str) -> float | None:
-    return float(np.median([row[name] for row in rows])) if rows else None
 
 
 def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return how many motions the exact certifier accepts, and the closest approach of all."""
     moved = [row for row in rows if not math.isnan(row["clearance"])]
-    nearest = min(moved, key=lambda row: row["clearance"], default=None)
-    near = nearest or {}
-    touching = [row for row in moved if row["refuted_at"] is not None]
+    near = min(moved, key=lambda row: row["clearance"], default=None) or {}
     pairs = dict.fromkeys(p for row in moved for p in row["allowed_contacts"].split(", ") if p)
     allowed = (row for row in moved if row["allowed_contacts"])
     deepest = max(allowed, key=lambda row: row["penetration"], default=None) or {}
@@ -201,7 +185,8 @@ def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "clearance_pair": near.get("clearance_pair"),
         "contacts": [
             {key: row[key] for key in ("replicate", "refuted_at", "refuted_pair")}
-            for row in touching
+            for row in moved
+            if row["refuted_at"] is not None
         ],
         "allowed_contacts": list(pairs),
         "penetration": deepest.get("penetration"),
@@ -209,11 +194,3 @@ def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "penetration_pair": deepest.get("penetration_pair"),
         "length_unit": rows[0]["length_unit"] if rows else None,
     }
-
-
-def _notes(config_json: bytes) -> list[str]:
-    """Return the remarks on a condition's settings, or the reason why there can be none."""
-    try:
-        return list(Condition.from_json(config_json).notes())
-    except EvoexpError as error:  # of another revision, or a package that is not installed
-        return [str(error)]

@@ -22,7 +22,7 @@ PATIENCE_S = 3.0  # [s] that closing may take before what it waits for is interr
 CLOSING_S = 15.0  # [s] that closing may take at all
 ENDING_S = 3.0  # [s] that the interpreter may take to end: an interrupted thread may never do
 AGAIN_S = 0.25  # [s] between two looks whether the exception is still under way
-_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some systems lack the last one
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupted(BaseException):
@@ -41,7 +41,6 @@ class Interruption:
         self.number: int | None = None
         self._since = self._raised = 0.0  # when it was heard, and `Interrupted` raised last [s]
         self._has_ended = False  # whether the command did
-        self._numbers: list[int] = []
 
     @property
     def exit_code(self) -> int:
@@ -50,11 +49,9 @@ class Interruption:
 
     def hear(self) -> None:
         """Hear signals from now on; one that this process was started to ignore stays ignored."""
-        for name in _NAMES:
-            number = getattr(signal, name, None)
-            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+        for number in _SIGNALS:
+            if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._hear)
-                self._numbers.append(number)
         # what callbacks and threads of libraries say of their interrupted work helps nobody
         in_callback, in_thread = sys.unraisablehook, threading.excepthook
         sys.unraisablehook = lambda it: None if self.number is not None else in_callback(it)
@@ -67,8 +64,9 @@ class Interruption:
         """
         self._has_ended = True
         if self.number is not None:
-            for number in self._numbers:
-                signal.signal(number, signal.SIG_IGN)
+            for number in _SIGNALS:
+                if signal.getsignal(number) == self._hear:
+                    signal.signal(number, signal.SIG_IGN)
             signal.setitimer(signal.ITIMER_REAL, ENDING_S)
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
@@ -81,21 +79,15 @@ class Interruption:
     def _look(self, number: int, frame: FrameType | None) -> None:
         """Raise again if the exception was lost, or if closing takes too long."""
         assert self.number is not None, "the timer runs after a signal"
-        now = time.monotonic()
+        now, error = time.monotonic(), sys.exception()
+        while error is not None and not isinstance(error, Interrupted):
+            error = error.__context__  # raised while the exception was handled
         if self._has_ended or now - self._since > CLOSING_S:
             signal.signal(self.number, signal.SIG_DFL)
             os.kill(os.getpid(), self.number)
-        elif now - self._raised > PATIENCE_S or not _is_under_way():
+        elif now - self._raised > PATIENCE_S or error is None:
             self._raise()
 
     def _raise(self) -> NoReturn:
         self._raised = time.monotonic()
         raise Interrupted
-
-
-def _is_under_way() -> bool:
-    """Return whether the exception, or one that was raised while it was handled, is handled now."""
-    error = sys.exception()
-    while error is not None and not isinstance(error, Interrupted):
-        error = error.__context__
-    return error is not None

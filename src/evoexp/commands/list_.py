@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from evoexp.commands.arguments import add_config_dir_argument
+from evoexp.commands.arguments import add_config_dir_argument, add_json_argument
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
 from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
@@ -30,12 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--failed", action="store_true", help="list the failed replicates of stored runs instead"
     )
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help=f"print JSON: experiments ({', '.join(EXPERIMENT_KEYS)}) and runs "
-        f"({', '.join(RUN_KEYS)}); with --failed, failures ({', '.join(FAILED_KEYS)})",
-    )
+    keys = [", ".join(names) for names in (EXPERIMENT_KEYS, RUN_KEYS, FAILED_KEYS)]
+    content = f"experiments ({keys[0]}) and runs ({keys[1]}); with --failed, failures ({keys[2]})"
+    add_json_argument(parser, content)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -44,14 +41,14 @@ def main(arguments: argparse.Namespace) -> int:
         failures = _failures()
         if arguments.json:
             print_json(failures)
+        elif failures:
+            say(_failure_table(failures))
         else:
-            say(
-                _failure_table(failures)
-                if failures
-                else f"no failed replicates in {outputs_root()}"
-            )
+            say(f"no failed replicates in {outputs_root()}")
         return 0
-    experiments = [_experiment(name) for name in options("experiment")]
+    files = [find("experiment", name) for name in options("experiment")]
+    rows = ((each.name, description(each.name), each.origin, each.path) for each in files)
+    experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in rows]
     runs = [_run(name, run) for name, run in stored_runs(outputs_root())]
     if arguments.json:
         print_json({"experiments": experiments, "runs": runs})
@@ -87,12 +84,6 @@ def _failure_table(failures: list[dict[str, Any]]) -> Table:
         label, reason = coloured(each["label"]), coloured(each["reason"])
         table.add_row(each["hash"], label, str(each["replicate"]), reason)
     return table
-
-
-def _experiment(name: str) -> dict[str, Any]:
-    found = find("experiment", name)
-    values = (name, description(name), found.origin, found.path)
-    return dict(zip(EXPERIMENT_KEYS, values, strict=True))
 
 
 def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:

@@ -19,12 +19,7 @@ ENDINGS = f"{', '.join(MOTION_ENDINGS[:-1])} or {MOTION_ENDINGS[-1]}"
 
 
 def read_motion(path: Path) -> Any:
-    """Read a motion as nested lists (an array from `.npy`), or a joint trajectory.
-
-    Raises:
-        MotionFileError: If the file is missing, of another kind, or holds anything but finite
-            numbers.
-    """
+    """Read a motion as nested lists (an array from `.npy`), or a joint trajectory."""
     try:
         if path.suffix not in MOTION_ENDINGS:
             raise MotionFileError(f"{path}: a motion file ends in {ENDINGS}")

@@ -45,7 +45,16 @@ def main(arguments: argparse.Namespace) -> int:
     """Write the package and print the commands to type next."""
     name = arguments.name
     root = arguments.directory / name
-    _check(name, root)
+    if not re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
+        must = "a word of lower-case letters, digits and _ that begins with a letter"
+        raise SettingError("NAME", must, name)
+    known = {*names(COMPONENTS), *(option for group in GROUPS for option in options(group))}
+    if name in known or name == "evoexp":
+        raise SettingError("NAME", "a new name: a component or an option has this one", name)
+    if root.exists():
+        raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
+    if find_spec(name) is not None:
+        raise PackageExists(f"{name}: a module of this name is installed; choose another NAME")
     kind = arguments.kind
     template = Path(evoexp.__file__).parent / "assets" / f"new_{kind}"
     files = {
@@ -64,20 +73,6 @@ def main(arguments: argparse.Namespace) -> int:
     print(f"install it: pip install -e {root}")
     print(f"run it:     {COMMANDS[kind].format(name=name)}")
     return 0
-
-
-def _check(name: str, root: Path) -> None:
-    """Refuse a name that cannot be, or that something has already."""
-    if not re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
-        must = "a word of lower-case letters, digits and _ that begins with a letter"
-        raise SettingError("NAME", must, name)
-    known = {*names(COMPONENTS), *(option for group in GROUPS for option in options(group))}
-    if name in known or name == "evoexp":
-        raise SettingError("NAME", "a new name: a component or an option has this one", name)
-    if root.exists():
-        raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
-    if find_spec(name) is not None:
-        raise PackageExists(f"{name}: a module of this name is installed; choose another NAME")
 
 
 def _named(text: str, kind: str, name: str) -> str:

@@ -61,21 +61,15 @@ def is_archive(word: str) -> bool:
 def in_archive(word: str) -> tuple[Path, str] | None:
     """Return archive and prefix of a hash of a word `RUNS.tar` or `RUNS.tar:HASH`; else None."""
     head, _, prefix = word.rpartition(":")
-    for path, wanted in ((word, ""), (head, prefix)):
-        if is_archive(path):
-            return Path(path), wanted
-    return None
+    places = ((word, ""), (head, prefix))
+    return next(((Path(path), own) for path, own in places if is_archive(path)), None)
 
 
 @contextmanager
 def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
-    """Give the runs of an archive while the body runs; the store stays as it is.
+    """Give the runs of an archive, or the one that a prefix begins, while the body runs.
 
-    Args:
-        prefix: Of the hash of the only run to be given; empty: all.
-
-    Raises:
-        UnknownHash: If no run of it, or several, begin with the prefix.
+    The store stays as it is.
     """
     with tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True) as folder:
         runs = [taken.run for taken in take_in(path, Path(folder))]
@@ -91,11 +85,7 @@ def looked_into(path: Path, prefix: str = "") -> Iterator[list[RunDirectory]]:
 
 
 def unpacked(words: Sequence[str]) -> list[str]:
-    """Take the archives among the words of a command into the store.
-
-    Returns:
-        The words, with the hashes of its runs in place of each archive.
-    """
+    """Take archives among words into the store; return the hashes of their runs in their place."""
     found: list[str] = []
     for word in words:
         if not is_archive(word):

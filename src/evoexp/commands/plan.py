@@ -16,7 +16,7 @@ from rich.table import Table
 
 from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
 from evoexp.batch.workers import num_cores
-from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.commands.arguments import add_experiment_arguments, add_json_argument
 from evoexp.commands.console import hash_column, new_table, print_json, right, say
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -68,9 +68,7 @@ KEYS = PlannedCondition._fields
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_experiment_arguments(parser)
-    parser.add_argument(
-        "--json", action="store_true", help=f"print JSON: a list of conditions ({', '.join(KEYS)})"
-    )
+    add_json_argument(parser, f"a list of conditions ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -82,9 +80,30 @@ def main(arguments: argparse.Namespace) -> int:
     rows: dict[str, PlannedCondition] = {}
     for experiment in experiments:
         for label, condition in experiment.conditions:
-            if condition.id not in rows:
-                count = condition.num_replicates(experiment.num_replicates)
-                rows[condition.id] = _planned(experiment.name, label, condition, count, stored)
+            if condition.id in rows:
+                continue
+            run, settings = (
+                RunDirectory(outputs_root(), condition.id),
+                json.loads(condition.to_json()),
+            )
+            count, done = condition.num_replicates(experiment.num_replicates), run.completed()
+            asked = set(range(count))
+            damaged = {int(Path(name).stem) for name in damaged_logs(run)} if done else set()
+            cached, failed = (done - damaged) & asked, run.failed() & asked
+            same_settings = stored.named.get(_key(_without_revisions(settings)), ())
+            rows[condition.id] = PlannedCondition(
+                experiment.name,
+                label,
+                condition.id,
+                count,
+                len(cached),
+                count - len(cached) - len(failed),
+                len(failed),
+                len(damaged & asked),
+                tuple(other[:12] for other in same_settings if other != condition.id),
+                *stored.estimate(condition, run, settings),
+                round(replicate_memory(condition) / GIGABYTE, 4),
+            )
     planned = list(rows.values())
     if arguments.json:
         print_json([row._asdict() for row in planned])
@@ -92,30 +111,6 @@ def main(arguments: argparse.Namespace) -> int:
     say(_table(planned))
     say(_total(planned, experiments[0].runner.num_workers or num_cores()))
     return 0
-
-
-def _planned(
-    experiment: str, label: str, condition: Condition, count: int, stored: "StoredTimes"
-) -> PlannedCondition:
-    run = RunDirectory(outputs_root(), condition.id)
-    asked = set(range(count))
-    damaged = {int(Path(name).stem) for name in damaged_logs(run)} if run.completed() else set()
-    cached = (run.completed() - damaged) & asked
-    failed = run.failed() & asked
-    settings = json.loads(condition.to_json())
-    return PlannedCondition(
-        experiment,
-        label,
-        condition.id,
-        count,
-        len(cached),
-        count - len(cached) - len(failed),
-        len(failed),
-        len(damaged & asked),
-        stored.other_revisions(settings, condition.id),
-        *stored.estimate(condition, run, settings),
-        round(replicate_memory(condition) / GIGABYTE, 4),
-    )
 
 
 def _table(rows: Sequence[PlannedCondition]) -> Table:
@@ -172,7 +167,7 @@ class StoredTimes:
 
     def __init__(self, outputs: Path) -> None:
         """Read the configurations of all runs; those that cannot be read are left out."""
-        self._named: dict[str, list[str]] = {}  # settings → ids of runs
+        self.named: dict[str, list[str]] = {}  # settings without revisions → ids of runs
         self._alike: dict[str, list[RunDirectory]] = {}  # planner and scene → runs
         self._known: dict[str, list[Times]] = {}
         for name in run_names(outputs):
@@ -183,14 +178,9 @@ class StoredTimes:
                 continue
             condition_id = hashlib.sha256(content).hexdigest()
             if condition_id.startswith(name) and isinstance(settings, dict):
-                self._named.setdefault(_key(_without_revisions(settings)), []).append(condition_id)
+                self.named.setdefault(_key(_without_revisions(settings)), []).append(condition_id)
                 run = RunDirectory(outputs, condition_id)
                 self._alike.setdefault(_scene(settings), []).append(run)
-
-    def other_revisions(self, settings: Any, condition_id: str) -> tuple[str, ...]:
-        """Return the hashes of runs of the same settings by components of another revision."""
-        same = self._named.get(_key(_without_revisions(settings)), ())
-        return tuple(other[:12] for other in same if other != condition_id)
 
     def estimate(self, condition: Condition, run: RunDirectory, settings: Any) -> Estimate:
         """Estimate the CPU time of a replicate: from its own ones, else from runs like it."""

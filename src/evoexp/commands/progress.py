@@ -56,10 +56,9 @@ class BatchProgress:
         """Prepare; shown inside `shown`.
 
         Args:
-            console: Where to show it.
+            console: Shows it.
             wanted: Condition's id → its label, and its replicates to run.
-            curves: Folder in which workers leave the convergence of what they run; None: it is not
-                shown.
+            curves: Folder in which workers leave the convergence of what they run; None: not shown.
             clock: Tells the time [s].
         """
         texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
@@ -144,25 +143,15 @@ class BatchProgress:
     def _say(self) -> None:
         total, failed = self._bars.tasks[-1], sum(self._failed.values())
         done, seconds = int(total.completed) - failed, total.time_remaining
-        if seconds is None:
-            rest = "–"
-        else:
-            in_minutes = seconds >= MINUTES_FROM_S
-            rest = f"{seconds / 60:.0f} min" if in_minutes else f"{seconds:.0f} s"
+        rest = "–" if seconds is None else f"{seconds:.0f} s"
+        if seconds is not None and seconds >= MINUTES_FROM_S:
+            rest = f"{seconds / 60:.0f} min"
         text = f"replicates: {done} of {total.total:.0f} done, {failed} failed, ETA {rest}"
         self._console.print(text, soft_wrap=True)
 
 
 def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH) -> str:
-    """Draw costs as a line of characters.
-
-    Args:
-        costs: Of one replicate, in order.
-        levels: Characters for the least to the largest of them.
-
-    Returns:
-        The characters, with the first and the last cost.
-    """
+    """Draw costs of a replicate, the first and the last included, by levels from least to most."""
     places = np.linspace(0, len(costs) - 1, min(len(costs), width)).round().astype(int)
     shown = np.asarray(costs, dtype=np.float64)[places]
     finite = shown[np.isfinite(shown)]

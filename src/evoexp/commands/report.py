@@ -93,30 +93,25 @@ def _check(reports: Iterable[build.ReportFiles]) -> int:
     """Compare reports with what is on disk, and name every file that is not the same."""
     num_reports = num_files = num_wrong = 0
     for report in reports:
-        for line in _differences(report):
+        wrong = []
+        for name, content in sorted(report.files.items()):
+            path = report.directory / name
+            if not path.exists():
+                wrong.append(f"missing: {path}")
+            elif path.read_bytes() != content:
+                wrong.append(f"differs: {path}")
+        if build.INDEX in report.files:  # the home page owns no folder
+            wrong += [f"left over: {path}" for path in build.stale_files(report)]
+        for line in wrong:
             say(line)
-            num_wrong += 1
         num_reports += 1
         num_files += len(report.files)
+        num_wrong += len(wrong)
     checked = f"check: {num_files} files of {num_reports} report{'s' * (num_reports != 1)}"
     say(
         f"{checked}: {num_wrong or 'all'} {'not ' * bool(num_wrong)}as they follow from the outputs"
     )
     return 1 if num_wrong else 0
-
-
-def _differences(report: build.ReportFiles) -> Iterator[str]:
-    """Yield a line for every file that differs, is missing or left over."""
-    directory, files = report
-    for name, content in sorted(files.items()):
-        path = directory / name
-        if not path.exists():
-            yield f"missing: {path}"
-        elif path.read_bytes() != content:
-            yield f"differs: {path}"
-    # the home page owns no folder
-    for path in build.stale_files(report) if build.INDEX in files else ():
-        yield f"left over: {path}"
 
 
 def _with_assumptions(words: Sequence[str]) -> list[str]:
@@ -181,32 +176,24 @@ def _budgets(outputs: Path, name: str) -> Iterator[str]:
     It began one of its runs, or all of them are there: experiments share conditions, so one of
     them alone does not mean that all were asked for.
     """
+    rows = [row for row in shipped() if row.experiment == name]
     for budget in ("paper", "smoke"):
-        ids = _ids(name, budget)
+        ids = {row.condition_id for row in rows if row.budget == budget}
+        if not rows:  # not shipped
+            (experiment,) = compose.expand([f"experiment={name}", f"budget={budget}"])
+            ids = {condition.id for _, condition in experiment.conditions}
         runs = (RunDirectory(outputs, each) for each in ids)
         begun = [run for run in runs if run.completed() or run.failed()]
         own = [run for run in begun if _notes(run).get("experiment") == name]
-        if own or (begun and len(begun) == len(ids)):
-            is_quick = budget == "paper" and _is_quick(name, own or begun)
-            yield "quick" if is_quick else budget
-
-
-def _ids(name: str, budget: str) -> set[str]:
-    """Return the hashes of an experiment's conditions; one that is not shipped is composed."""
-    rows = [row for row in shipped() if row.experiment == name]
-    if rows:
-        return {row.condition_id for row in rows if row.budget == budget}
-    (experiment,) = compose.expand([f"experiment={name}", f"budget={budget}"])
-    return {condition.id for _, condition in experiment.conditions}
-
-
-def _is_quick(name: str, begun: Sequence[RunDirectory]) -> bool:
-    """Return whether runs, whose hashes are those of the paper's budget, are of `quick`."""
-    commands = [_words(str(_notes(run).get("command", ""))) for run in begun]
-    if not all("budget=quick" in words for words in commands):
-        return False
-    (quick,) = compose.expand([f"experiment={name}", "budget=quick"])
-    return all(len(run.completed()) <= quick.num_replicates for run in begun)
+        if not own and len(begun) < max(len(ids), 1):
+            continue
+        # `quick` has the hashes of the paper's budget
+        commands = [_words(str(_notes(run).get("command", ""))) for run in own or begun]
+        is_quick = budget == "paper" and all("budget=quick" in words for words in commands)
+        if is_quick:
+            (quick,) = compose.expand([f"experiment={name}", "budget=quick"])
+            is_quick = all(len(run.completed()) <= quick.num_replicates for run in own or begun)
+        yield "quick" if is_quick else budget
 
 
 def _notes(run: RunDirectory) -> dict[str, Any]:
@@ -221,10 +208,15 @@ def _again(folder: str, command: str) -> build.ReportFiles:
     name, *words = _words(command)
     if name not in ("report", "compare"):
         raise StoreError(f"{folder}: names no command that draws it")
-    arguments = _parsed(name, words)
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(complaint):
+            arguments = command_parser(name).parse_intermixed_args(words)
+    except SystemExit as error:
+        raise StoreError(complaint.getvalue().strip().removeprefix("evoexp: ")) from error
     with searched_first(arguments.config_dir):
         if name == "compare":
-            return compare.drawn(arguments).files
+            return compare.drawn(arguments)[0]
         found = [] if arguments.all else requests(arguments)
         if len(found) != 1:
             raise StoreError(f"{folder}: names no command that draws it alone")
@@ -236,12 +228,3 @@ def _words(command: str) -> list[str]:
         return shlex.split(command) or [""]
     except ValueError:
         return [""]
-
-
-def _parsed(name: str, words: Sequence[str]) -> argparse.Namespace:
-    complaint = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(complaint):
-            return command_parser(name).parse_intermixed_args(words)
-    except SystemExit as error:
-        raise StoreError(complaint.getvalue().strip().removeprefix("evoexp: ")) from error

@@ -48,15 +48,18 @@ def chosen(
     Returns:
         Runs by the first digits of their hashes, or experiments and the overrides that apply to all
         of them; the settings of the first experiment, of runs those of the paper's report.
-
-    Raises:
-        UnknownOption: If a word is neither an experiment nor a hash.
-        SettingError: If runs are given by their hashes, and overrides beside them.
     """
     multirun, only, known = arguments.multirun, arguments.only, options("experiment")
     overrides = [word for word in arguments.overrides if is_override(word)]
     names = [word for word in arguments.overrides if word not in overrides]
-    names, overrides = _with_budget(names, overrides)
+    # `rana_planar@smoke`, as the folder of a report is named
+    parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
+    if budgets := {f"budget={budget}" for _, at, budget in parted if at}:
+        budgets |= {word for word in overrides if word.startswith("budget=")}
+        if len(budgets) > 1 or not all(at for _, at, _ in parted):
+            raise SettingError("budget", "one for all experiments", " ".join(names))
+        names = [name for name, _, _ in parted]
+        overrides += budgets - set(overrides)
     unknown = [name for name in names if name not in known and not is_file(name)]
     if names and len(unknown) == len(names) and all(map(_HASH.fullmatch, names)):
         if overrides or multirun or only:
@@ -74,18 +77,6 @@ def chosen(
         [*words, *overrides], multirun=multirun or len(names) > 1, only=only
     )
     return {}, experiments, overrides, experiments[0].report
-
-
-def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str], list[str]]:
-    """Read `rana_planar@smoke`, as the folder of a report is named, as its words."""
-    parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
-    budgets = {f"budget={budget}" for _, at, budget in parted if at}
-    if not budgets:
-        return list(names), overrides
-    budgets |= {word for word in overrides if word.startswith("budget=")}
-    if len(budgets) > 1 or not all(at for _, at, _ in parted):
-        raise SettingError("budget", "one for all experiments", " ".join(names))
-    return [name for name, _, _ in parted], [*overrides, *(budgets - set(overrides))]
 
 
 def requests(arguments: argparse.Namespace) -> list[ReportRequest]:
@@ -109,15 +100,7 @@ def request_of(
     only: Sequence[str] = (),
     config_dir: Sequence[str] = (),
 ) -> ReportRequest:
-    """Return the report of one experiment.
-
-    Args:
-        experiment: As `compose.expand` gives it.
-        overrides: As typed; `experiment=` among them is not looked at.
-        multirun: Whether `-m` was given.
-        only: The labels of `--only`.
-        config_dir: The folders of `--config-dir`.
-    """
+    """Return the report of one experiment, whose command repeats the words that were typed."""
     file = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
     words = [experiment.name] if experiment.name in options("experiment") else []
     words = file if any(map(is_file, file)) else words

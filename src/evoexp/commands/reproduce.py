@@ -2,9 +2,8 @@
 
 import argparse
 import contextlib
-import itertools
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from evoexp.batch.replicate import run_replicate
@@ -19,7 +18,7 @@ from evoexp.batch.reproduction import (
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.console import coloured, hash_column, new_table, right, say
 from evoexp.commands.pack import in_archive, looked_into
-from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
+from evoexp.commands.stored_runs import finished_replicate, shipped_experiment, stored_or_shipped
 from evoexp.errors import NothingStored, RevisionMismatch, UnknownHash, printable
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -64,32 +63,17 @@ def main(arguments: argparse.Namespace) -> int:
 def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison | DamagedLog]:
     """Run the finished replicates of a run again, or one of them."""
     try:
-        return _compare_all(run, _replicates(run, replicate))
+        if replicate is not None:
+            return _compare_all(run, [finished_replicate(run, replicate)])
+        if not run.completed():
+            raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
+        return _compare_all(run, sorted(run.completed()))
     except RevisionMismatch as error:
         text = (
             f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is "
             f"installed: {run.command}"
         )
         raise RevisionMismatch(text) from None
-
-
-def _replicates(run: RunDirectory, replicate: int | None) -> list[int]:
-    done = sorted(run.completed())
-    if replicate is not None and replicate not in done:
-        there = ", ".join(_spans(done)) or "none"
-        raise NothingStored(
-            f"run {run.hash12}: no finished replicate {replicate} (finished: {there})"
-        )
-    if not done:
-        raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
-    return [replicate] if replicate is not None else done
-
-
-def _spans(numbers: Sequence[int]) -> Iterator[str]:
-    """Yield ascending numbers as text, three and more in a row as one span: 0–1999."""
-    for _, group in itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
-        row = [number for _, number in group]
-        yield from (f"{row[0]}–{row[-1]}",) if len(row) > 2 else map(str, row)
 
 
 def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison | DamagedLog]:

@@ -36,7 +36,6 @@ from evoexp.store.summaries import summary_table as stored_summaries
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
   evoexp list                                       # all {number} experiments, and stored runs"""
-SHOWN = ("solved", "certified", "best_cost", "cpu_s")  # columns of the stored summaries
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
 
 
@@ -64,12 +63,15 @@ def main(arguments: argparse.Namespace) -> int:
     )
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    command = _command(arguments)
+    swept = ["-m"] if arguments.multirun else []
+    only = ["--only", ",".join(arguments.only)] if arguments.only else []
+    words = [*swept, *arguments.overrides, *only, *folder_words(arguments.config_dir)]
+    command = shlex.join(["evoexp", "run", *words])
     wanted = [
         (
             labelled.condition,
             labelled.condition.num_replicates(experiment.num_replicates),
-            _notes(experiment, labelled.label, command),
+            experiment.origin(labelled.label, command),
         )
         for experiment in experiments
         for labelled in _that_can_run(experiment)
@@ -99,14 +101,6 @@ def main(arguments: argparse.Namespace) -> int:
     return 1 if failures or left else 0
 
 
-def _command(arguments: argparse.Namespace) -> str:
-    """Return the command as it can be typed again."""
-    swept = ["-m"] if arguments.multirun else []
-    only = ["--only", ",".join(arguments.only)] if arguments.only else []
-    words = [*swept, *arguments.overrides, *only, *folder_words(arguments.config_dir)]
-    return shlex.join(["evoexp", "run", *words])
-
-
 def _that_can_run(experiment: Experiment) -> list[Labelled]:
     """Return the conditions of an experiment that need no extra that is not there."""
     lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
@@ -116,17 +110,6 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
     if all(lacks.values()):
         raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
     return [each for each in experiment.conditions if not lacks[each.label]]
-
-
-def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
-    """Return the notes that a new run's manifest keeps of its origin; no part of its identity."""
-    return {
-        "experiment": experiment.name,
-        "budget": experiment.budget_of(label),
-        "label": label,
-        "options": experiment.option_names(label),
-        "command": command,
-    }
 
 
 def _run(
@@ -212,7 +195,8 @@ def summary_table(experiment: Experiment) -> Table:
         run = RunDirectory(outputs_root(), condition.id)
         rows = stored_summaries(run)
         planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
-        columns = rows.select([*SHOWN, "status", "clearance"]).to_pylist()
+        names = ["solved", "certified", "best_cost", "cpu_s", "status", "clearance"]
+        columns = rows.select(names).to_pylist()
         done = [row for row in columns if row["status"] == "done"]
         moved = [row for row in done if not math.isnan(row["clearance"])]
         solved = sum(row["solved"] for row in done)
@@ -222,8 +206,8 @@ def summary_table(experiment: Experiment) -> Table:
             condition.id[:12],
             f"{len(done)} of {planned}",
             f"{solved} / {certified}",
-            _median([row["best_cost"] for row in done], ".4g"),
-            _median([row["cpu_s"] for row in done], ".3f"),
+            f"{np.median([row['best_cost'] for row in done]):.4g}" if done else "–",
+            f"{np.median([row['cpu_s'] for row in done]):.3f}" if done else "–",
         )
         if experiment.budget_of(label) == "smoke":
             table.caption = "budget=smoke shows that everything runs; its numbers decide nothing"
@@ -231,10 +215,6 @@ def summary_table(experiment: Experiment) -> Table:
             asked = experiment.num_replicates
             table.caption = f"of {asked} asked for: all that are stored, here and in the report"
     return table
-
-
-def _median(values: list[float], form: str) -> str:
-    return format(np.median(values), form) if values else "–"
 
 
 def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:

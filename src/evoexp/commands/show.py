@@ -1,6 +1,7 @@
 """`evoexp show`: a condition before it is run, a stored run, or somebody's log."""
 
 import argparse
+import functools
 import itertools
 import shlex
 import textwrap
@@ -115,23 +116,18 @@ def _print_screens(
     if arguments.json:
         print_json(found if len(found) > 1 else found[0])
         return
+    as_yaml = functools.partial(
+        yaml.safe_dump, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+    )
     for facts, run in zip(found, runs, strict=True):
         for line in screen(facts, plain_console().width):
             say(line)
         if arguments.all:
-            _say_yaml({"settings": facts["settings"]})
+            say(as_yaml({"settings": facts["settings"]}))
             if run is not None:
                 say(_replicate_table(run))
                 manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
-                _say_yaml({"manifest": manifest})
-
-
-def _say_yaml(data: Mapping[str, Any]) -> None:
-    say(
-        yaml.safe_dump(
-            data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
-        )
-    )
+                say(as_yaml({"manifest": manifest}))
 
 
 def _archive_table(found: Sequence[dict[str, Any]]) -> Table:

@@ -2,8 +2,7 @@
 
 import argparse
 import importlib
-from collections.abc import Iterator
-from pathlib import Path
+from collections import Counter
 
 from evoexp.commands.console import say
 from evoexp.commands.stored_runs import stored_runs
@@ -59,13 +58,19 @@ def write_site() -> None:
 
 
 def home_files() -> ReportFiles:
-    """Return the home page as it follows from the reports and runs that are there.
-
-    Raises:
-        NothingStored: If there is neither a report nor a run.
-    """
+    """Return the home page as it follows from the reports and runs that are there."""
     outputs = outputs_root()
-    found, runs = summaries(outputs / "reports"), list(_runs(outputs))
+    found, runs = summaries(outputs / "reports"), list[StoredRun]()
+    for name, run in stored_runs(outputs):
+        if isinstance(run, EvoexpError):
+            runs.append(StoredRun(name, "", "", "", 0, 0, 0, str(run)))
+            continue
+        origin = origin_of(run)
+        experiment, label, budget = (
+            str(origin[key] or "") for key in ("experiment", "label", "budget")
+        )
+        counts = len(run.completed()), run.num_planned(), len(run.failed())
+        runs.append(StoredRun(name, experiment, label, budget, *counts))
     if not found and not runs:
         raise NothingStored(
             f"site: nothing stored in {outputs}; try: evoexp run experiment=rana_planar"
@@ -75,34 +80,18 @@ def home_files() -> ReportFiles:
 
 
 def papers() -> list[Paper]:
-    """Return the papers that packages register claims of, the oldest first."""
-    found = [_paper(name) for name in names(CLAIMS)]
+    """Return the papers that packages register claims of, the oldest first.
+
+    The title of a paper is the first sentence of its package.
+    """
+    found = []
+    for name in names(CLAIMS):
+        registration = registered(CLAIMS, name)
+        assert registration is not None
+        rules = registered_rules(registration).values()
+        module = importlib.import_module(registration.module)
+        text = importlib.import_module(module.__package__ or module.__name__).__doc__ or name
+        title, _, subtitle = text.strip().partition("\n")[0].rstrip(".").partition(": ")
+        claims = Counter(experiment for rule in rules for experiment in rule.experiments)
+        found.append(Paper(name, title, subtitle, tuple(options("experiment")), claims))
     return sorted(found, key=lambda paper: (paper.title[-4:], paper.title))
-
-
-def _paper(name: str) -> Paper:
-    """Return a paper; its title is the first sentence of its package."""
-    registration = registered(CLAIMS, name)
-    assert registration is not None
-    rules = registered_rules(registration)
-    module = importlib.import_module(registration.module)
-    text = importlib.import_module(module.__package__ or module.__name__).__doc__ or name
-    title, _, subtitle = text.strip().partition("\n")[0].rstrip(".").partition(": ")
-    claims: dict[str, int] = {}
-    for rule in rules.values():
-        for experiment in rule.experiments:
-            claims[experiment] = claims.get(experiment, 0) + 1
-    return Paper(name, title, subtitle, tuple(options("experiment")), claims)
-
-
-def _runs(outputs: Path) -> Iterator[StoredRun]:
-    for name, run in stored_runs(outputs):
-        if isinstance(run, EvoexpError):
-            yield StoredRun(name, "", "", "", 0, 0, 0, str(run))
-            continue
-        origin = origin_of(run)
-        experiment, label, budget = (
-            str(origin[key] or "") for key in ("experiment", "label", "budget")
-        )
-        done, failed = len(run.completed()), len(run.failed())
-        yield StoredRun(name, experiment, label, budget, done, run.num_planned(), failed)

@@ -1,5 +1,6 @@
 """Stored runs as commands name them: by a prefix of a hash."""
 
+import itertools
 from pathlib import Path
 
 from evoexp import shipped
@@ -24,13 +25,7 @@ def stored_runs(outputs: Path) -> list[tuple[str, RunDirectory | EvoexpError]]:
 
 
 def stored_run(prefix: str) -> RunDirectory:
-    """Return the stored run whose hash begins with a prefix.
-
-    Raises:
-        NothingStored: If it is that of a shipped condition which was not run here.
-        UnknownHash: If there is none; lists those that there are.
-        AmbiguousHash: If there are several.
-    """
+    """Return the stored run whose hash begins with a prefix; refuse any other as one line."""
     run = stored_or_shipped(prefix)
     if isinstance(run, RunDirectory):
         return run
@@ -38,28 +33,35 @@ def stored_run(prefix: str) -> RunDirectory:
 
 
 def stored_or_shipped(prefix: str) -> RunDirectory | Shipped:
-    """Return the stored run, or else the shipped condition, whose hash begins with a prefix.
-
-    Raises:
-        UnknownHash: If there is neither; lists the stored runs.
-        AmbiguousHash: If there are several.
-    """
+    """Return the stored run, or else the shipped condition, whose hash begins with a prefix."""
     try:
         return resolve(outputs_root(), prefix)
     except UnknownHash as error:
         rows = shipped.find(prefix)
-        if len(rows) > 1:
+        if len(rows) == 1:
+            return rows[0]
+        if rows:
             raise AmbiguousHash(prefix, [row.condition_id[:12] for row in rows]) from None
-        if not rows:
-            if prefix in options("experiment"):
-                hint = f"did you mean 'experiment={prefix}'?"
-                raise UnknownHash(f"{error}; {hint}") from None
-            names = run_names(outputs_root())
-            more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
-            stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
-            hint = f"no shipped condition either (stored: {stored}; see: evoexp list)"
-            raise UnknownHash(f"{error}; {hint}") from None
-        return rows[0]
+        names = run_names(outputs_root())
+        more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+        stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
+        hint = f"no shipped condition either (stored: {stored}; see: evoexp list)"
+        if prefix in options("experiment"):
+            hint = f"did you mean 'experiment={prefix}'?"
+        raise UnknownHash(f"{error}; {hint}") from None
+
+
+def finished_replicate(run: RunDirectory, replicate: int) -> int:
+    """Return a replicate of a run; refuse one that is not finished, and list those that are."""
+    done, spans = sorted(run.completed()), list[str]()
+    if replicate in done:
+        return replicate
+    # three and more in a row as one span: 0–1999
+    for _, group in itertools.groupby(enumerate(done), lambda pair: pair[1] - pair[0]):
+        row = [number for _, number in group]
+        spans += [f"{row[0]}–{row[-1]}"] if len(row) > 2 else map(str, row)
+    there = ", ".join(spans) or "none"
+    raise NothingStored(f"run {run.hash12}: no finished replicate {replicate} (finished: {there})")
 
 
 def shipped_experiment(row: Shipped) -> Experiment:

@@ -11,14 +11,8 @@ from rich.table import Table
 
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
-from evoexp.commands.console import (
-    hash_column,
-    new_table,
-    plain_console,
-    print_json,
-    right,
-    say,
-)
+from evoexp.commands.arguments import add_json_argument
+from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
 from evoexp.commands.stored_runs import stored_run
 from evoexp.store.identity import CONFIG
 from evoexp.store.integrity import LogCheck, RunCheck, check_log, check_rows, check_run
@@ -52,17 +46,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HASH",
         help="any unique prefixes of runs' hashes; by default every stored run",
     )
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help=f"print JSON: a list of all runs that were checked ({', '.join(RUN_KEYS)})",
-    )
+    add_json_argument(parser, f"a list of all runs that were checked ({', '.join(RUN_KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Check; exit code 1 if anything is damaged. Nothing is written."""
     outputs = outputs_root()
-    names = [_name(outputs, prefix) for prefix in arguments.hashes] or run_names(outputs)
+    names: list[str] = []
+    for prefix in arguments.hashes:  # whatever is damaged in the run
+        own = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
+        names += own if len(own) == 1 else [stored_run(prefix).hash12]
+    names = names or run_names(outputs)
     runs = [check_run(outputs, name) for name in dict.fromkeys(names)]
     with plain_console().status("checking logs"):
         found = [_checked(run, logs) for run, logs in zip(runs, _all_logs(runs), strict=True)]
@@ -86,12 +80,6 @@ def main(arguments: argparse.Namespace) -> int:
     said = found_in if damaged else "all is well"
     say(f"{len(found)} runs, {logs} logs: {said}")
     return 1 if damaged else 0
-
-
-def _name(outputs: Path, prefix: str) -> str:
-    """Return the name of the run directory that a prefix names, whatever is damaged in it."""
-    names = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
-    return names[0] if len(names) == 1 else stored_run(prefix).hash12
 
 
 def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:

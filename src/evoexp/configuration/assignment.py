@@ -6,6 +6,7 @@ component decides whether it has such a setting.
 """
 
 import contextlib
+import copy
 import difflib
 from typing import Any
 
@@ -24,41 +25,33 @@ from evoexp.registry import component_class
 from evoexp.validation import TARGET
 
 
-def assign_all(config: dict[str, Any], overrides: Choice) -> None:
-    """Apply overrides in a fixed order, whatever the order in which they were typed.
+def assigned(config: dict[str, Any], overrides: Choice) -> dict[str, Any]:
+    """Return a copy with overrides of settings applied, whatever the order of typing.
 
     Shorter paths come before longer ones that begin with them, deletions come last and from behind.
-
-    Args:
-        config: Changed in place.
-        overrides: By dotted path, each with one value; none is a group.
-
-    Raises:
-        SettingError: If a path leads nowhere, or a value cannot be added or deleted there.
     """
-    by_path = sorted(overrides.values(), key=lambda override: _parts(override.key))
+    config = copy.deepcopy(config)
+    settings = [override for key, override in overrides.items() if key not in groups()]
+    by_path = sorted(settings, key=lambda override: _parts(override.key))
     for override in by_path:
         if override.prefix != DELETE:
             _assign(config, override)
     for override in reversed(by_path):
         if override.prefix == DELETE:
             _delete(config, override)
+    return config
 
 
 def known_instead(config: dict[str, Any], override: Override) -> list[str] | None:
     """Return the settings of a component that lacks an overridden one; None if it has that one.
 
-    A component that reads files, and all that is no component, is not looked into: whether there is
-    such a setting is checked with its value.
-
-    Returns:
-        None if the override concerns this configuration; no names if no option of the override's
-        group is chosen.
+    No names are returned if no option of the override's group is chosen. A component that reads
+    files, and all that is no component, is not looked into: a setting there is checked with its
+    value.
     """
     root, *parts = override.key.split(".")
-    if root in NOT_IDENTITY or root not in groups() or not parts:
-        return None
-    if override.prefix in (ADD, FORCE):  # it adds what there is not
+    adds = override.prefix in (ADD, FORCE)
+    if root in NOT_IDENTITY or root not in groups() or not parts or adds:
         return None
     node = config.get(root)
     if node is None:
@@ -81,56 +74,52 @@ def _parts(key: str) -> list[tuple[int, str]]:
 
 
 def _assign(config: dict[str, Any], override: Override) -> None:
-    *parents, last = override.key.split(".")
-    node: Any = config
-    for k, part in enumerate(parents):
-        inner = _child(node, override, k)
-        if inner is None:
-            inner = node[part] = {}  # whether there is such a setting is checked with its value
-        node = inner
-    present = _child(node, override, len(parents))
+    node, last, present = _place(config, override)
     value = override.values[0].data
     if isinstance(present, dict) and isinstance(value, dict):
         _merge(present, value)
     elif present is not None and override.prefix == ADD:
         raise SettingError(override.key, "given without +, it is there already", override.typed)
-    elif isinstance(node, list) and int(last) == len(node):
+    elif isinstance(node, list) and last == len(node):
         node.append(value)
-    elif isinstance(node, list):
-        node[int(last)] = value
     else:
         node[last] = value
 
 
 def _delete(config: dict[str, Any], override: Override) -> None:
-    *parents, last = override.key.split(".")
-    node: Any = config
-    for k in range(len(parents)):
-        node = _child(node, override, k)
-        if node is None:
-            break
-    if node is None or (isinstance(node, dict) and last not in node):
+    node, last, present = _place(config, override)
+    if isinstance(node, dict) and last not in node:
         raise SettingError(override.key, "a setting that is there, to be deleted", override.text)
-    present = _child(node, override, len(parents))
     if override.values and override.values[0].data != present:
         raise SettingError(override.key, f"{present!r}, to be deleted by ~", override.typed)
-    del node[int(last) if isinstance(node, list) else last]
+    del node[last]
+
+
+def _place(config: dict[str, Any], override: Override) -> tuple[Any, Any, Any]:
+    """Return the list or mapping of an overridden setting, its index or key, its present value."""
+    node: Any = config
+    *parents, last = override.key.split(".")
+    for depth, part in enumerate(parents):
+        inner = _child(node, override, depth)
+        if inner is None:  # whether there is such a setting is checked with its value
+            inner = node[int(part) if isinstance(node, list) else part] = {}
+        node = inner
+    present = _child(node, override, len(parents))
+    return node, int(last) if isinstance(node, list) else last, present
 
 
 def _child(node: Any, override: Override, depth: int) -> Any:
-    """Return the value one step down a path; None where a mapping has no such key.
-
-    Args:
-        node: Where the first `depth` parts of the path lead.
-        override: Gives the path, and whether a list may grow.
-        depth: Number of the step, from 0.
-    """
+    """Return the value one step down a path, `depth` parts deep; None if there is no such key."""
     parts = override.key.split(".")
     part, field = parts[depth], ".".join(parts[: depth + 1])
     if isinstance(node, list):
         grows = depth == len(parts) - 1 and override.prefix in (ADD, FORCE)
         if not part.isdecimal() or int(part) >= len(node) + grows:
-            raise SettingError(field, _index(len(node), field.rpartition(".")[0]), part)
+            above, length = field.rpartition(".")[0], len(node)
+            one = "the index 0" if length == 1 else f"an index from 0 to {length - 1}"
+            must = f"{one} (+{above}.{length}=… adds one)"
+            empty = f"added with +{above}.0: the list is empty"
+            raise SettingError(field, must if node else empty, part)
         return node[int(part)] if int(part) < len(node) else None
     if not isinstance(node, dict):
         above = ".".join(parts[:depth])
@@ -142,29 +131,12 @@ def _child(node: Any, override: Override, depth: int) -> Any:
     if depth == 0 and part not in node and not override.prefix:
         if part in groups():
             raise SettingError(part, f"chosen: {', '.join(options(part))}", None)
-        raise UnknownSetting(part, [*groups(), *SCALARS, *_in_groups(part, node)])
+        # the setting of a group that was perhaps meant by a name given without its group
+        named = {key: f"{group}.{key}" for group in groups() for key in node.get(group) or ()}
+        near = difflib.get_close_matches(part, named.keys() - {TARGET}, n=1, cutoff=0.8)
+        meant = [] if nearest(part, node) else [named[key] for key in near]
+        raise UnknownSetting(part, [*groups(), *SCALARS, *meant])
     return node.get(part)
-
-
-def _in_groups(name: str, config: dict[str, Any]) -> list[str]:
-    """Return the setting of a group that was perhaps meant by a name given without its group."""
-    if nearest(name, config):
-        return []
-    settings = {
-        key: f"{group}.{key}"
-        for group, node in config.items()
-        if isinstance(node, dict)
-        for key in node
-        if key != TARGET
-    }
-    return [settings[near] for near in difflib.get_close_matches(name, settings, n=1, cutoff=0.8)]
-
-
-def _index(length: int, above: str) -> str:
-    if not length:
-        return f"added with +{above}.0: the list is empty"
-    more = f" (+{above}.{length}=… adds one)"
-    return f"an index from 0 to {length - 1}{more}" if length > 1 else f"the index 0{more}"
 
 
 def _merge(present: dict[str, Any], value: dict[str, Any]) -> None:

@@ -1,24 +1,23 @@
 """Building: a composed configuration, as plain data, checked and made into typed settings."""
 
-from typing import Any, TypeVar
-
-from pydantic import ValidationError
+from typing import Any
 
 from evoexp.condition import PARTS, Condition, read_files
 from evoexp.configuration.experiment import Budget
 from evoexp.configuration.interpolations import fill_in
-from evoexp.configuration.named_states import with_named_states
 from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
-from evoexp.configuration.planning_groups import with_planning_group, with_shared_packages
 from evoexp.configuration.refusals import chosen
+from evoexp.configuration.robots_of_tasks import (
+    with_named_states,
+    with_planning_group,
+    with_shared_packages,
+)
 from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, UnknownSetting
 from evoexp.registry import component_class
-from evoexp.validation import TARGET, Settings, build, settings_error
+from evoexp.validation import TARGET, AnySettings, build, construct
 
 MOST_REPLICATES = 1_000_000  # of one condition, each of which is a file
-
-AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
 def condition_of(config: dict[str, Any], budget: Budget) -> tuple[Condition, bool]:
@@ -36,15 +35,9 @@ def condition_of(config: dict[str, Any], budget: Budget) -> tuple[Condition, boo
 
 
 def build_condition(config: dict[str, Any], planner: str) -> Condition:
-    """Build the condition of a configuration.
+    """Build the condition of a configuration whose interpolations are filled in.
 
-    Args:
-        config: All groups, interpolations filled in.
-        planner: The planner's settings as text, interpolations as they are written: they tell
-            which groups the planner takes in.
-
-    Raises:
-        EvoexpError: For a value that cannot be, or parts that do not go together.
+    The planner's settings as text, with interpolations, tell which groups the planner takes in.
     """
     beside = [folder.path / "scenario" for folder in folders()]  # where files lie
     read = read_files(with_shared_packages(config), beside, with_planning_group)
@@ -88,10 +81,4 @@ def build_settings(kind: type[AnySettings], config: dict[str, Any], group: str) 
     """Build the settings of a group that is no component."""
     if TARGET in config:
         raise UnknownSetting(f"{group}.{TARGET}", kind.model_fields)
-    values = build(config, component_class, group)
-    try:
-        return kind(**values)
-    except ValidationError as error:
-        raise settings_error(kind, error, values, group) from None
-    except SettingError as error:
-        raise SettingError(f"{group}.{error.field}", error.must, error.was, error.hint) from None
+    return construct(kind, build(config, component_class, group), group)

@@ -5,8 +5,9 @@ found here, before anything is computed, and said in one line. Hydra reads overr
 the chosen options; settings are assigned to copies of these (see `assignment`).
 """
 
-import copy
+import contextlib
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,12 +24,11 @@ from omegaconf.errors import OmegaConfBaseException
 
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.configuration.assignment import assign_all
+from evoexp.configuration.assignment import assigned
 from evoexp.configuration.building import build_settings, planned_replicates
-from evoexp.configuration.conditions import Builder, Built, Composed, Entry, concerning
-from evoexp.configuration.experiment import Budget, Experiment, Labelled
+from evoexp.configuration.conditions import Builder, Composed, Entry, concerning
+from evoexp.configuration.experiment import Budget, Built, Experiment, Labelled
 from evoexp.configuration.interpolations import fill_in
-from evoexp.configuration.option_files import check_file
 from evoexp.configuration.overrides import (
     ADD,
     DELETE,
@@ -39,14 +39,13 @@ from evoexp.configuration.overrides import (
     Override,
     Value,
     collect,
-    dotted,
     expand_entry,
     refuse_sweeps,
     single_values,
     sweep,
 )
 from evoexp.configuration.problem_folders import FOLDER
-from evoexp.configuration.refusals import uncomposed, unparsed, without_header
+from evoexp.configuration.refusals import check_file, uncomposed, unparsed, without_header
 from evoexp.configuration.search_path import EXPERIMENT, find, folders, groups, is_file
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.report_settings import ReportSettings
@@ -76,8 +75,7 @@ def expand(
     """Expand overrides into experiments, one per `experiment=` swept over.
 
     Args:
-        overrides: As typed: `experiment=rana_planar ga.population_size=20`; their order does not
-            matter.
+        overrides: As typed, in any order: `experiment=rana_planar ga.population_size=20`.
         multirun: Whether values with commas are swept over.
         only: Labels to keep; empty keeps all.
 
@@ -96,13 +94,14 @@ def expand(
 
 def parse(text: str) -> Override:
     """Read one override."""
-    key, _, typed = text.partition("=")
+    key, equals, typed = text.partition("=")
     if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
         return Override("", key, (Value(typed, typed),), False, text)
     parser = OverridesParser.create()
     try:
-        found = parser.parse_override(dotted(text))
-        key, texts = found.key_or_group, [text.partition("=")[2]]
+        indexed = re.sub(r"\[(\d+)\]", r".\1", key)  # `a[0]` is `a.0`
+        found = parser.parse_override(f"{indexed}{equals}{typed}")
+        key, texts = found.key_or_group, [typed]
         if not key or found.package is not None:
             raise SettingError("override", "key=value", text)
         if found.is_sweep_override():
@@ -128,16 +127,14 @@ def _with_text_keys(value: Any) -> Any:
 class Composer:
     """Composes configurations of one experiment; Hydra composes every choice of options once.
 
-    Hydra applies settings, too, but takes a tenth of a second and more each time, and reaches no
-    setting in a list.
+    Hydra could apply settings, too, but takes a tenth of a second, and reaches none in a list.
     """
 
     def __init__(self, root: Path, file: Option | None) -> None:
-        """Begin with the shipped root configuration.
+        """Begin with the shipped root configuration, in an empty folder `root`.
 
-        Args:
-            root: An empty folder. It comes first in the search path and holds, beside the root, an
-                experiment that is given as a file: of a user's folders only the options count.
+        It comes first in the search path and holds, beside the root configuration, an experiment
+        that is given as a file: of a user's folders only the options count.
         """
         self.root, self.file = root, file
         self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options
@@ -149,24 +146,21 @@ class Composer:
                     check_file(path)
         self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
 
-    def __call__(self, overrides: Choice) -> Composed:
-        """Return the options that overrides choose, with the settings that overrides change."""
-        base = self.chosen(overrides)
-        config = copy.deepcopy(base.config)
-        assign_all(config, {key: each for key, each in overrides.items() if key not in groups()})
-        return Composed(config, base.options)
-
     def chosen(self, overrides: Choice) -> Composed:
         """Return the options that overrides choose, with the settings that these have."""
         file = self.file
         choices = {key: overrides[key] for key in sorted(overrides) if key in groups()}
-        words = [_choosing(override) for override in choices.values()]
         names = {group: override.option() for group, override in choices.items()}
+        words = []
+        for group, override in choices.items():
+            option = names[group]
+            if option is None and override.prefix == DELETE and override.values:
+                option = str(override.values[0].data)  # only that option is to be deleted
+            chosen = "" if option is None else f"={_quoted(option)}"
+            words.append(f"{'~' if names[group] is None else ''}{group}{chosen}")
         if file is not None:
             names[EXPERIMENT] = file.origin if is_file(file.origin) else file.name
-        if (key := frozenset(words)) not in self._known and (joined := self._joined(key)):
-            self._known[key] = joined
-        if key not in self._known:
+        if (key := frozenset(words)) not in self._known:
             if file is not None and is_file(file.origin):
                 check_file(Path(file.path))
                 shutil.copy(file.path, self.root / EXPERIMENT / f"{file.name}.yaml")
@@ -175,37 +169,6 @@ class Composer:
             except _COMPOSER as error:
                 raise uncomposed(error, names, file) from None
         return self._known[key]
-
-    def _joined(self, words: frozenset[str]) -> Composed | None:
-        """Join known compositions of some of the words each, if each changed other groups.
-
-        None where words are left over, where two compositions changed the same group, and where a
-        user's option is taken: only of shipped ones it is known that none names another's choice.
-        """
-        pieces: list[Composed] = []
-        rest = words
-        for known in sorted(self._known, key=len, reverse=True):
-            if known and known <= rest:
-                pieces.append(self._known[known])
-                rest -= known
-        plain = self._known.get(frozenset())
-        if plain is None or rest:
-            return None
-        config, options = dict(plain.config), {each.group: each for each in plain.options}
-        changed = set[str]()
-        for piece in [plain, *pieces]:
-            if any(each.origin != shipped.ORIGIN for each in piece.options):
-                return None
-            taken = {each.group: each for each in piece.options}
-            changes = _differing(plain.config, piece.config)
-            choices = _differing({each.group: each for each in plain.options}, taken)
-            if (changes | choices) & changed:
-                return None
-            changed |= changes | choices
-            config = _replaced(config, piece.config, changes)
-            options = _replaced(options, taken, choices)
-        ordered = dict.fromkeys([EXPERIMENT, *groups()])
-        return Composed(config, tuple(options[group] for group in ordered if group in options))
 
     def by_hydra(self, words: list[str]) -> Composed:
         """Have Hydra compose options, chosen by words of its own grammar."""
@@ -227,27 +190,6 @@ class Composer:
         named = ((group, taken.get(group)) for group in groups() if group != EXPERIMENT)
         options = tuple(find(group, name) for group, name in named if name)
         return Composed(config, options if self.file is None else (self.file, *options))
-
-
-def _differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> set[str]:
-    """Return the keys that only one of two mappings has, or with another value."""
-    both = one.keys() & other.keys()
-    return (one.keys() ^ other.keys()) | {key for key in both if one[key] != other[key]}
-
-
-def _replaced(values: dict[str, Any], other: Mapping[str, Any], keys: set[str]) -> dict[str, Any]:
-    """Return values with those of another mapping for some keys; a key it lacks is left out."""
-    rest = {key: value for key, value in values.items() if key not in keys}
-    return rest | {key: other[key] for key in keys & other.keys()}
-
-
-def _choosing(override: Override) -> str:
-    """Return the override of a group as Hydra takes it."""
-    if (name := override.option()) is not None:
-        return f"{override.key}={_quoted(name)}"
-    if override.prefix == DELETE and override.values:  # only that option is to be deleted
-        return f"~{override.key}={_quoted(str(override.values[0].data))}"
-    return f"~{override.key}"
 
 
 def _quoted(text: str) -> str:
@@ -274,15 +216,16 @@ def _expand_one(file: Option | None, overrides: Choice, only: Sequence[str]) -> 
 
 
 def _builder(compose: Composer, overrides: Choice) -> tuple[dict[str, Any], Builder]:
-    """Return the settings that all conditions share, and who builds the conditions."""
+    """Return the settings that all conditions share, and the builder of the conditions."""
     first = {key: each for key, each in next(sweep(overrides)).items() if key != FOLDER}
-    config = compose(concerning(first, compose.chosen(first).config)).config
+    shared_choice = concerning(first, compose.chosen(first).config)
+    config = assigned(compose.chosen(shared_choice).config, shared_choice)
     # settings outside the conditions may be taken from those of a condition
     shared = {name: config[name] for name in NOT_IDENTITY if name in config}
     base = fill_in(shared, config)
     budget = build_settings(Budget, base["budget"], "budget")
     name = compose.file.name if compose.file else "custom"
-    return base, Builder(name, list(_entries(config["conditions"])), compose, budget)
+    return base, Builder(name, list(_entries(config["conditions"])), compose.chosen, budget)
 
 
 def _is_changed(
@@ -292,12 +235,10 @@ def _is_changed(
     plain = {key: each for key, each in overrides.items() if key in NOT_IDENTITY}
     if compose.file is None or (len(plain) == len(overrides) and not only):
         return compose.file is None
-    try:
+    with contextlib.suppress(EvoexpError):  # a file that the experiment names need not be there
         own = _builder(compose, plain)[1].build_all(plain, ())
-    except EvoexpError:  # a file that the experiment names need not be there
-        return True
-    identities = [[(k, each.condition.id) for k, each in of.items()] for of in (built, own)]
-    return identities[0] != identities[1]
+        return [*own] != [*built] or any(own[k].condition.id != built[k].condition.id for k in own)
+    return True
 
 
 def _entries(conditions: Any) -> Iterator[Entry]:

@@ -5,15 +5,14 @@ setting; one that concerns none is refused.
 """
 
 import contextlib
-from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
-from evoexp.condition import Condition
-from evoexp.configuration.assignment import known_instead
+from evoexp.configuration.assignment import assigned, known_instead
 from evoexp.configuration.building import condition_of
-from evoexp.configuration.experiment import Budget
+from evoexp.configuration.experiment import Budget, Built
 from evoexp.configuration.interpolations import MARK
-from evoexp.configuration.labels import Crossed, Group, labels_of, refuse_equal_labels, rejoined
+from evoexp.configuration.labels import Crossed, labels_of, refuse_equal_labels, rejoined
 from evoexp.configuration.overrides import (
     NOT_IDENTITY,
     PLANNER_PARTS,
@@ -37,33 +36,19 @@ class Composed(NamedTuple):
     options: tuple[Option, ...]  # the option taken of each group
 
 
-class Built(NamedTuple):
-    """A condition, the options that it was taken from, and whether the budget capped it."""
-
-    condition: Condition
-    options: tuple[Option, ...]
-    is_capped: bool
-
-
-class Composes(Protocol):
-    """Composes configurations of one experiment."""
-
-    def __call__(self, overrides: Choice) -> Composed:
-        """Return the options that overrides choose, with the settings that overrides change."""
-
-    def chosen(self, overrides: Choice) -> Composed:
-        """Return the options that overrides choose, with the settings that these have."""
-
-
 class Builder:
     """Builds the conditions of an experiment at one budget, each choice of overrides once."""
 
     def __init__(
-        self, name: str, entries: Sequence[Entry], compose: Composes, budget: Budget
+        self,
+        name: str,
+        entries: Sequence[Entry],
+        composed: Callable[[Choice], Composed],
+        budget: Budget,
     ) -> None:
-        """Keep the experiment, and who composes it."""
+        """Keep the experiment, and the function that composes the options of a choice."""
         self.name, self.budget = name, budget
-        self._entries, self._compose = entries, compose
+        self._entries, self._composed = entries, composed
         self._known: dict[frozenset[str], Built] = {}
 
     def build_all(self, overrides: Choice, only: Sequence[str]) -> dict[str, Built]:
@@ -73,10 +58,6 @@ class Builder:
 
         Args:
             only: Labels to keep; empty keeps all.
-
-        Raises:
-            EvoexpError: For a condition that cannot be built, an override that concerns none, or an
-                unknown label of `only`.
         """
         rows = list(self._crossed(overrides))
         refuse_equal_labels(rows)
@@ -91,34 +72,31 @@ class Builder:
             except EvoexpError:
                 if row in named:
                     raise
-        built = [self._built(same[0].choice) for same in members.values()]
-        groups = [
-            Group(same, each.condition.planner.component, each.is_capped)
-            for same, each in zip(members.values(), built, strict=True)
-        ]
-        labels = labels_of(groups, self._is_same)
+        groups = [(same, self._built(same[0].choice)) for same in members.values()]
+
+        def is_same(row: Crossed, choice: Choice) -> bool:
+            """Return whether another choice gives the same condition."""
+            with contextlib.suppress(EvoexpError):
+                return self._built(choice).condition.id == self._built(row.choice).condition.id
+            return False
+
+        labels = labels_of(groups, is_same)
         picked = rejoined(only, known := {*labels, *names})
         if unknown := [label for label in picked if label not in known]:
             raise UnknownOption("--only", unknown[0], known)
         return {
-            label: each
-            for label, group, each in zip(labels, groups, built, strict=True)
-            if not picked or label in picked or any(row.is_named(picked) for row in group.members)
+            label: built
+            for label, (same, built) in zip(labels, groups, strict=True)
+            if not picked or label in picked or any(row.is_named(picked) for row in same)
         }
 
     def _built(self, choice: Choice) -> Built:
         key = frozenset(each.word for each in choice.values() if each.root not in NOT_IDENTITY)
         if key not in self._known:
-            composed = self._compose(choice)
-            condition, is_capped = condition_of(composed.config, self.budget)
-            self._known[key] = Built(condition, composed.options, is_capped)
+            config, options = self._composed(choice)
+            condition, is_capped = condition_of(assigned(config, choice), self.budget)
+            self._known[key] = Built(condition, options, is_capped)
         return self._known[key]
-
-    def _is_same(self, row: Crossed, choice: Choice) -> bool:
-        """Whether another choice gives the same condition."""
-        with contextlib.suppress(EvoexpError):
-            return self._built(choice).condition.id == self._built(row.choice).condition.id
-        return False
 
     def _crossed(self, overrides: Choice) -> Iterator[Crossed]:
         """Yield the entries with each combination of the values that overrides have."""
@@ -136,18 +114,18 @@ class Builder:
 
     def _concerning(self, choice: Choice, own: Choice) -> Choice:
         """Return the overrides of the command line that concern a condition."""
-        planner = str(self._compose.chosen({**own, **choice}).config.get("planner"))
+        planner = str(self._composed({**own, **choice}).config.get("planner"))
         parts = [key for key in choice if key in PLANNER_PARTS and choice[key].option()]
         not_taken = {key for key in parts if f"{MARK}{key}" not in planner}
         choice = {key: each for key, each in choice.items() if key not in not_taken}
-        return concerning(choice, self._compose.chosen({**own, **choice}).config)
+        return concerning(choice, self._composed({**own, **choice}).config)
 
     def _refuse_unused(self, overrides: Choice, rows: Sequence[Crossed]) -> None:
         """Refuse an override of the command line that concerns none of the conditions."""
         for key, override in overrides.items():
             if any(key in row.typed for row in rows):
                 continue
-            configs = [self._compose.chosen(row.choice).config for row in rows]
+            configs = [self._composed(row.choice).config for row in rows]
             known = {name for each in configs for name in known_instead(each, override) or ()}
             if known:
                 raise UnknownSetting(key, sorted(known))

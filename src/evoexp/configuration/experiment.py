@@ -40,6 +40,14 @@ class Labelled(NamedTuple):
     condition: Condition
 
 
+class Built(NamedTuple):
+    """A condition, the options that it was taken from, and whether the budget capped it."""
+
+    condition: Condition
+    options: tuple[Option, ...]
+    is_capped: bool
+
+
 class Experiment(NamedTuple):
     """The conditions that one call asks for, and how they are run and reported."""
 
@@ -74,9 +82,15 @@ class Experiment(NamedTuple):
             return PAPER
         return f"{PAPER}, capped" if self.budget == PAPER else self.budget
 
-    def option_names(self, label: str) -> dict[str, dict[str, str]]:
-        """Return group → name and origin of the option taken, as a run's manifest records them."""
+    def origin(self, label: str, command: str) -> dict[str, Any]:
+        """Return a condition's origin for the manifest of its run; no part of its identity.
+
+        Options are recorded as group → name and origin of the option taken.
+        """
         return {
-            option.group: {"name": option.name, "origin": option.origin}
-            for option in self.options[label]
+            "experiment": self.name,
+            "budget": self.budget_of(label),
+            "label": label,
+            "options": {o.group: {"name": o.name, "origin": o.origin} for o in self.options[label]},
+            "command": command,
         }

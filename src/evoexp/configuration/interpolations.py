@@ -20,11 +20,7 @@ _MAX_DEPTH = 100  # of settings taken from settings; deeper ones go round in cir
 
 
 def fill_in(values: Mapping[str, Any], config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings with others in the place of interpolations.
-
-    Raises:
-        SettingError: If an interpolation is more than the name of a setting that exists.
-    """
+    """Return settings with others in the place of interpolations."""
     return {key: _filled(value, config, str(key), _MAX_DEPTH) for key, value in values.items()}
 
 

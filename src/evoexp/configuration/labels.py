@@ -10,13 +10,13 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from evoexp.configuration.experiment import Built
 from evoexp.configuration.overrides import (
     AROUND,
     DELETE,
     JOIN,
     NOT_IDENTITY,
     Choice,
-    Override,
     short_names,
 )
 from evoexp.errors import SettingError
@@ -47,14 +47,7 @@ class Crossed(NamedTuple):
         return not {self.entry, self.label}.isdisjoint(labels)
 
 
-class Group(NamedTuple):
-    """All combinations that are one condition."""
-
-    members: Sequence[Crossed]  # in the order of the experiment
-    planner: str  # name of the component of its planner
-    is_capped: bool  # whether the budget capped it
-
-
+Group = tuple[Sequence[Crossed], Built]  # all combinations, in order, that are one condition
 Holds = Callable[[Crossed, Choice], bool]  # whether a condition is the same with another choice
 
 
@@ -70,12 +63,7 @@ def refuse_equal_labels(rows: Iterable[Crossed]) -> None:
 
 
 def rejoined(parts: Sequence[str], labels: Container[str]) -> list[str]:
-    """Join the parts of labels that were split at commas which belong to them.
-
-    Args:
-        parts: Labels, or parts of them: the longest label wins.
-        labels: All that there are.
-    """
+    """Join the parts of labels that were split at commas of theirs; the longest label wins."""
     found, start = list[str](), 0
     while start < len(parts):
         ends = range(len(parts), start, -1)
@@ -86,38 +74,28 @@ def rejoined(parts: Sequence[str], labels: Container[str]) -> list[str]:
 
 
 def labels_of(groups: Sequence[Group], holds: Holds) -> list[str]:
-    """Return the label of each condition.
-
-    Args:
-        groups: One per condition, in the order of the experiment.
-        holds: Tells whether a label of the file still is of the condition.
-
-    Raises:
-        SettingError: If two conditions would have the same one.
-    """
-    varied = _varied([member for group in groups for member in group.members])
-    labels = [_label(group, varied, holds, group.planner) for group in groups]
+    """Return the label of each condition; refuse one that two conditions would have."""
+    # keys in which the entries of the experiment's file differ
+    rows = [member for members, _ in groups for member in members]
+    varied = set[str]()
+    for key in {key for row in rows for key in row.own}:
+        if len({row.own[key].word if key in row.own else None for row in rows}) > 1:
+            varied.add(key)
+    planners = [built.condition.planner.component for _, built in groups]
+    labels = [_label(*each, varied, holds) for each in zip(groups, planners, strict=True)]
     if len(set(labels)) < len(labels):  # planners of one component
-        labels = [_label(group, varied, holds, "") for group in groups]
+        labels = [_label(group, "", varied, holds) for group in groups]
     if twice := [label for label, count in Counter(labels).items() if count > 1]:
         raise SettingError("conditions", "labels that differ", twice[0])
     return labels
 
 
-def _varied(rows: Sequence[Crossed]) -> set[str]:
-    """Return the keys in which the entries of the experiment's file differ."""
-    words: dict[str, set[str | None]] = {}
-    for key in {key for row in rows for key in row.own}:
-        words[key] = {row.own[key].word if key in row.own else None for row in rows}
-    return {key for key, values in words.items() if len(values) > 1}
-
-
-def _label(group: Group, varied: set[str], holds: Holds, planner: str) -> str:
+def _label(group: Group, planner: str, varied: set[str], holds: Holds) -> str:
     """Return the label of a condition; without a planner's name the overrides themselves."""
-    members = group.members
+    members, built = group
     overridden = varied.intersection(*(member.typed for member in members))
     swept = {key for member in members for key in member.swept}
-    if not overridden and group.is_capped and not swept:
+    if not overridden and built.is_capped and not swept:
         return members[0].label  # others differ from it in what the budget caps
     if not overridden:
         return SAME.join(dict.fromkeys(member.label for member in members))
@@ -151,11 +129,8 @@ def _values(member: Crossed, overridden: set[str], planner: str) -> Iterator[str
         yield planner
     keys = sorted(key for key in overridden if not (by_planner and key in PLANNER))
     for key, name in short_names(keys).items():
-        yield _text(name, member.typed[key])
-
-
-def _text(name: str, override: Override) -> str:
-    return f"~{name}" if override.prefix == DELETE else f"{name}={override.values[0].text}"
+        override = member.typed[key]
+        yield f"~{name}" if override.prefix == DELETE else f"{name}={override.values[0].text}"
 
 
 def _without(member: Crossed, varied: set[str]) -> Choice:

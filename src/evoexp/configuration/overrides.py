@@ -75,24 +75,18 @@ def collect(overrides: Iterable[Override]) -> dict[str, Override]:
         known = found.setdefault(override.key, override)
         if known.text != override.text:
             raise SettingError(override.key, "given once", f"{known.text} {override.text}")
-        if override.key in groups():
-            _check_group(override)
-        else:
+        if (group := override.key) not in groups():
             _check_setting(override)
+            continue
+        if override.prefix == DELETE and group not in OPTIONAL:
+            raise SettingError(group, "given", override.text)
+        for each in single_values(override):
+            name = each.option()
+            if name is not None or group not in OPTIONAL:
+                find(group, "null" if name is None else name)
+        if override.prefix in (ADD, FORCE):
+            raise SettingError(group, f"given without {override.prefix}", override.text)
     return found
-
-
-def _check_group(override: Override) -> None:
-    """Refuse an override of a group that chooses no option, or an unknown one."""
-    group = override.key
-    if override.prefix == DELETE and group not in OPTIONAL:
-        raise SettingError(group, "given", override.text)
-    for each in single_values(override):
-        name = each.option()
-        if name is not None or group not in OPTIONAL:
-            find(group, "null" if name is None else name)
-    if override.prefix in (ADD, FORCE):
-        raise SettingError(group, f"given without {override.prefix}", override.text)
 
 
 def _check_setting(override: Override) -> None:
@@ -126,9 +120,8 @@ def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
         if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
             must = "one value: a sweep is over what changes a condition"
             raise SettingError(key, must, override.typed)
-        if key != EXPERIMENT and len({value.text for value in override.values}) < len(
-            override.values
-        ):
+        texts = [value.text for value in override.values]
+        if key != EXPERIMENT and len(set(texts)) < len(texts):
             raise SettingError(key, "values that differ", override.typed)
 
 
@@ -163,13 +156,9 @@ def short_names(keys: Sequence[str]) -> dict[str, str]:
 def expand_entry(
     template: str, overrides: Iterable[Override]
 ) -> Iterator[tuple[str, dict[str, Override]]]:
-    """Expand an entry of `conditions`: cross its sweeps and fill their values into its label.
+    """Yield label and overrides of each condition of an entry, whose sweeps are crossed.
 
-    Args:
-        template: Label of the entry, with a `{}` per swept override or none.
-
-    Yields:
-        Label and overrides with one value of each condition.
+    A template of labels has a `{}` per swept override, or none.
     """
     field, parsed = f"conditions.{template}", collect(overrides)
     for key, override in parsed.items():
@@ -187,10 +176,4 @@ def expand_entry(
             yield pieces[0] + "".join(filled), chosen
         else:
             parts = (template, *sweep_texts(parsed, chosen).values())
-            yield JOIN.join(part for part in parts if part), chosen
-
-
-def dotted(text: str) -> str:
-    """Return an override with the list indices of its key as one may type them, `a[0]` as `a.0`."""
-    key, equals, value = text.partition("=")
-    return re.sub(r"\[(\d+)\]", r".\1", key) + equals + value
+            yield JOIN.join(filter(None, parts)), chosen

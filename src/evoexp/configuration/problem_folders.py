@@ -19,11 +19,7 @@ def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
     """Yield label and overrides of every problem of a folder; without one, the overrides as given.
 
     A label is the folder's name and the number, `box_panda 0001`; problems come in the order of the
-    paths of their scenes.
-
-    Raises:
-        SettingError: If the folder holds no problem or too many, a scene has no request, or one is
-            named beside the folder.
+    paths of their scenes. A folder that holds none, too many, or a scene alone is refused.
     """
     if FOLDER not in choice:
         yield "", choice
@@ -31,8 +27,7 @@ def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
     for key in (SCENE, REQUEST):
         if key in choice:
             raise SettingError(key, f"left out beside {FOLDER}", choice[key].text)
-    given = choice[FOLDER]
-    folder = str(given.values[0].data) if given.values else ""
+    folder = "".join(str(value.data) for value in choice[FOLDER].values)
     root = Path(located(folder))
     if "\0" in folder or not root.is_dir():
         raise SettingError(FOLDER, "a folder of problems", folder)
@@ -46,9 +41,8 @@ def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
         request = scene.with_name(f"request{number}.yaml")
         if not request.is_file():
             raise SettingError(FOLDER, f"a folder with {request.name} beside every scene", folder)
-        paths = {SCENE: str(scene), REQUEST: str(request)}
+        paths = ((SCENE, str(scene)), (REQUEST, str(request)))
         files = {
-            key: Override("", key, (Value(path, path),), False, f"{key}={path}")
-            for key, path in paths.items()
+            k: Override("", k, (Value(path, path),), False, f"{k}={path}") for k, path in paths
         }
         yield f"{scene.resolve().parent.name} {number}".strip(), rest | files

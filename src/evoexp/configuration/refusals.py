@@ -1,7 +1,7 @@
 """Refusals: errors of the composer, each turned into one line that names a field and a remedy."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,14 @@ import yaml
 
 from evoexp.configuration.search_path import EXPERIMENT, groups, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption
+from evoexp.input_files import MEGABYTE, read_bounded
 from evoexp.shipped import Option
 
 HEADER = "# @package _global_"  # first line of an experiment file
+# of an option file, no larger, unfolded, than a person would write
+MAX_FILE = MEGABYTE  # the largest shipped option has 9 kB
+MOST_NESTED = 50  # lists and mappings in each other
+MOST_VALUES = 100_000  # once every alias (`*name`) stands for a copy of what it names
 
 
 def chosen(group: str) -> str:
@@ -33,11 +38,7 @@ def unparsed(text: str) -> SettingError:
 def uncomposed(
     error: Exception, choices: Mapping[str, str | None], file: Option | None
 ) -> EvoexpError:
-    """Return the refusal of options that cannot be composed.
-
-    Args:
-        choices: Group → option, as far as the command line and an entry choose.
-    """
+    """Return the refusal of options (by group, as far as they were chosen) that do not compose."""
     text, cause = str(error), error
     while cause.__cause__ is not None and not isinstance(cause, yaml.MarkedYAMLError):
         cause = cause.__cause__  # type: ignore[assignment]
@@ -86,3 +87,44 @@ def _miswritten(file: Option) -> EvoexpError | None:
             if group in groups() and name is not None and str(name) not in options(group):
                 return UnknownOption(group, str(name), options(group))
     return None
+
+
+def check_file(path: Path) -> None:
+    """Refuse an option file that is too large, or that unfolds to too many values.
+
+    Whether it can be composed otherwise is not looked at.
+    """
+    try:
+        content = read_bounded(path, MAX_FILE)
+        unfolded = _num_values(yaml.parse(content, yaml.CSafeLoader))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError("option", f"a file that can be read ({reason})", str(path)) from None
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return  # told by whoever reads it, if anybody does
+    if unfolded > MOST_VALUES:
+        must = f"a file of at most {MOST_VALUES:,} values, aliases unfolded, {MOST_NESTED} deep"
+        raise SettingError("option", must, str(path))
+
+
+def _num_values(events: Iterator[yaml.Event]) -> int:
+    """Return how many values there are, aliases unfolded; very many if they are nested deeply."""
+    sizes: dict[str, int] = {}  # of what has a name
+    total, open_nodes = 0, list[tuple[str | None, int]]()  # (name, values before it)
+    for event in events:
+        if isinstance(event, yaml.AliasEvent):
+            total += sizes.get(event.anchor, MOST_VALUES)  # what is open yet would hold itself
+        elif isinstance(event, yaml.CollectionStartEvent):
+            open_nodes.append((event.anchor, total))
+            if len(open_nodes) > MOST_NESTED:
+                return MOST_VALUES + 1
+            total += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            name, before = open_nodes.pop()
+            if name is not None:
+                sizes[name] = total - before
+        elif isinstance(event, yaml.ScalarEvent):
+            total += 1
+            if event.anchor is not None:
+                sizes[event.anchor] = 1
+    return total

@@ -13,6 +13,7 @@ is the package's own.
 import contextlib
 import functools
 import importlib.util
+import itertools
 import os
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
@@ -40,11 +41,7 @@ class Folder(NamedTuple):
 
 @contextlib.contextmanager
 def searched_first(directories: Iterable[str]) -> Iterator[None]:
-    """Search some folders before all others, for as long as the context lasts.
-
-    Args:
-        directories: As typed after `--config-dir`, the first one to be searched first.
-    """
+    """Search the folders of `--config-dir` before all others, for as long as the context lasts."""
     token = _given.set(tuple(directories))
     try:
         folders()
@@ -54,12 +51,7 @@ def searched_first(directories: Iterable[str]) -> Iterator[None]:
 
 
 def folders() -> list[Folder]:
-    """Return all folders in the order in which they are searched.
-
-    Raises:
-        SettingError: If a folder that was typed is none.
-        RegistrationError: If a package declares a folder that it does not have.
-    """
+    """Return all folders in the order in which they are searched."""
     typed = [(ARGUMENT, directory) for directory in _given.get()]
     variable = os.environ.get(VARIABLE, "").split(os.pathsep)
     found = []
@@ -105,11 +97,7 @@ def options(group: str) -> list[str]:
 
 
 def find(group: str, name: str) -> Option:
-    """Return an option: its file and where it comes from.
-
-    Raises:
-        UnknownOption: If there is none of this name; lists those that there are.
-    """
+    """Return an option: its file and where it comes from."""
     if group == EXPERIMENT and is_file(name):
         if not os.path.isfile(name):
             raise SettingError(EXPERIMENT, "the path of a file, or the name of an experiment", name)
@@ -134,10 +122,7 @@ def description(experiment: str) -> str:
 
     It is the first comment that neither names Hydra's package nor the command that runs the file.
     """
-    for line in Path(find(EXPERIMENT, experiment).path).read_text(encoding="utf-8").splitlines():
-        words = line.removeprefix("#").strip()
-        if not line.startswith("#"):
-            break
-        if not words.startswith(("@package", "evoexp run")):
-            return words
-    return ""
+    text = Path(find(EXPERIMENT, experiment).path).read_text(encoding="utf-8")
+    comments = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    lines = (line.removeprefix("#").strip() for line in comments)
+    return next((line for line in lines if not line.startswith(("@package", "evoexp run"))), "")

@@ -14,7 +14,7 @@ from typing import Any
 import pyarrow as pa
 
 from evoexp.errors import EvoexpError, StoreError
-from evoexp.shipped import labels_by_experiment, rows_by_condition
+from evoexp.shipped import rows_of, shipped
 from evoexp.store.identity import CONFIG, MANIFEST, read_object
 from evoexp.store.run_directory import RunDirectory
 from evoexp.validation import MOST_QUERIES, TARGET
@@ -37,10 +37,10 @@ def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
     notes = {name: manifest.get(name) or None for name in ORIGIN}
     experiment, label = notes["experiment"], notes["label"]
     rows = sorted(
-        rows_by_condition().get(condition_id, ()),
+        rows_of(condition_id),
         key=lambda row: (row.experiment != experiment, row.label != label),
     )
-    labels = labels_by_experiment().get(experiment or "", set())
+    labels = {row.label for row in shipped() if row.experiment == experiment}
     is_named = label is not None and label not in labels
     if rows and (rows[0].experiment == experiment or not is_named):
         return {**{name: getattr(rows[0], name) for name in ORIGIN}, "changed": False}

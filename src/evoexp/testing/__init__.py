@@ -17,10 +17,9 @@ A check that fails raises `ContractBroken`, whose message says what a planner or
 operator must do, and what this one did.
 """
 
-from evoexp.testing.contract import CHECKS, Check, check_planner
+from evoexp.testing.contract import CHECKS, Check, check_planner, conditions
 from evoexp.testing.evolution_record import ContractBroken
 from evoexp.testing.operator_checks import check_operator, crossed, mutated, selected
-from evoexp.testing.small_conditions import conditions
 
 __all__ = [
     "CHECKS",

@@ -7,6 +7,7 @@ Every check takes a condition, runs its replicate 0 (once for all checks) and ra
 from collections.abc import Callable
 
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.testing import protocol_checks as protocol
 from evoexp.testing import record_checks as records
 from evoexp.testing import solution_checks as solutions
@@ -39,11 +40,22 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-def check_planner(condition: Condition) -> None:
-    """Check every obligation of a condition's planner.
+def conditions(*overrides: str, budget: str = "smoke") -> dict[str, Condition]:
+    """Return the conditions of an experiment by their labels.
 
     Args:
-        condition: At a small budget: all populations are kept in memory.
+        overrides: As on the command line: `experiment=my_experiment`, `ga.num_offspring=4`.
+        budget: Name of the budget; `smoke` takes seconds.
+
+    Raises:
+        EvoexpError: If the experiment cannot be run.
+    """
+    experiments = compose.expand([*overrides, f"budget={budget}"])
+    return {label: condition for each in experiments for label, condition in each.conditions}
+
+
+def check_planner(condition: Condition) -> None:
+    """Check every obligation of a condition's planner, at a small budget.
 
     Raises:
         ContractBroken: For the first obligation that the planner does not keep.

@@ -1,5 +1,6 @@
 """Checks of the whole planner: its members, its identity, its randomness."""
 
+import contextlib
 import functools
 import inspect
 import pickle
@@ -18,63 +19,40 @@ from evoexp.validation import Component
 def has_one_population(condition: Condition) -> bool:
     """Return whether individuals can be drawn and judged: not of references and plans of stages."""
     planner, problem = condition.prepare()
-    try:
-        return (
-            not condition.is_reference and planner.sample(problem, condition.rng(0), 1) is not None
-        )
-    except SettingError:  # a planner of several stages refuses
-        return False
+    with contextlib.suppress(SettingError):  # by which a planner of several stages refuses
+        if not condition.is_reference:
+            return planner.sample(problem, condition.rng(0), 1) is not None
+    return False
 
 
 def every_member_is_there(condition: Condition) -> None:
     """A planner has every member of the protocol `Planner`, with the same parameters."""
     planner = condition.planner
-    demand(
-        isinstance(planner, Component),
-        condition,
-        "a planner must be a Component, so that a configuration can name it",
-        type(planner).__name__,
-    )
-    names = _members()
+    must = "a planner must be a Component, so that a configuration can name it"
+    demand(isinstance(planner, Component), condition, must, type(planner).__name__)
+    names = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
     missing = [name for name in names if not hasattr(planner, name)]
-    demand(
-        not missing,
-        condition,
-        "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
-        "gives the usual answers)",
-        f"without {', '.join(missing)}",
-    )
+    must = "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
+    must += "gives the usual answers)"
+    demand(not missing, condition, must, f"without {', '.join(missing)}")
     for name in names:
         wanted = getattr(Planner, name, None)
-        if inspect.isfunction(wanted):
-            _same_parameters(condition, name, wanted, getattr(planner, name))
+        if not inspect.isfunction(wanted):
+            continue
+        method, expected = getattr(planner, name), list(inspect.signature(wanted).parameters)[1:]
+        demand(callable(method), condition, f"{name} must be a method", type(method).__name__)
+        try:
+            inspect.signature(method).bind(*expected)
+        except TypeError:
+            must = f"{name} must take ({', '.join(expected)})"
+            demand(False, condition, must, f"{name}{inspect.signature(method)}")
     known: Any = planner
-    for name, values in (
-        ("reproducibility", get_args(Reproducibility)),
-        ("is_reference", (False, True)),
-    ):
+    choices = {"reproducibility": get_args(Reproducibility), "is_reference": (False, True)}
+    for name, values in choices.items():
         must = f"{name} must be one of {', '.join(map(repr, values))}"
         demand(getattr(known, name) in values, condition, must, repr(getattr(known, name)))
     must = "revision must be a whole number, at least 1"
     demand(type(known.revision) is int and known.revision > 0, condition, must, known.revision)
-
-
-def _members() -> list[str]:
-    """Return the names of the protocol's members."""
-    annotated = [name for name in Planner.__annotations__ if not name.startswith("_")]
-    written = [name for name in vars(Planner) if not name.startswith("_")]
-    return list(dict.fromkeys([*annotated, *written]))
-
-
-def _same_parameters(condition: Condition, name: str, wanted: Any, given: Any) -> None:
-    """Demand that a method can be called as the protocol calls it."""
-    expected = list(inspect.signature(wanted).parameters)[1:]
-    demand(callable(given), condition, f"{name} must be a method", type(given).__name__)
-    try:
-        inspect.signature(given).bind(*expected)
-    except TypeError:
-        must = f"{name} must take ({', '.join(expected)})"
-        demand(False, condition, must, f"{name}{inspect.signature(given)}")
 
 
 def a_condition_survives_its_json(condition: Condition) -> None:

@@ -6,7 +6,6 @@ import math
 import numpy as np
 
 from evoexp.condition import Condition
-from evoexp.records import Generation
 from evoexp.store.log_reader import read_log
 from evoexp.testing.evolution_record import demand, evolution, finished
 
@@ -86,19 +85,15 @@ def costs_are_those_of_the_generation(condition: Condition) -> None:
         least = generation.best_cost_in_generation
         must = f"best_cost_in_generation must be the least of costs, {costs.min()!r},{where}"
         demand(least == costs.min(), condition, must, repr(least))
-        if not BETTER_THAN_ALONE & generation.terms.keys():
-            _mean_fits(condition, generation, where)
-
-
-def _mean_fits(condition: Condition, generation: Generation, where: str) -> None:
-    """Demand that mean and deviation are those of the finite costs."""
-    finite = generation.costs[np.isfinite(generation.costs)]
-    wanted = (finite.mean(), finite.std()) if finite.size else (np.nan, np.nan)
-    given = (generation.mean_cost, generation.std_cost)
-    size = float(np.abs(finite).max()) if finite.size else 0.0
-    fits = np.allclose(given, wanted, rtol=1e-9, atol=1e-9 * size, equal_nan=True)
-    must = f"mean_cost and std_cost must be those of the finite costs, {wanted},{where}"
-    demand(fits, condition, must, given)
+        if BETTER_THAN_ALONE & generation.terms.keys():
+            continue
+        finite = costs[np.isfinite(costs)]
+        wanted = (finite.mean(), finite.std()) if finite.size else (np.nan, np.nan)
+        was = (generation.mean_cost, generation.std_cost)
+        size = float(np.abs(finite).max()) if finite.size else 0.0
+        fits = np.allclose(was, wanted, rtol=1e-9, atol=1e-9 * size, equal_nan=True)
+        must = f"mean_cost and std_cost must be those of the finite costs, {wanted},{where}"
+        demand(fits, condition, must, was)
 
 
 def numbers_are_finite(condition: Condition) -> None:

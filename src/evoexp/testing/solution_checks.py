@@ -26,10 +26,11 @@ NUM_SAMPLES = 6  # [-] individuals that are drawn and judged
 
 def a_best_solution_is_never_changed(condition: Condition) -> None:
     """The array of a best solution keeps its values; a better solution is another array."""
-    for each in evolution(condition).watched:
-        must = f"the best solution of generation {each.generation.index} must keep its values"
-        kept = np.array_equal(each.best_afterwards, each.best)
-        demand(kept, condition, must, "changed later: yield a copy")
+    found = evolution(condition)
+    for generation, afterwards in zip(found.generations, found.bests, strict=True):
+        must = f"the best solution of generation {generation.index} must keep its values"
+        is_same = np.array_equal(afterwards, generation.best)
+        demand(is_same, condition, must, "changed later: yield a copy")
 
 
 def the_last_population_is_left_alone(condition: Condition) -> None:

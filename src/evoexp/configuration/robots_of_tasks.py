@@ -1,7 +1,7 @@
-"""Settings of the robot by a task that MoveIt wrote: its group, joints at rest, its tool's link.
+"""Robot and task name parts of each other: states of an SRDF, a planning request's group and link.
 
-The door puts it into the robot's settings, so that the robot of a condition is told by its own
-settings alone.
+The door puts numbers in the place of states, and what a request that MoveIt wrote says of the robot
+into the robot's settings: a condition's robot is told by its own settings alone.
 """
 
 from typing import Any
@@ -10,11 +10,14 @@ from evoexp.condition import PARTS
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
+from evoexp.robots.assembly import Robot
 from evoexp.robots.urdf import Urdf
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
 
 TURNING, SLIDING = ("revolute", "continuous"), "prismatic"
+FIELDS = ("q_start", "q_goal")
+OF_ARMS = {"arm_motion": True, "posture_task": False}  # whether a scenario lists arms
 
 
 def with_shared_packages(plain: dict[str, Any]) -> dict[str, Any]:
@@ -30,11 +33,7 @@ def with_shared_packages(plain: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
-    """Return a configuration whose robot is as the request wants it, if a request there is.
-
-    Raises:
-        SettingError: If robot and request contradict each other.
-    """
+    """Return a configuration whose robot is as the request wants it, if a request there is."""
     robot, scenario = (plain.get(part) for part in PARTS[:2])
     if not isinstance(scenario, dict) or scenario.get(TARGET) != MoveitTask.component:
         return plain
@@ -76,3 +75,33 @@ def _standing(state: dict[str, float], settings: dict[str, Any]) -> dict[str, fl
         elif joint.kind == SLIDING:
             found[name] = value
     return found
+
+
+def with_named_states(config: dict[str, Any]) -> dict[str, Any]:
+    """Put the values of named states in the place of their names.
+
+    `q_start: ready` counts for all arms, `q_start: [ready, folded]` for one each.
+    """
+    scenario = config.get("scenario")
+    if not isinstance(scenario, dict) or scenario.get(TARGET) not in OF_ARMS:
+        return config
+    several, found = OF_ARMS[scenario[TARGET]], dict(scenario)
+    for name in FIELDS:
+        value = scenario.get(name)
+        listed = several and isinstance(value, list) and any(isinstance(v, str) for v in value)
+        if not isinstance(value, str) and not listed:
+            continue
+        robot = build(config.get("robot"), component_class, "robot")
+        if not isinstance(robot, Robot):
+            raise SettingError("robot", "one whose SRDF names states", None)
+        states = robot.states()
+        given = value if isinstance(value, list) else [value] * len(states)
+        if len(given) != len(states):
+            must = f"one state or list per arm of the robot ({len(states)})"
+            raise SettingError(f"scenario.{name}", must, value)
+        arms = [
+            state.values_of(own, f"scenario.{name}") if isinstance(own, str) else own
+            for own, state in zip(given, states, strict=True)
+        ]
+        found[name] = arms if several else arms[0]
+    return {**config, "scenario": found}

@@ -5,8 +5,7 @@ import io
 
 import numpy as np
 
-from evoexp.report.pages.comparison import Rated
-from evoexp.report.pages.comparison_files import as_csv, as_latex
+from evoexp.report.pages.comparison import Rated, as_csv, as_latex
 from evoexp.report.statistics.inference import Interval, Spread
 
 ROWS = [

@@ -17,7 +17,6 @@ from evoexp.condition import Condition
 from evoexp.configuration.labels import SAME
 from evoexp.errors import SettingError
 from evoexp.report.pages import build, comparison, markdown
-from evoexp.report.pages.comparison_files import as_csv, as_latex
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import read_best_known, shipped_best_known
 from evoexp.report.results.given_data import of_given, read_given, strange_problems
@@ -138,9 +137,9 @@ def _write_files(
 ) -> None:
     """Write the files that `--csv`, `--latex` and `--ioh` ask for."""
     if arguments.csv:
-        write_file(Path(arguments.csv), as_csv(rows))
+        write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:
-        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
+        write_file(Path(arguments.latex), comparison.as_latex(rows, command, settings.confidence))
     if arguments.ioh:
         folder = Path(arguments.ioh)
         files = {folder / name: content for name, content in ioh_files(runs).items()}

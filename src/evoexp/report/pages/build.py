@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
-from evoexp.report.pages import markdown, page_of
+from evoexp.report.pages import markdown
 from evoexp.report.pages.html_page import HTML, html_page
 from evoexp.report.pages.index import document
 from evoexp.report.pages.latex_tables import latex_tables
 from evoexp.report.pages.motion_pictures import players_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Drawing, Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from evoexp.report.pages import markdown
+from evoexp.report.pages.page_file import own_pages
 from evoexp.report.pages.page_parts import (
     Claim,
     Document,
@@ -20,7 +21,6 @@ from evoexp.report.pages.page_parts import (
     Verdict,
     provenance,
 )
-from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -156,6 +156,15 @@ def _added(results: Results) -> Notice:
     )
 
 
+def _table(
+    name: str, rows: Iterable[tuple[object, ...]], behind: Sequence[str] = (), **words: object
+) -> Table:
+    """Return a table of `page.yaml`, with the words in braces filled in, and further columns."""
+    entry = own_pages().entries["tables"][name]
+    heading, note = (entry.get(part, "").format(**words) for part in ("heading", "note"))
+    return Table(heading, (*entry["headers"], *behind), tuple(rows), note)
+
+
 def _conditions(results: Results, settings: ReportSettings) -> Table:
     rows = []
     for c in results.conditions:
@@ -169,7 +178,7 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
             exact = (*proven, found.solved_refuted, found.margin_broken)
         name = f"`{c.condition.id[:12]}`"
         rows.append((c.label, name, c.done, c.planned, c.failed, solved, *exact))
-    return WORDS.table("conditions", rows, level=100 * settings.confidence)
+    return _table("conditions", rows, level=100 * settings.confidence)
 
 
 def _quantities(page: Page, results: Results) -> Table:
@@ -179,9 +188,9 @@ def _quantities(page: Page, results: Results) -> Table:
     if len(labels) > WIDEST:
         names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
         below = zip(heads, *cells, strict=True) if cells else ()
-        return WORDS.table("results", below)._replace(headers=("condition", *names))
+        return _table("results", below)._replace(headers=("condition", *names))
     rows = [(q.name, q.unit, *own) for q, own in zip(page.quantities, cells, strict=True)]
-    return WORDS.table("results", rows * bool(labels), behind=heads)
+    return _table("results", rows * bool(labels), behind=heads)
 
 
 def _claims(claims: Sequence[Claim]) -> Table:
@@ -189,7 +198,7 @@ def _claims(claims: Sequence[Claim]) -> Table:
         (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
         for c in claims
     ]
-    return WORDS.table("claims", rows)
+    return _table("claims", rows)
 
 
 def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettings) -> Table:
@@ -203,7 +212,7 @@ def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettin
         )
         for c in rows
     ]
-    return WORDS.table("comparison", cells, heading=heading, level=100 * settings.confidence)
+    return _table("comparison", cells, heading=heading, level=100 * settings.confidence)
 
 
 def _figure(
@@ -234,7 +243,7 @@ def _parameters(results: Results) -> Table:
         for name in _ordered(by_name)
         for parameter, labels in by_name[name].items()
     ]
-    return WORDS.table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
+    return _table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
 
 
 def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
@@ -253,7 +262,7 @@ def _failures(results: Results) -> Iterator[Table]:
         for replicate, reason in c.failures.items()
     ]
     if rows:
-        yield WORDS.table("failures", rows)
+        yield _table("failures", rows)
 
 
 def have_two_parts(labels: Sequence[str]) -> bool:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
 
-from evoexp.report.results.stored_results import ConditionResults
-from evoexp.report.statistics.comparisons import Comparison
-from evoexp.report.statistics.inference import Spread
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison, Values
+from evoexp.report.statistics.inference import Spread, spread
 
 if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure
@@ -49,6 +49,11 @@ class Quantity(NamedTuple):
     name: str
     unit: str
     spreads: dict[str, Spread]  # by label
+
+
+def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity:
+    """Return a row of the table of results."""
+    return Quantity(name, unit, {c.label: spread(values(c)) for c in results.with_data})
 
 
 class Table(NamedTuple):

@@ -9,7 +9,7 @@ from evoexp.report.pages import markdown
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, Measure, by_column, compared
+from evoexp.report.statistics.comparisons import Comparison, Measure, Values, by_column, compared
 from evoexp.report.statistics.comparisons import adjusted as adjusted_rows
 from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 
@@ -39,6 +39,11 @@ def differing(results: Results) -> list[Measure]:
         for one in EFFORTS
         if len(np.unique(np.concatenate([one.values(c) for c in results.evolved]))) > 1
     ]
+
+
+def differing_values(differing: list[Measure]) -> dict[str, Values]:
+    """Return the values of these quantities by name."""
+    return {one.name: one.values for one in differing}
 
 
 def pairs(results: Results) -> list[Pair]:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles, quantile
 
@@ -103,15 +102,6 @@ def main_effects(
             pairs = _pairs(sweep, base, k, (first, other), values)
             if pairs.size:
                 yield _effect((base, setting, first, other), pairs, confidence, num_resamples)
-
-
-def measures() -> dict[str, Values]:
-    """Return the quantities that pages of sweeps tell, by name."""
-    return {
-        "best cost": lambda c: c.column("best_cost"),
-        "evaluations": lambda c: c.column("evaluations"),
-        "CPU time of the search [s]": search_seconds,
-    }
 
 
 def _parted(label: str) -> tuple[str, dict[str, str]]:

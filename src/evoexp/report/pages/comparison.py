@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,6 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import shipped_best_known
 from evoexp.report.results.given_data import MARK, GivenData
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
-from evoexp.report.results.proven_answers import first_reached
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Comparison, compared
@@ -177,8 +176,8 @@ def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
         "evaluations": condition.column("evaluations"),
         "cpu_s": search_seconds(condition),
     }
-    per_answer = {
-        name: expected_effort(*first_reached(own.table, own.replicates, np.inf, whole, name))
+    per_answer: dict[str, Any] = {
+        name: expected_effort(*own.first_reached(effort=name, spent=whole))
         for name, whole in spent.items()
         if not own.table[name].isna().any()
     }
@@ -198,14 +197,17 @@ def problem_rows(runs: Sequence[PlannerRuns]) -> Iterator[tuple[str, ...]]:
         best.append(float(own.best_lengths.min()))
     for name, (problem, best) in found.items():
         lengths = map(markdown.number, (problem.straight, problem.best_known, min(best)))
-        yield name, f"`{problem.key}`" if problem.key else "–", *lengths, problem.unit_name
+        unit = "straight line" if np.isnan(problem.best_known) else "best known"
+        if np.isnan(problem.unit):
+            unit = "none: any proven answer is the only target"
+        yield name, f"`{problem.key}`" if problem.key else "–", *lengths, unit
 
 
 def answer_rows(rated: Sequence[Rated], settings: ReportSettings) -> Iterator[tuple[object, ...]]:
     """Yield each condition's proven answers: how many, their effort and their lengths."""
     for row in rated:
-        *lengths, count = row.lengths
-        in_units = Spread(*(length / row.unit for length in lengths), count)
+        median, lower, upper, count = row.lengths
+        in_units = Spread(median / row.unit, lower / row.unit, upper / row.unit, count)
         yield (
             row.condition,
             row.runs,

@@ -45,6 +45,17 @@ class ReportSummary(NamedTuple):
         """Name of the experiment in its folder's name: without budget and overrides."""
         return re.split("[@+]", self.folder)[0]
 
+    def url(self, place: str = "") -> str:
+        """Return its address, or that of a place in it, relative to the home page."""
+        if self.file != HTML:
+            return f"{quote(self.folder)}/{self.file}"
+        return f"{quote(self.folder)}/{HTML}{FROM_HOME}" + f"#{place}" * bool(place)
+
+    @property
+    def picture_url(self) -> str:
+        """The address of its picture."""
+        return f"{quote(self.folder)}/{quote(self.picture)}"
+
     @property
     def is_comparison(self) -> bool:
         """Whether `evoexp compare` draws it."""
@@ -90,30 +101,6 @@ class StoredRun(NamedTuple):
         if self.done >= self.planned:
             return "done"
         return "partial" if self.done else "planned"
-
-
-class Link(NamedTuple):
-    """A link to a report."""
-
-    text: str  # name of its folder
-    url: str  # relative to the home page
-    partial: bool = False  # whether results are missing
-    failed: int = 0  # number of failed replicates
-    detail: str = ""  # its title
-    picture: str = ""  # address of its figure; empty if it has none
-
-
-class PaperCard(NamedTuple):
-    """A paper on the home page."""
-
-    title: str  # authors and year
-    subtitle: str  # what it is about
-    face: Link | None  # the report whose figure is shown; None if none has any
-    # (verdict, number of claims), over the reports of its experiments
-    counts: tuple[tuple[str, int], ...]
-    unjudged: int  # claims of experiments without a report at the paper's budget
-    links: tuple[Link, ...]  # to its reports
-    missing: tuple[str, ...]  # experiments without a report
 
 
 def read_summary(folder: Path) -> ReportSummary | None:
@@ -168,55 +155,39 @@ def site(
     }
     return {
         "num_reports": len(found),
-        "partial": [_link(each) for each in found if each.partial],
+        "partial": [each for each in found if each.partial],
         # of which only the title is known
         "num_earlier": sum(each.file != HTML for each in found),
         "unfinished": sum(run.state != "done" for run in runs),
         "papers": [_card(paper, owned[paper.name]) for paper in papers],
-        "others": [(name, list(map(_link, group))) for name, group in groups.items() if group],
-        "runs": [(run, list(_links(run, found))) for run in runs],
+        "others": [item for item in groups.items() if item[1]],
+        "runs": [
+            (run, [each for each in found if run.hash12 in dict(each.runs)][:MAX_LINKS])
+            for run in runs
+        ],
     }
 
 
-def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
+def _card(paper: Paper, reports: Sequence[ReportSummary]) -> dict[str, Any]:
     """Return the card of a paper; its claims are those of whole experiments, not of variants."""
     whole = [each for each in reports if each.folder == each.experiment]
     drawn, shown = {each.folder for each in whole}, {each.experiment for each in reports}
     names = (*paper.experiments, *paper.claims)
-    face = min(
-        (each for each in whole or reports if each.picture),
-        key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
-        default=None,
-    )
-    return PaperCard(
-        paper.title,
-        paper.subtitle,
-        _link(face) if face else None,
-        verdict_counts(verdict for each in whole for _, verdict in each.claims),
-        sum(count for name, count in paper.claims.items() if name not in drawn),
-        tuple(map(_link, reports)),
-        tuple(sorted({name for name in names if paper.has(name)} - shown)),
-    )
-
-
-def _link(report: ReportSummary) -> Link:
-    picture = f"{quote(report.folder)}/{quote(report.picture)}" * bool(report.picture)
-    told = bool(report.partial), report.failed, report.title
-    return Link(report.folder, _url(report), *told, picture)
-
-
-def _url(report: ReportSummary, place: str = "") -> str:
-    """Return the address of a report, or of a place in it."""
-    if report.file != HTML:
-        return f"{quote(report.folder)}/{report.file}"
-    return f"{quote(report.folder)}/{HTML}{FROM_HOME}" + f"#{place}" * bool(place)
-
-
-def _links(run: StoredRun, found: Iterable[ReportSummary]) -> Iterator[Link]:
-    """Yield links to a run's place in the reports that show it, at most `MAX_LINKS`."""
-    shown = [each for each in found if run.hash12 in dict(each.runs)]
-    for each in shown[:MAX_LINKS]:
-        yield Link(each.folder, _url(each, f"run-{run.hash12}"))
+    return {
+        "paper": paper,
+        # the report whose figure is shown
+        "face": min(
+            (each for each in whole or reports if each.picture),
+            key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
+            default=None,
+        ),
+        "counts": verdict_counts(verdict for each in whole for _, verdict in each.claims),
+        # claims of experiments without a report at the paper's budget
+        "unjudged": sum(count for name, count in paper.claims.items() if name not in drawn),
+        "reports": reports,
+        # experiments without a report
+        "missing": sorted({name for name in names if paper.has(name)} - shown),
+    }
 
 
 def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
@@ -229,4 +200,4 @@ def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
             *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
         ]
         for kind, text, place in entries:
-            yield {"text": text, "kind": kind, "report": each.folder, "url": _url(each, place)}
+            yield {"text": text, "kind": kind, "report": each.folder, "url": each.url(place)}

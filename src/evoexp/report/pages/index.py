@@ -9,7 +9,6 @@ from evoexp.report.pages.page_file import own_pages
 from evoexp.report.pages.page_parts import (
     Claim,
     Document,
-    Drawing,
     Figures,
     FigureText,
     LogText,
@@ -49,30 +48,40 @@ def document(
 
     `players` are the pages that play motions, by the keys of the played runs.
     """
-    notices = (_incomplete(results), _damaged(results), _added(results))
     first = _conditions(results, settings), _quantities(page, results)
     later = (
         _claims(page.claims),
         Table("Known defects and checks", ("check", "finding"), page.checks),
         *(_comparison(heading, rows, settings) for heading, rows in page.comparisons),
     )
-    figures = Figures(tuple(_figure(each, settings, players or {}) for each in page.drawings))
-    sections = (
-        *(table for table in first if table.rows),
-        *page.tables,
-        *(table for table in later if table.rows),
-        *((figures,) if figures.figures else ()),
-        _parameters(results),
-        *_failures(results),
+    figures = Figures(
+        tuple(
+            FigureText(
+                each.stem,
+                each.title,
+                f"{each.caption} {_provenance(each.conditions)}".strip(),
+                tuple(settings.formats),
+                tuple(players[run.key] for run in each.plays if players and run.key in players),
+            )
+            for each in page.drawings
+        )
     )
+    sections = list[Table | Figures]()
+    for table in (*first, *page.tables, *later, figures, _parameters(results), _failures(results)):
+        if isinstance(table, Table) and table.rows:
+            number = 1 + sum(isinstance(section, Table) for section in sections)
+            words = "_".join(re.findall("[a-z0-9]+", table.heading.lower()))[:LONGEST_NAME]
+            sections.append(table._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex"))
+        elif isinstance(table, Figures) and table.figures:
+            sections.append(table)
     return Document(
         page.title,
         command,
         results.experiment,
         results.budget,
-        tuple(notice for notice in notices if notice.text),
+        tuple(_notices(results)),
         page.introduction,
-        tuple(_with_files(sections)),
+        tuple(sections),
         tuple(map(_run, results.conditions)),
         _seeds(results.conditions),
     )
@@ -97,63 +106,41 @@ def _run(c: ConditionResults) -> RunText:
     return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, logs)
 
 
-def _with_files(sections: Iterable[Table | Figures]) -> Iterator[Table | Figures]:
-    """Name the files of tables: by their number and heading."""
-    number = 0
-    for section in sections:
-        if isinstance(section, Table):
-            number += 1
-            words = "_".join(re.findall("[a-z0-9]+", section.heading.lower()))[:LONGEST_NAME]
-            section = section._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex")
-        yield section
-
-
 def _seeds(conditions: Iterable[ConditionResults]) -> tuple[int, ...]:
     return tuple(sorted({c.condition.seed for c in conditions}))
 
 
-def _incomplete(results: Results) -> Notice:
-    """Name the replicates that are missing; empty if none is."""
-    missing = [
-        f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed"
-        for c in results.conditions
-        if c.done < c.planned
-    ]
-    return Notice(
-        "Partial results",
-        f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
-        * bool(missing),
-    )
+def _provenance(conditions: Sequence[ConditionResults]) -> str:
+    return provenance([(c.condition.id[:12], c.done) for c in conditions], _seeds(conditions))
 
 
-def _damaged(results: Results) -> Notice:
-    """Name the logs that are damaged and left out; empty if none is."""
-    lost = [
-        f"{c.label}: {len(c.damaged)} ({', '.join(list(c.damaged)[:FEW])}"
-        + f"{', …' if len(c.damaged) > FEW else ''})"
-        for c in results.conditions
-        if c.damaged
-    ]
-    return Notice(
-        "Damaged logs",
-        f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
-        "experiment runs them again." * bool(lost),
-    )
-
-
-def _added(results: Results) -> Notice:
-    """Name the replicates that were added when results could be known; empty if none was."""
+def _notices(results: Results) -> Iterator[Notice]:
+    """Yield the remarks on replicates that are missing, cannot be read or were added."""
     fixed = planned_replicates(results) if results.experiment else 0
-    added = [
-        f"{c.label}: {n} of {c.done}"
-        for c in results.conditions
-        if (n := c.added(c.condition.num_replicates(fixed)))
-    ]
-    return Notice(
-        "Replicates added later",
-        f"{'; '.join(added)}: asked for when results of earlier ones were stored already. Numbers "
-        "and verdicts below use all of them." * bool(added),
-    )
+    missing, lost, added = list[str](), list[str](), list[str]()
+    for c in results.conditions:
+        if c.done < c.planned:
+            missing.append(f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed")
+        if c.damaged:
+            names = [*list(c.damaged)[:FEW], *["…"] * (len(c.damaged) > FEW)]
+            lost.append(f"{c.label}: {len(c.damaged)} ({', '.join(names)})")
+        if count := c.added(c.condition.num_replicates(fixed)):
+            added.append(f"{c.label}: {count} of {c.done}")
+    if missing:
+        text = f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
+        yield Notice("Partial results", text)
+    if lost:
+        text = (
+            f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
+            "experiment runs them again."
+        )
+        yield Notice("Damaged logs", text)
+    if added:
+        text = (
+            f"{'; '.join(added)}: asked for when results of earlier ones were stored already. "
+            "Numbers and verdicts below use all of them."
+        )
+        yield Notice("Replicates added later", text)
 
 
 def _table(
@@ -168,11 +155,11 @@ def _table(
 def _conditions(results: Results, settings: ReportSettings) -> Table:
     rows = []
     for c in results.conditions:
-        solved, verdicts, found = "–", ("–",) * 5, c.verdicts
+        solved, found = "–", c.verdicts
         if c.done:
             interval = Proportion(c.solved, c.done).interval(settings.confidence)
             solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
-        exact: tuple[object, ...] = verdicts
+        exact: tuple[object, ...] = ("–",) * 5
         if found.judged:
             proven = found.certified, found.refuted, found.undecided
             exact = (*proven, found.solved_refuted, found.margin_broken)
@@ -215,16 +202,6 @@ def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettin
     return _table("comparison", cells, heading=heading, level=100 * settings.confidence)
 
 
-def _figure(
-    drawing: Drawing, settings: ReportSettings, players: Mapping[tuple[str, int], Player]
-) -> FigureText:
-    runs = [(c.condition.id[:12], c.done) for c in drawing.conditions]
-    whose = provenance(runs, _seeds(drawing.conditions))
-    caption = f"{drawing.caption} {whose}".strip()
-    motions = tuple(players[run.key] for run in drawing.plays if run.key in players)
-    return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats), motions)
-
-
 def _parameters(results: Results) -> Table:
     """Return one row per setting, and one per value where conditions differ in it."""
     by_name: dict[str, dict[Parameter, list[str]]] = {}
@@ -232,6 +209,10 @@ def _parameters(results: Results) -> Table:
         for parameter in parameters(results, condition):
             by_name.setdefault(parameter.name, {}).setdefault(parameter, []).append(condition.label)
     every = [condition.label for condition in results.conditions]
+    # settings group by group, seed and number of replicates last
+    groups = list(dict.fromkeys(re.split(r"[.[]", name)[0] for name in by_name))
+    groups.sort(key=lambda group: group in ("seed", "num_replicates"))
+    ordered = sorted(by_name, key=lambda name: groups.index(re.split(r"[.[]", name)[0]))
     rows = [
         (
             f"`{name}`"
@@ -240,29 +221,20 @@ def _parameters(results: Results) -> Table:
             parameter.unit or "–",
             parameter.source or "–",
         )
-        for name in _ordered(by_name)
+        for name in ordered
         for parameter, labels in by_name[name].items()
     ]
     return _table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
 
 
-def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
-    """Yield settings group by group, seed and number of replicates last."""
-    groups = list(dict.fromkeys(name.split(".")[0].split("[")[0] for name in by_name))
-    groups.sort(key=lambda group: group in ("seed", "num_replicates"))
-    for group in groups:
-        yield from (name for name in by_name if name.split(".")[0].split("[")[0] == group)
-
-
-def _failures(results: Results) -> Iterator[Table]:
-    """Yield the table of failed replicates, if there are any."""
-    rows = [
+def _failures(results: Results) -> Table:
+    """Return the table of failed replicates."""
+    rows = (
         (c.label, replicate, reason)
         for c in results.conditions
         for replicate, reason in c.failures.items()
-    ]
-    if rows:
-        yield _table("failures", rows)
+    )
+    return _table("failures", rows)
 
 
 def have_two_parts(labels: Sequence[str]) -> bool:

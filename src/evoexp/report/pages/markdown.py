@@ -3,7 +3,7 @@
 import math
 import re
 import string
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from evoexp.report.pages.page_parts import Document
@@ -49,8 +49,8 @@ def number(value: float) -> str:
     return (f"{value + 0.0:.0f}" if whole else f"{value:.4g}").replace("-", "−")  # −0.0 is 0
 
 
-def filled(template: str, words: Mapping[str, Any]) -> str:
-    """Fill in the words of a sentence.
+def filled(template: str, words: Any) -> str:
+    """Fill in the words of a sentence: values by name, a mapping or a `Scope`.
 
     `{x!n}` is written as `number` does, `{p!p}` as `p_value`, `{xs!d}` as the median of its values,
     `{xs!m}` as that with quartiles, `{runs!i}` as a proportion with its interval at the level
@@ -66,7 +66,7 @@ def filled(template: str, words: Mapping[str, Any]) -> str:
 class Sentence(string.Formatter):
     """Reads and writes the words in braces of a sentence."""
 
-    def __init__(self, words: Mapping[str, Any]) -> None:
+    def __init__(self, words: Any) -> None:
         self.words = words
 
     def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:

@@ -105,37 +105,6 @@ def motion_length(motion: Motion) -> float:
     return total
 
 
-def first_reached(
-    table: pd.DataFrame,
-    replicates: Any,
-    longest: float,
-    spent: FloatArray,
-    effort: str = "collision_queries",
-) -> Any:
-    """Return the effort of every run up to its first proven answer that is so short.
-
-    Args:
-        table: Of `answers_of`.
-        replicates: (runs,) in order.
-        longest: Length that an answer may have.
-        spent: (runs,) effort of the whole runs.
-        effort: The column that is the effort.
-
-    Returns:
-        (runs,) effort, that of the whole run without such an answer; (runs,) whether there was one.
-    """
-    good = table[table["certified"] & (table["length"] <= longest)]
-    first = good.groupby("replicate")[effort].min().reindex(replicates)
-    reached = first.notna().to_numpy()
-    return np.where(reached, first.to_numpy(np.float64, na_value=0.0), spent), reached
-
-
-def best_lengths(table: pd.DataFrame, replicates: Any) -> FloatArray:
-    """Return the least length of a proven answer of every run, (runs,); inf: none is proven."""
-    good = table[table["certified"]].groupby("replicate")["length"].min().reindex(replicates)
-    return np.asarray(good.to_numpy(np.float64, na_value=np.inf))
-
-
 def straight_line(table: pd.DataFrame) -> float:
     """Return the distance from start to goal; NaN where goals are not all the same."""
     far = table["straight"].to_numpy(np.float64)

@@ -18,9 +18,7 @@ def summary(folder: str, command: str = "", picture: str = "") -> ReportSummary:
     headings = (("Claims", "claims"), ("GA against others", "ga-against-others"))
     words = command or f"report {folder}"
     runs = ((HASH, "GA"),)
-    return ReportSummary(
-        folder, "index.html", f"about {folder}", words, "", 0, headings, CLAIMS, runs, picture
-    )
+    return ReportSummary(folder, f"about {folder}", words, "", 0, headings, CLAIMS, runs, picture)
 
 
 def test_a_card_counts_the_claims_of_whole_experiments() -> None:
@@ -102,7 +100,6 @@ def test_what_strangers_write_is_only_text(text: str) -> None:
     folder = text.replace("/", "")
     hostile = ReportSummary(
         folder,
-        "index.html",
         text,
         text,
         text,

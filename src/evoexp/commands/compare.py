@@ -3,7 +3,7 @@
 import argparse
 import hashlib
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "multiples of them",
     )
     parser.add_argument("--csv", metavar="FILE", help="write the table as CSV, with all digits")
-    parser.add_argument("--latex", metavar="FILE", help="write the table as LaTeX (booktabs)")
+    parser.add_argument("--latex", metavar="FILE", help="write the answers as LaTeX (booktabs)")
     parser.add_argument(
         "--ioh", metavar="FOLDER", help="write the runs for IOHanalyzer and iohinspector"
     )
@@ -73,7 +73,7 @@ def main(arguments: argparse.Namespace) -> int:
     files, request, settings, runs, strange = drawn(arguments)
     path = build.write_report(files)
     rows = comparison.rated(runs, settings)
-    _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
+    _write_files(arguments, files.files, runs, rows)
     if arguments.json:
         print_json(
             [
@@ -130,16 +130,16 @@ def _table(rows: Sequence[comparison.Rated], title: str) -> Table:
 
 def _write_files(
     arguments: argparse.Namespace,
+    page_files: Mapping[str, bytes],
     runs: Sequence[PlannerRuns],
     rows: Sequence[comparison.Rated],
-    command: str,
-    settings: ReportSettings,
 ) -> None:
     """Write the files that `--csv`, `--latex` and `--ioh` ask for."""
     if arguments.csv:
         write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:
-        write_file(Path(arguments.latex), comparison.as_latex(rows, command, settings.confidence))
+        (table,) = (page_files[name] for name in page_files if name.endswith("_answers.tex"))
+        write_file(Path(arguments.latex), table)
     if arguments.ioh:
         folder = Path(arguments.ioh)
         files = {folder / name: content for name, content in ioh_files(runs).items()}

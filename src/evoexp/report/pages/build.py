@@ -45,11 +45,7 @@ class Request(NamedTuple):
         if self.arguments:
             return self.arguments
         if self.experiment and "+" not in self.report_name:
-            return (
-                self.experiment
-                if self.budget == "paper"
-                else f"{self.experiment} budget={self.budget}"
-            )
+            return self.experiment + f" budget={self.budget}" * (self.budget != "paper")
         return " ".join(dict.fromkeys(condition.id[:12] for _, condition in self.conditions))
 
     @property
@@ -61,8 +57,8 @@ class Request(NamedTuple):
 
     def results(self, outputs: Path, num_replicates: int | None) -> Results:
         """Read the stored results, see `gather`."""
-        where = outputs, self.conditions, num_replicates
-        return gather(*where, self.experiment, self.budget, self.hint, self.options)
+        words = self.experiment, self.budget, self.hint
+        return gather(outputs, self.conditions, num_replicates, *words, self.options)
 
 
 class ReportFiles(NamedTuple):
@@ -143,7 +139,17 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     sidecar = {
         "figure": drawing.title,
         "code_version": __version__,
-        "conditions": _provenance(drawing),
+        "conditions": [
+            {
+                "label": c.label,
+                "run": c.condition.id,
+                "planned": c.planned,
+                "done": c.done,
+                "failed": c.failed,
+                "run_code": c.code,
+            }
+            for c in drawing.conditions
+        ],
         "data": {
             "file": f"{drawing.stem}.csv",
             "rows": len(table),
@@ -158,20 +164,6 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     }
     text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
-
-
-def _provenance(drawing: Drawing) -> list[dict[str, Any]]:
-    return [
-        {
-            "label": c.label,
-            "run": c.condition.id,
-            "planned": c.planned,
-            "done": c.done,
-            "failed": c.failed,
-            "run_code": c.code,
-        }
-        for c in drawing.conditions
-    ]
 
 
 def _sha256(content: bytes) -> str:

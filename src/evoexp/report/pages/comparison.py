@@ -12,7 +12,6 @@ from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.pages import markdown
-from evoexp.report.pages.latex_tables import escaped, tabular
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
@@ -32,15 +31,6 @@ from evoexp.report.statistics.inference import (
     spread,
 )
 from evoexp.report.statistics.problem_ranks import Standing, standing
-
-LATEX_HEADERS = (
-    "planner",
-    "problem",
-    "$n$",
-    "proven",
-    r"queries per proven answer ({level}\,\%)",
-    "length [quartiles]",
-)
 
 
 class Rated(NamedTuple):
@@ -258,16 +248,11 @@ def compared_lengths(
     return (("best proven length", rows),) if rows else ()
 
 
-# the table as files
-
-
 def as_csv(rows: Sequence[Rated]) -> bytes:
-    """Return the table as CSV, numbers with all digits, `inf` where there is no proven answer.
+    """Return the answers as CSV, numbers with all digits, `inf` where there is no proven answer.
 
-    Columns: planner, problem, n (runs), proven (runs with a proven answer), effort (expected
-    running time [collision queries]) with its interval, length (median [rad, m]) with quartiles;
-    body_queries (the effort in pairs of shapes), evaluations and cpu_s (expected to a proven
-    answer, as the effort is), empty where they are not known.
+    Efforts are expected to a proven answer, in collision queries with their interval, in pairs of
+    shapes (body_queries), evaluations and CPU time; those that are not known are empty.
     """
     table = pd.DataFrame(
         {
@@ -288,30 +273,3 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
         for row in rows
     )
     return table.to_csv(index=False, lineterminator="\n").encode()
-
-
-def as_latex(rows: Sequence[Rated], command: str, confidence: float) -> bytes:
-    r"""Return the table as LaTeX; it needs `\usepackage{booktabs}`."""
-    lines = [
-        f"% made by {command.replace(chr(10), ' ')}",
-        "% queries: expected running time, failed runs included; length: best proven one [rad, m]",
-        *tabular(
-            (head.format(level=f"{100.0 * confidence:g}") for head in LATEX_HEADERS),
-            map(_cells, rows),
-            "llrrrr",
-        ),
-    ]
-    return "\n".join([*lines, ""]).encode()
-
-
-def _cells(row: Rated) -> tuple[str, ...]:
-    effort, low, high = (_latex(effort_text(each)) for each in (row.queries, *row.interval))
-    median, lower, upper = (_latex(markdown.number(value)) for value in row.lengths[:3])
-    length = median if row.lengths.num_values == 1 else f"{median} [{lower}, {upper}]"
-    effort = f"{effort} ({low}--{high})"
-    names = escaped(row.planner), escaped(row.problem)
-    return (*names, str(row.runs), str(row.proven), effort, length)
-
-
-def _latex(number: str) -> str:
-    return number.replace("∞", r"$\infty$").replace("–", "--")

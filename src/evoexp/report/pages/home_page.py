@@ -1,6 +1,5 @@
 """The home page of all reports: papers, other reports, stored runs, and a search over them."""
 
-import html
 import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,14 +11,12 @@ from pydantic import Field, TypeAdapter
 
 from evoexp.report.pages.html_page import HTML, script_json, telling_rank, verdict_counts, written
 
-MARKDOWN = "index.md"
 MAX_LINKS = 3  # reports named beside a run
 FROM_HOME = "?home"  # tells a report that it can link back
 COMPARE = "compare"
 USUAL = {"Conditions", "Results", "Claims", "Motions", "Figures", "Parameters", "Failures"}
 """Headings of nearly every report, which nobody looks for."""
 _SUMMARY = re.compile(r'<script type="application/json" id="summary">(.*?)</script>', re.DOTALL)
-_MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
 
 Hash = Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
 Picture = Annotated[str, Field(pattern=r"^([\w.-]+\.(svg|png))?$")]  # in the report's own folder
@@ -29,7 +26,6 @@ class ReportSummary(NamedTuple):
     """A report that is there, as its page says."""
 
     folder: str  # its name under `reports`
-    file: str  # its page in the folder
     title: str  # heading
     command: str = ""  # that draws it, without `evoexp`; empty where it is not known
     partial: str = ""  # the remark that results are missing; empty if none is
@@ -47,8 +43,6 @@ class ReportSummary(NamedTuple):
 
     def url(self, place: str = "") -> str:
         """Return its address, or that of a place in it, relative to the home page."""
-        if self.file != HTML:
-            return f"{quote(self.folder)}/{self.file}"
         return f"{quote(self.folder)}/{HTML}{FROM_HOME}" + f"#{place}" * bool(place)
 
     @property
@@ -104,25 +98,14 @@ class StoredRun(NamedTuple):
 
 
 def read_summary(folder: Path) -> ReportSummary | None:
-    """Return the summary of a report's folder; None if it holds no report.
-
-    A report of an earlier version, which has no HTML page, has only a title and its command.
-    """
+    """Return the summary of a report's folder; None if it holds no report."""
     try:
-        found = _SUMMARY.search((folder / HTML).read_text(encoding="utf-8"))
-        if found:
-            named = {"folder": folder.name, "file": HTML, **json.loads(found[1])}
-            return _REPORT.validate_python(named)
+        text = (folder / HTML).read_text(encoding="utf-8")
+        if found := _SUMMARY.search(text):
+            return _REPORT.validate_python({"folder": folder.name, **json.loads(found[1])})
     except (OSError, ValueError, TypeError):
         pass  # nobody's page, or no page of ours
-    try:
-        text = (folder / MARKDOWN).read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return None
-    title = text.partition("\n")[0].removeprefix("# ")
-    made = _MADE_BY.search(text)
-    command = html.unescape(made[1]) if made else ""
-    return ReportSummary(folder.name, MARKDOWN, html.unescape(title) or folder.name, command)
+    return None
 
 
 def summaries(reports: Path) -> list[ReportSummary]:
@@ -156,8 +139,6 @@ def site(
     return {
         "num_reports": len(found),
         "partial": [each for each in found if each.partial],
-        # of which only the title is known
-        "num_earlier": sum(each.file != HTML for each in found),
         "unfinished": sum(run.state != "done" for run in runs),
         "papers": [_card(paper, owned[paper.name]) for paper in papers],
         "others": [item for item in groups.items() if item[1]],

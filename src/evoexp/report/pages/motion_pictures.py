@@ -37,21 +37,17 @@ def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, 
 
     The name of the experiment is empty for runs given by their hashes.
     """
-    runs = {run.key: run for drawing in drawings for run in drawing.plays}
-    players = ((key, _player(experiment, run)) for key, run in runs.items())
-    return {key: player for key, player in players if player}
-
-
-def _player(experiment: str, run: PlayedRun) -> Player | None:
-    """Return the player of a run; None if its solution is no motion."""
-    c, k = run
-    try:
+    players = dict[tuple[str, int], Player]()
+    for c, k in {run.key: run for drawing in drawings for run in drawing.plays}.values():
         title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
-        found = record(c.condition, c.solutions[k], Heading(title, k))
-    except NoMotion:
-        return None
-    words = f"{c.label}, replicate {k}: {VERDICTS[found.verdict.certified]}"
-    return Player(words, f"motion_{c.condition.id[:12]}_{k:04d}.html", player_page.page([found]))
+        try:
+            motion = record(c.condition, c.solutions[k], Heading(title, k))
+        except NoMotion:
+            continue
+        words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
+        file = f"motion_{c.condition.id[:12]}_{k:04d}.html"
+        players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
+    return players
 
 
 def motion_results(results: Results) -> Results:

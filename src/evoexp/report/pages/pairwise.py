@@ -82,29 +82,18 @@ def share_rows_of_all(results: Results, confidence: float) -> list[tuple[str, ..
 
 def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]]:
     """Return how far shares differ from each other; no row of one that is the same everywhere."""
-    return [
-        row for name, of in SHARES.items() for row in _differences(results, confidence, name, of)
-    ]
-
-
-def _differences(
-    results: Results,
-    confidence: float,
-    name: str,
-    of: Callable[[ConditionResults], Proportion],
-) -> list[tuple[str, ...]]:
-    """Return one row per pair; none where the share is the same in all conditions."""
-    found = [(a, b, of(a), of(b)) for a, b in pairs(results) if of(a).total and of(b).total]
-    if len({p.share for _, _, *both in found for p in both}) < 2:
-        return []
-    p_values = [fisher_exact(one, two) for _, _, one, two in found]
     rows: list[tuple[str, ...]] = []
-    for (a, b, one, two), p, adjusted in zip(found, p_values, holm(p_values), strict=True):
-        between = (one.share - two.share, *newcombe(one, two, confidence))
-        difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
-        points = f"{difference} [{low}, {high}]".replace("-", "−")
-        tests = markdown.p_value(p), markdown.p_value(adjusted)
-        rows.append((name, _named(a, b), points, *tests))
+    for name, of in SHARES.items():
+        found = [(a, b, of(a), of(b)) for a, b in pairs(results) if of(a).total and of(b).total]
+        if len({p.share for _, _, *both in found for p in both}) < 2:
+            continue
+        p_values = [fisher_exact(one, two) for _, _, one, two in found]
+        for (a, b, one, two), p, adjusted in zip(found, p_values, holm(p_values), strict=True):
+            between = (one.share - two.share, *newcombe(one, two, confidence))
+            difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
+            points = f"{difference} [{low}, {high}]".replace("-", "−")
+            tests = markdown.p_value(p), markdown.p_value(adjusted)
+            rows.append((name, _named(a, b), points, *tests))
     return rows
 
 

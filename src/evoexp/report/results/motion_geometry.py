@@ -241,27 +241,6 @@ class Extremes(NamedTuple):
     at_lowest: FloatArray  # (nq, instants), of the first replicate of several
     at_highest: FloatArray  # (nq, instants), of the first replicate of several
 
-    def with_others(self, later: "Extremes") -> "Extremes":
-        """Return the extremes of these and others, of which these come first."""
-        own, later = self._of_length(len(later.lowest)), later._of_length(len(self.lowest))
-        lower, higher = later.lowest < own.lowest, later.highest > own.highest
-        return Extremes(
-            np.where(lower, later.lowest, own.lowest),
-            np.where(higher, later.highest, own.highest),
-            np.where(lower, later.at_lowest, own.at_lowest),
-            np.where(higher, later.at_highest, own.at_highest),
-        )
-
-    def _of_length(self, length: int) -> "Extremes":
-        """Return them with so many instants at least."""
-        more = max(0, length - len(self.lowest))
-        if not more:
-            return self
-        lowest = np.pad(self.lowest, (0, more), constant_values=np.inf)
-        highest = np.pad(self.highest, (0, more), constant_values=-np.inf)
-        at = (np.pad(q, ((0, 0), (0, more))) for q in (self.at_lowest, self.at_highest))
-        return Extremes(lowest, highest, *at)
-
 
 def extremes(
     replicates: Sequence[int], sampled: Callable[[int], FloatArray], measures: Sequence[Measure]
@@ -274,9 +253,28 @@ def extremes(
     for replicate in replicates:
         q = sampled(replicate)
         own = [Extremes(values, values, q, q) for values in (measure(q) for measure in measures)]
-        pairs = zip(found, own, strict=True)
-        found = [seen.with_others(later) for seen, later in pairs] if found else own
+        found = [_both(*each) for each in zip(found, own, strict=True)] if found else own
     return tuple(found)
+
+
+def _both(first: Extremes, later: Extremes) -> Extremes:
+    """Return the extremes of two, with the instants of the longer one."""
+    length = max(len(first.lowest), len(later.lowest))
+    own, other = (
+        Extremes(
+            np.pad(each.lowest, (0, length - len(each.lowest)), constant_values=np.inf),
+            np.pad(each.highest, (0, length - len(each.lowest)), constant_values=-np.inf),
+            *(np.pad(q, ((0, 0), (0, length - len(each.lowest)))) for q in each[2:]),
+        )
+        for each in (first, later)
+    )
+    lower, higher = other.lowest < own.lowest, other.highest > own.highest
+    return Extremes(
+        np.where(lower, other.lowest, own.lowest),
+        np.where(higher, other.highest, own.highest),
+        np.where(lower, other.at_lowest, own.at_lowest),
+        np.where(higher, other.at_highest, own.at_highest),
+    )
 
 
 def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:

@@ -328,7 +328,20 @@ def _read(
     manifest = run.manifest() if is_stored else {}
     code = {"version": (manifest.get("versions") or {}).get("evoexp")}
     code |= {name: (manifest.get("git") or {}).get(name) for name in ("commit", "dirty")}
-    plans = _plans(run)
+    plans: tuple[Plan, ...] = ()
+    try:
+        plans = tuple(run.plans())
+    except DamagedFile as error:
+        warn(f"{error}; added replicates are not marked")
+    if options is None:  # those that the manifest names; only shipped ones have files to be read
+        recorded: dict[str, dict[str, str]] = manifest.get("options") or {}
+        options = tuple(
+            Option(group, name, origin, str(folder / f"{name}.yaml") if origin == ORIGIN else "")
+            for group, each in recorded.items()
+            for name, origin, folder in (
+                (each["name"], each["origin"], config_directory() / group),
+            )
+        )
     rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
     rows = rows.set_index("replicate")
     asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
@@ -341,27 +354,7 @@ def _read(
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,
         code if is_stored else {},
-        _recorded_options(manifest) if options is None else options,
+        options,
         plans,
         damaged_logs(run),
     )
-
-
-def _plans(run: RunDirectory) -> tuple[Plan, ...]:
-    """Return the plans of a run; without its list of plans, which is said, none."""
-    try:
-        return tuple(run.plans())
-    except DamagedFile as error:
-        warn(f"{error}; added replicates are not marked")
-        return ()
-
-
-def _recorded_options(manifest: Mapping[str, Any]) -> tuple[Option, ...]:
-    """Return the options that a run's manifest names; only shipped ones have files to be read."""
-    recorded: dict[str, dict[str, str]] = manifest.get("options") or {}
-    found = []
-    for group, each in recorded.items():
-        shipped = config_directory() / group / f"{each['name']}.yaml"
-        path = str(shipped) if each["origin"] == ORIGIN else ""
-        found.append(Option(group, each["name"], each["origin"], path))
-    return tuple(found)

@@ -110,7 +110,7 @@ def drawn(arguments: argparse.Namespace) -> Drawn:
     if given:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
-    page = comparison.page_of_runs(runs, found, settings, given)
+    page = comparison.page(found, settings, runs, given)
     return Drawn(build.page_files(request, page, found, settings), request, settings, runs, strange)
 
 

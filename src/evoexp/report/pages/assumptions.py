@@ -1,27 +1,5 @@
 """The page of what a paper leaves open: every assumed number, and which claims survive another one.
 
-A paper has an experiment `<paper>_assumptions` (`conf/experiment`) for it. Its first condition of a
-family is the shipped one, without overrides; each other condition changes assumed settings by
-overrides (`planner.num_via_points=10`), and keeps all options; controls stand beside their
-conditions as everywhere:
-
-    defaults: [..., {override /report: rana_assumptions}]
-    conditions:
-      "as assumed": []
-      "as assumed, multi-start": [control=multi_start]
-      "N = 10": [planner.num_via_points=10]
-      "N = 10, multi-start": [planner.num_via_points=10, control=multi_start]
-
-The paper's `page.yaml` (see `page_file`) has a page with `headlines`: its headline claims, each
-with its rule in `claims.yaml`, a quantity that is drawn, and a function that judges it on one
-condition:
-
-    headlines:
-      - {claim: free_at_via_points, quantity: "free runs [%]", values: free, judge: judge_free}
-
-    def judge_free(judge, condition, controls):  # -> Claim
-        return judge.on("free_at_via_points", who="").every(...)
-
 The functions below give what the page `assumptions` of `page.yaml` shows. `assumed_results` are
 those of the experiment `<paper>_assumptions`, or of some of its conditions.
 """

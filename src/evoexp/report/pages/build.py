@@ -1,12 +1,10 @@
 """Builds a report; no other module of it writes its files."""
 
-import functools
 import hashlib
-import inspect
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from evoexp.condition import Condition
 from evoexp.report.pages import markdown
@@ -71,19 +69,7 @@ class ReportFiles(NamedTuple):
 def derived(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> ReportFiles:
-    """Return a report as it follows from the outputs; nothing is written.
-
-    Args:
-        request: Names its conditions.
-        settings: Formats and levels.
-        outputs: Root of all outputs.
-        num_replicates: Planned for every condition; None: as many as each one has.
-
-    Raises:
-        NothingStored: If nothing of it has been run.
-        UnknownOption: If the settings name a page that does not exist.
-        CorruptLog: If a log cannot be trusted.
-    """
+    """Return a report as it follows from the outputs; nothing is written."""
     found = request.results(outputs, num_replicates)
     return page_files(request, page_of(found, settings), found, settings)
 
@@ -158,7 +144,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
             "columns": {
                 str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
             },
-            "description": drawing.columns or description(drawing.table),
+            "description": drawing.columns,
         },
         "files": {name: _sha256(content) for name, content in pictures.items()},
     }
@@ -168,10 +154,3 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def description(source: Callable[..., Any]) -> str:
-    """Return a function's docstring as one line."""
-    while isinstance(source, functools.partial):
-        source = source.func
-    return " ".join((inspect.getdoc(source) or "").split())

@@ -60,27 +60,20 @@ class Rated(NamedTuple):
     own_cost: Spread = Spread(np.nan, np.nan, np.nan, 0)
 
 
-def page(results: Results, settings: ReportSettings) -> Page:
-    """Build the page.
+def page(
+    results: Results,
+    settings: ReportSettings,
+    runs: Sequence[PlannerRuns] | None = None,
+    given: GivenData | None = None,
+) -> Page:
+    """Build the page, of runs that are judged already or of all results.
 
     Raises:
         NothingStored: If no run has a motion.
     """
-    known = {key: each.length for key, each in shipped_best_known().items()}
-    return page_of_runs(of_results(results.evolved, known), results, settings)
-
-
-def page_of_runs(
-    runs: Sequence[PlannerRuns],
-    results: Results,
-    settings: ReportSettings,
-    given: GivenData | None = None,
-) -> Page:
-    """Build the page from runs that are judged already.
-
-    Raises:
-        NothingStored: If there are none.
-    """
+    if runs is None:
+        known = {key: each.length for key, each in shipped_best_known().items()}
+        runs = of_results(results.evolved, known)
     if not runs:
         raise NothingStored(f"{results.experiment or 'compare'}: no stored solution is a motion")
     return own_page("comparison", results, settings, runs=runs, given=given)

@@ -10,8 +10,8 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from evoexp.report.pages.index import CLAIMS, FAILURES
+from evoexp.report.pages.markdown import asset, environment
 from evoexp.report.pages.page_parts import Document, Figures, Verdict
-from evoexp.report.pages.templates import asset, environment
 
 HTML = "index.html"
 FEW = 3  # failures named at the top
@@ -31,11 +31,7 @@ READER = MarkdownIt("zero").enable("backticks")  # knows code alone: all else in
 
 
 def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
-    """Return a page as HTML; the same text gives the same bytes.
-
-    Args:
-        pictures: File name → content of its pictures.
-    """
+    """Return a page as HTML, with the sizes of its pictures; the same text gives the same bytes."""
     sections = tuple(_places(document, pictures))
     figures = [figure for section in sections for figure in section["figures"]]
     headings = [(section["heading"], section["anchor"]) for section in sections]
@@ -111,13 +107,9 @@ def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[dict[
 
 
 def written(template: str, runs: Mapping[str, str] | None = None, **values: Any) -> bytes:
-    """Return a page.
+    """Return a page by its template in `assets/site`, filled with values.
 
-    Args:
-        template: Name of its file in `assets/site`.
-        runs: Hash → label of the runs that the page has a place for: codes that name a hash, and
-            heads of tables that name a label, link to it.
-        values: By the names that the template has for them.
+    Codes that name the hash of a run, and heads of tables that name its label, link to its place.
     """
     known = frozenset(runs or {})
     places = {label: name for name, label in reversed(list((runs or {}).items()))}

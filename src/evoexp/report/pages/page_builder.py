@@ -137,11 +137,8 @@ class PageBuilder:
         for name in names:
             entry = self.entries["tables"][name]
             if rows := tuple(map(tuple, self.rows(entry))):
-                before, behind = (
-                    self.scope.value(entry[side]) if side in entry else ()
-                    for side in ("before", "behind")
-                )
-                headers = (*before, *map(self.scope.text, entry["headers"]), *behind)
+                behind = self.scope.value(entry["behind"]) if "behind" in entry else ()
+                headers = (*map(self.scope.text, entry["headers"]), *behind)
                 note = self.scope.text(entry.get("note", ""))
                 yield Table(self.scope.text(entry["heading"]), headers, rows, note)
 
@@ -263,7 +260,7 @@ class PageBuilder:
                 for one in played
                 if one.replicate is not None
             ),
-            columns=entry.get("columns", ""),
+            columns=entry.get("columns") or " ".join((table.__doc__ or "").split()),
         )
 
 

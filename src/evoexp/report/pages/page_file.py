@@ -1,61 +1,6 @@
 """Pages as data: the file `page.yaml` of a paper, read and checked.
 
-A paper, ours or a guest's, is a package with a file `page.yaml`, which says what its pages show,
-and modules with the functions that it names; rules of claims stand in `claims.yaml` beside it.
-Its entry points `evoexp.pages` name the file: `my_paper = "my_paper:page.yaml"` registers the page
-`my_paper` of the file.
-
-    name: "Lavoie & Boudreau 2001"
-    functions: [measures, claims]     # modules of the package: their functions may be named
-    pages:
-      lavoie:
-        fits: fits                    # function; where it returns false, another page is shown:
-        otherwise: generic            # of this file; `generic` if none is named
-        title: "…"                    # "{paper}: {experiment}" if there is none
-        introduction: "…"
-        quantities: [arms, terms]     # rows of the table of results; `terms`: the planner's own
-        claims: [percentages, {each: condition in main, judge: [free]}]
-        tables: [tasks]
-        comparisons:                  # first conditions of families against the others
-          - families: arms
-            measures: [[best cost, best_cost], [clearance, clearance, length, higher]]
-          - {controls: [[best cost, best_cost]]}  # conditions against their controls
-        checks: [arms]
-        figures: [attempts, values]
-        headlines:                    # of a page of assumptions, see `assumptions`
-          - {claim: free, quantity: "clearance [{unit}]", values: clearance, judge: free}
-    quantities:
-      arms: [[attempts, "–", term_attempts]]  # name, unit, column or function of a condition
-    tables:
-      tasks:
-        heading: "Tasks"
-        headers: [task, goal met]
-        each: condition in main       # one row each: `cells`, or a function `row`; or all `rows`
-        cells: ["{condition.label}", "{success!i}"]
-        note: "Median [quartiles]."
-    checks:
-      arms:
-        - ["Time of a run", "the paper prints its own"]
-        - title: "Attempts"           # a finding may join the texts of several items
-          finding: {each: condition in main, text: "{condition.label}: {attempts}"}
-    figures:
-      attempts:                       # the stem of its files, unless `stem` gives another
-        title: "Attempts"
-        caption: "Share of runs that took so many attempts, with Wilson's {level:g} % interval."
-        columns: "Columns attempts, having, …"  # of its table, for the file beside it
-        functions: figures.attempts.attempts  # attempts_table, draw_attempts; or a list of both
-        arguments: {efforts: {"evaluations [-]": evaluations}}  # that are no values of their name
-        among: main                   # shows the results of these conditions alone
-      effort:
-        kind: values                  # begins with a figure that all pages share, of `page.yaml`
-        of: {"effort [-]": effort}    # beside this file: values, effects, shares, convergence, best
-
-Words in braces are values and functions by name (`page_scope`), written as `markdown.filled`
-does. `each: x in xs` repeats an entry for all items, `when: name` leaves it out where the value is
-false, `when: not name` where it is true. Texts of a figure may name its arguments and its `words`,
-which are texts by name; it is not drawn without values of the argument that it `needs`. `given` are
-the names of values that code brings along, on evoexp's own pages. The keys of each kind of entry
-stand in `KEYS`.
+The format stands at the head of the file `page.yaml` beside this one, which has evoexp's own pages.
 """
 
 import functools
@@ -82,10 +27,9 @@ KEYS: dict[str, set[str]] = {
     "pages": {"fits", "otherwise", "title", "introduction", "quantities", "claims", "tables"}
     | {"comparisons", "checks", "figures", "headlines", "conditions", "given"},
     "claims": {"each", "when", "judge"},
-    "comparisons": {"families", "measures", "controls", "when"},
+    "comparisons": {"families", "measures", "controls"},
     "headlines": {"claim", "quantity", "values", "judge"},
-    "tables": {"heading", "headers", "before", "behind", "each", "when", "cells", "row", "rows"}
-    | {"note"},
+    "tables": {"heading", "headers", "behind", "each", "when", "cells", "row", "rows"} | {"note"},
     "checks": {"title", "finding", "each", "when", "rows"},
     "finding": {"each", "when", "text"},
     "figures": {"title", "caption", "columns", "stem", "functions", "arguments", "options"}

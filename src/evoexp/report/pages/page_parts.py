@@ -40,7 +40,7 @@ class Drawing(NamedTuple):
     draw: "Callable[[pd.DataFrame], Figure]"  # draws the data
     conditions: tuple[ConditionResults, ...]  # whose results it shows
     plays: tuple[PlayedRun, ...] = ()  # runs whose motions it shows
-    columns: str = ""  # description of the table's columns; empty: the docstring of `table` is it
+    columns: str = ""  # description of the table's columns
 
 
 class Quantity(NamedTuple):

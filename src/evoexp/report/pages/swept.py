@@ -69,8 +69,9 @@ def combination_headers(sweep: Sweep) -> tuple[str, ...]:
 
 
 def effect_headers(effects: Sequence[MainEffect]) -> tuple[str, ...]:
-    """Return the headers of the table of effects that it has where several bases are swept."""
-    return ("condition",) if any(each.base for each in effects) else ()
+    """Return the headers of the table of effects."""
+    of_base = ("condition",) if any(each.base for each in effects) else ()
+    return (*of_base, "setting", "value", "pairs", "change of the best cost", "better in")
 
 
 def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]]:

@@ -59,11 +59,7 @@ def straight_line(
 
 
 def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
-    """Return a motion sampled along its straight segments.
-
-    Args:
-        q: (nq, instants).
-        samples: Per segment.
+    """Return a motion, q (nq, instants), at so many samples per straight segment.
 
     Returns:
         Times in instants, (segments · samples + 1,), and configurations, (nq, the same).
@@ -177,13 +173,9 @@ def link_distance(assembly: Assembly) -> BodyDistance:
 
 
 def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
-    """Return all links at every instant of a motion.
+    """Return all links at every instant of a motion, q (nq, instants) [deg], link by link.
 
-    Args:
-        q: (nq, instants) [deg].
-
-    Returns:
-        Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit], link by link.
+    Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit].
     """
     rows = [
         (instant, arm, link, *start[instant], *end[instant])
@@ -196,13 +188,8 @@ def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
 def in_stages(table: pd.DataFrame, num_stages: int) -> pd.DataFrame:
     """Return the rows of a motion's instants stage by stage, and all of them as the last stage.
 
-    Args:
-        table: With the column instant, whole numbers from 0 on.
-        num_stages: Stages that the motion is cut into, as far as it has instants.
-
-    Returns:
-        The columns of the table, stage, first and last (instants of the stage); an instant between
-        two stages belongs to both.
+    The column instant holds whole numbers from 0 on; stage, first and last (instants of the stage)
+    are added. An instant between two stages belongs to both.
     """
     last = int(table["instant"].max())
     cuts = np.unique(np.round(np.linspace(0, last, min(num_stages, last) + 1)).astype(np.int64))

@@ -64,8 +64,7 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
     if not condition.is_reference:  # which has one replicate, however many are planned
         planned = Entry(planned_replicates(results), *root["num_replicates"][1:])
         found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
-    budget = _file("budget", results.budget, taken)
-    caps = option(budget) if budget else {}
+    caps = _entries("budget", results.budget, taken)
     for k, parameter in enumerate(found):  # a setting that the budget changed, and no override
         cap = caps.get(_CAPS.get(parameter.name, ""))
         if parameter.source == OVERRIDE and cap and str(cap.value) == parameter.value:
@@ -83,15 +82,14 @@ def planned_replicates(results: Results) -> int:
 def _of_experiment(results: Results) -> dict[str, Entry]:
     """Return the settings in the file of the experiment itself, by dotted key."""
     taken = {each.group: each for c in results.conditions for each in c.options}
-    path = _file("experiment", results.experiment, taken)
-    return option(path) if path else {}
+    return _entries("experiment", results.experiment, taken)
 
 
-def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:
-    """Return the file of the option taken of a group, else of the shipped option, else None."""
+def _entries(group: str, name: str, taken: dict[str, Option]) -> dict[str, Entry]:
+    """Return the content of the option taken of a group, else of the shipped one, if it is there."""
     shipped = config_directory() / group / f"{name}.yaml"
     path = Path(taken[group].path) if group in taken else shipped
-    return path if path.is_file() else None
+    return option(path) if path.is_file() else {}
 
 
 def overridden(found: Iterable[Parameter]) -> list[str]:
@@ -150,8 +148,7 @@ def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
 def _component(group: str, config: dict[str, Any], taken: dict[str, Option]) -> Iterator[Parameter]:
     """Yield the settings of one component, and of the groups that its option takes in."""
     if group in taken:
-        path = _file(group, "", taken)
-        where, entries = taken[group].source, option(path) if path else {}
+        where, entries = taken[group].source, _entries(group, "", taken)
     else:
         where, entries = _most_like(group, config)
     otherwise = OVERRIDE if entries else where  # of a setting that the option does not have

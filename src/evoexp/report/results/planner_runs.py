@@ -12,10 +12,7 @@ import pandas as pd
 
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
-from evoexp.report.results.proven_answers import (
-    answers_of,
-    straight_line,
-)
+from evoexp.report.results.proven_answers import answers_of, straight_line
 from evoexp.report.results.stored_results import ConditionResults
 
 MULTIPLES = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of a problem's unit of length
@@ -68,16 +65,10 @@ class PlannerRuns(NamedTuple):
         effort: str = "collision_queries",
         spent: FloatArray | None = None,
     ) -> tuple[FloatArray, np.ndarray]:
-        """Return the effort of every run up to its first proven answer that is so short.
+        """Return the effort of each run up to an answer that is so short, and whether it has one.
 
-        Args:
-            longest: Length that an answer may have [rad, m].
-            effort: The column that is the effort.
-            spent: (runs,) effort of the whole runs; None: their collision queries.
-
-        Returns:
-            (runs,) effort, that of the whole run without such an answer; (runs,) whether there was
-            one.
+        The effort, a column, is that of the whole run, `spent` (runs,), where no proven answer is
+        at most `longest` [rad, m].
         """
         good = self.table[self.table["certified"] & (self.table["length"] <= longest)]
         first = good.groupby("replicate")[effort].min().reindex(self.replicates)
@@ -110,11 +101,8 @@ def of_results(
     """Return the runs of conditions, in order, with their answers judged.
 
     Conditions of a problem that nobody has a motion for are left out: their answers are of another
-    kind. A planner without a motion where others have one has failed, and stays.
-
-    Args:
-        conditions: That are compared.
-        known: Key of a problem → best known length [rad, m].
+    kind. A planner without a motion where others have one has failed, and stays. `known` are the
+    best known lengths [rad, m] by the keys of problems.
     """
     found = answers_of(conditions)
     moving = {_task(c) for c in conditions if len(found[c.label])}

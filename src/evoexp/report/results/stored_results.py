@@ -288,19 +288,12 @@ def gather(
     command: str,
     options: Mapping[str, tuple[Option, ...]] | None = None,
 ) -> Results:
-    """Read the stored results of some conditions.
+    """Read the stored results of (label, condition): every replicate, done or failed.
 
-    Args:
-        outputs: Root of all outputs.
-        conditions: (label, condition).
-        num_replicates: Planned for every condition, at least; every stored one is read.
-        experiment: Its name.
-        budget: Its name.
-        command: The command that helps where nothing is stored.
-        options: Label → options that were taken; None: those that the runs' manifests name.
+    At least `num_replicates` are planned of each; `command` helps where nothing is stored.
 
     Raises:
-        NothingStored: If no replicate of any condition is there, done or failed.
+        NothingStored: If no replicate of any condition is there.
         CorruptLog: If a log cannot be trusted.
     """
     found = tuple(

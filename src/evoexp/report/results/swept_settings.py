@@ -85,12 +85,7 @@ def sweep_of(results: Results) -> Sweep | None:
 def main_effects(
     sweep: Sweep, values: Values, confidence: float, num_resamples: int
 ) -> Iterator[MainEffect]:
-    """Yield the effect of each value of each setting.
-
-    Args:
-        values: (done,) of a condition, lower is better.
-        confidence: Level of the intervals.
-    """
+    """Yield the effect of each value of each setting; lower values, (done,), are better."""
     for base, (k, setting) in itertools.product(sweep.bases, enumerate(sweep.settings)):
         first, *others = sweep.levels(k)
         for other in others:

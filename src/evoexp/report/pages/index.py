@@ -245,16 +245,11 @@ def have_two_parts(labels: Sequence[str]) -> bool:
 
 
 def in_few_words(labels: Sequence[str], every: Sequence[str]) -> str:
-    """Return a list of labels; a part of them stands for all labels that have it.
+    """Return some of every label of a page; a part of them stands for all labels that have it.
 
-    Args:
-        labels: Some of them.
-        every: All labels of the page.
-
-    Returns:
-        "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
-        labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
-        themselves where they have not two parts.
+    "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
+    labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
+    themselves where they have not two parts.
     """
     if not have_two_parts(every):
         return ", ".join(labels)

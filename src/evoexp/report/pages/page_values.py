@@ -42,7 +42,7 @@ PARTS: dict[str, Callable[..., Any]] = {
 
 def scenes(results: Results) -> str:
     """Warn where conditions differ in robot or scenario; empty if they do not."""
-    if len({(c.robot, c.scenario) for c in results.with_data}) < 2:
+    if len({(c.condition.robot, c.scenario) for c in results.with_data}) < 2:
         return ""
     return (
         "The conditions differ in robot or scenario: their costs are compared as numbers, whatever "
@@ -52,13 +52,15 @@ def scenes(results: Results) -> str:
 
 def terms(results: Results) -> Iterator[Quantity]:
     """Yield the rows of the planner's own terms, those of the best solutions."""
-    for term in results.terms:
+    columns = {str(name) for c in results.with_data for name in c.summaries}
+    for column in sorted(name for name in columns if name.startswith(TERM)):
+        term = column.removeprefix(TERM)
         name, unit = term.replace("_", " "), "–"
         if term.endswith(("_deg", "_rad")):
             name, _, unit = name.rpartition(" ")
         elif "distance" in term or "clearance" in term:
             unit = results.with_data[0].length_unit or "–"
-        yield quantity(results, name, unit, by_column(TERM + term))
+        yield quantity(results, name, unit, by_column(column))
 
 
 def known(of: Mapping[str, Values], results: Results) -> dict[str, Values]:

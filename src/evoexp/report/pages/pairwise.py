@@ -57,11 +57,7 @@ def pairs(results: Results) -> list[Pair]:
 def pairs_of_conditions(
     results: Results, settings: ReportSettings, differing: list[Measure]
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare conditions in every quantity in which they differ.
-
-    Returns:
-        (heading, one comparison per pair), p-values adjusted within each quantity.
-    """
+    """Compare pairs in every quantity in which they differ; p-values are adjusted within each."""
     of = "pairs of conditions"
     if len(results.evolved) > MOST:
         of = f"{results.evolved[0].label} against each other condition"

@@ -25,11 +25,7 @@ Rows = list[tuple[int, float]]
 
 
 def ioh_files(runs: Sequence[PlannerRuns]) -> dict[str, bytes]:
-    """Return the contents of all files by their paths in the folder.
-
-    Args:
-        runs: Of each planner on each problem; the problems are numbered from 1 in their order.
-    """
+    """Return the contents of all files by their paths in the folder, problems numbered from 1."""
     problems = list(dict.fromkeys(own.problem.name for own in runs))
     folders = _slugs(dict.fromkeys(own.planner for own in runs))
     names, dimensions = _slugs(problems), {name: _dimension(runs, name) for name in problems}

@@ -43,12 +43,9 @@ def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:
 def straight_line(
     shape: Sequence[tuple[int, int]], start: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the solution that goes straight from start to goal in equal steps, flat.
+    """Return the solution that goes straight from start to goal, (sum of joints,), flat.
 
-    Args:
-        shape: Of a solution, part by part: (rows, joints).
-        start: (sum of joints,).
-        goal: (sum of joints,) in the same unit.
+    It has equal steps; the shape of a solution is (rows, joints), part by part.
     """
     parts, first = [], 0
     for rows, joints in shape:
@@ -73,11 +70,7 @@ def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
 def joint_positions(
     assembly: Assembly, q: FloatArray
 ) -> Iterator[tuple[int, int, FloatArray, FloatArray]]:
-    """Yield (arm, link of the arm, start (instants, 3), end (instants, 3)) of every link.
-
-    Args:
-        q: (nq, instants) [deg].
-    """
+    """Yield (arm, its link, start (instants, 3), end (instants, 3)) at q (nq, instants) [deg]."""
     data, frames = assembly.model.createData(), list[FloatArray]()
     for configuration in q.T:
         pin.forwardKinematics(assembly.model, data, DEGREE * configuration)
@@ -95,9 +88,7 @@ def joint_positions(
 def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
     """Return the closed outlines of obstacles as seen along z, each (points, 2).
 
-    Args:
-        reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth
-            of it deep.
+    A half-space is a strip of length `reach` to both sides of its point, a tenth of it deep.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])

@@ -86,7 +86,7 @@ def _of_experiment(results: Results) -> dict[str, Entry]:
 
 
 def _entries(group: str, name: str, taken: dict[str, Option]) -> dict[str, Entry]:
-    """Return the content of the option taken of a group, else of the shipped one, if it is there."""
+    """Return the option taken of a group, else the shipped one; nothing if there is no file."""
     shipped = config_directory() / group / f"{name}.yaml"
     path = Path(taken[group].path) if group in taken else shipped
     return option(path) if path.is_file() else {}

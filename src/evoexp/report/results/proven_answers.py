@@ -80,9 +80,8 @@ def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame
             write_kept(places[path], json.dumps(own).encode())
     found: dict[str, list[Answer]] = {c.label: [] for c in conditions}
     for (condition, replicate, path), cpu_s in zip(logs, times, strict=True):
-        answers = (Answer(replicate, *answer) for answer in kept[path])
         found[condition.label] += [
-            answer._replace(cpu_s=float(cpu_s[answer.generation])) for answer in answers
+            Answer(replicate, *answer, cpu_s=float(cpu_s[answer[0]])) for answer in kept[path]
         ]
     return {label: answer_table(own) for label, own in found.items()}
 

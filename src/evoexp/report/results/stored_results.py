@@ -21,7 +21,6 @@ from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
 from evoexp.store.log_reader import read_log, read_solution
-from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
 from evoexp.store.tables import read_generations, read_summaries
@@ -108,8 +107,7 @@ class ConditionResults:
     def added(self, fixed: int) -> int:
         """Return how many finished replicates were asked for when results were there already.
 
-        Args:
-            fixed: Replicates that the experiment fixes by itself; these never count.
+        The replicates that the experiment fixes by itself never count.
         """
         known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
         seen = [plan.num_replicates for plan in self.plans if plan.stored]
@@ -179,11 +177,6 @@ class ConditionResults:
         return found
 
     @property
-    def robot(self) -> Any:
-        """The robot."""
-        return self.condition.robot
-
-    @property
     def scenario(self) -> Any:
         """The scene and the task."""
         return self.condition.scenario
@@ -246,12 +239,6 @@ class Results(NamedTuple):
     def references(self) -> tuple[ConditionResults, ...]:
         """References with data."""
         return tuple(c for c in self.with_data if c.is_reference)
-
-    @property
-    def terms(self) -> list[str]:
-        """Names of the terms that any summary has, in order."""
-        columns = {str(name) for c in self.with_data for name in c.summaries}
-        return sorted(name.removeprefix(TERM) for name in columns if name.startswith(TERM))
 
     @property
     def suffixed(self) -> Iterator[tuple[ConditionResults, str]]:

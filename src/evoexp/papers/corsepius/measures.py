@@ -64,7 +64,7 @@ def problem(condition: ConditionResults) -> Problem:
 
 def scene(condition: ConditionResults) -> tuple[Any, Any]:
     """Return the canonical forms of robot and scenario."""
-    return condition.condition.robot.canonical(), condition.scenario.canonical()
+    return condition.robot.canonical(), condition.scenario.canonical()
 
 
 def tasks(results: Results, setting: str, of: str = "ga") -> Tasks:
@@ -247,7 +247,7 @@ def releases(condition: ConditionResults) -> tuple[Release, ...]:
 def by_robot(conditions: Conditions) -> Conditions:
     """Return the first condition of every robot and its collision model."""
     groups = run_measures.grouped(
-        conditions, lambda c: (c.condition.robot.canonical(), c.planner.collision.canonical())
+        conditions, lambda c: (c.robot.canonical(), c.planner.collision.canonical())
     )
     return tuple(group[0] for group in groups)
 

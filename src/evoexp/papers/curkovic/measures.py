@@ -91,7 +91,7 @@ def several(results: Results) -> bool:
 
 def one_scene(results: Results) -> bool:
     """Return whether all conditions share robots and scene."""
-    return len({(c.condition.robot, c.scenario) for c in results.with_data}) == 1
+    return len({(c.robot, c.scenario) for c in results.with_data}) == 1
 
 
 def free_at_first(condition: ConditionResults) -> int:

@@ -205,7 +205,7 @@ def solved_within(own: ConditionResults, control: ConditionResults) -> Proportio
 
 def _controls(results: Results, own: ConditionResults) -> list[ConditionResults]:
     """Return the controls that stand beside this very planner in the same scene."""
-    same = own.condition.robot, own.scenario, own.planner
+    same = own.robot, own.scenario, own.planner
     return [
         c for c in results.with_data if c.is_control and (c.robot, c.scenario, c.planner) == same
     ]

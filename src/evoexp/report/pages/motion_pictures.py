@@ -81,7 +81,7 @@ def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
     for each in best_motions:
         planner, problem = each.condition.prepared
         if covers := tuple(planner.covers(problem)):
-            key = each.condition.condition.robot, len(covers)
+            key = each.condition.robot, len(covers)
             covered.setdefault(key, (each, covers))
     best = sorted(best_motions, key=lambda each: _best_cost(each.condition))[:1]
     return {

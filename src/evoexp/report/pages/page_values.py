@@ -42,7 +42,7 @@ PARTS: dict[str, Callable[..., Any]] = {
 
 def scenes(results: Results) -> str:
     """Warn where conditions differ in robot or scenario; empty if they do not."""
-    if len({(c.condition.robot, c.scenario) for c in results.with_data}) < 2:
+    if len({(c.robot, c.scenario) for c in results.with_data}) < 2:
         return ""
     return (
         "The conditions differ in robot or scenario: their costs are compared as numbers, whatever "

@@ -202,7 +202,7 @@ def _parts(c: ConditionResults) -> list[str]:
 
 
 def _task(c: ConditionResults) -> Hashable:
-    return c.condition.robot, c.condition.scenario
+    return c.robot, c.scenario
 
 
 def _by_task(conditions: Sequence[ConditionResults]) -> dict[Hashable, list[ConditionResults]]:

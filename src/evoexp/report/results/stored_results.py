@@ -177,6 +177,11 @@ class ConditionResults:
         return found
 
     @property
+    def robot(self) -> Any:
+        """The robot."""
+        return self.condition.robot
+
+    @property
     def scenario(self) -> Any:
         """The scene and the task."""
         return self.condition.scenario

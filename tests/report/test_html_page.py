@@ -13,7 +13,6 @@ from evoexp.report.pages.page_parts import (
     Figures,
     FigureText,
     LogText,
-    Notice,
     Player,
     RunText,
     Table,
@@ -50,7 +49,7 @@ def page_of(text: str) -> Document:
         f"evoexp report {text}",
         text,
         text,
-        (Notice("Partial results", text),),
+        (("Partial results", text),),
         text,
         (
             table,

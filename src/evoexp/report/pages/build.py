@@ -104,13 +104,7 @@ def write_report(report: ReportFiles) -> Path:
 def stale_files(report: ReportFiles) -> list[Path]:
     """Return the files in a report's folder that it does not have: those of an earlier one."""
     directory, files = report
-    if not directory.is_dir():
-        return []
-    return sorted(
-        path
-        for path in directory.iterdir()
-        if path.name not in files and not path.name.startswith(".")
-    )
+    return sorted(path for path in directory.glob("[!.]*") if path.name not in files)
 
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:

@@ -38,7 +38,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
     summary = {  # that the page carries for the home page
         "title": document.title,
         "command": document.command.removeprefix("evoexp "),
-        "partial": "".join(n.text for n in document.notices if n.title == "Partial results"),
+        "partial": dict(document.notices).get("Partial results", ""),
         "failed": sum(run.failed for run in document.runs),
         "headings": [*headings, *((each["text"].title, each["anchor"]) for each in figures)],
         "claims": [

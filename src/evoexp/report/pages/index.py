@@ -12,7 +12,6 @@ from evoexp.report.pages.page_parts import (
     Figures,
     FigureText,
     LogText,
-    Notice,
     Page,
     Player,
     RunText,
@@ -44,10 +43,7 @@ def document(
     command: str,
     players: Mapping[tuple[str, int], Player] | None = None,
 ) -> Document:
-    """Return the text of a page; the same results give the same text.
-
-    `players` are the pages that play motions, by the keys of the played runs.
-    """
+    """Return the text of a page, with the players of motions by the keys of the played runs."""
     first = _conditions(results, settings), _quantities(page, results)
     later = (
         _claims(page.claims),
@@ -83,7 +79,7 @@ def document(
         page.introduction,
         tuple(sections),
         tuple(map(_run, results.conditions)),
-        _seeds(results.conditions),
+        _provenance(results.conditions),
     )
 
 
@@ -106,15 +102,12 @@ def _run(c: ConditionResults) -> RunText:
     return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, logs)
 
 
-def _seeds(conditions: Iterable[ConditionResults]) -> tuple[int, ...]:
-    return tuple(sorted({c.condition.seed for c in conditions}))
-
-
 def _provenance(conditions: Sequence[ConditionResults]) -> str:
-    return provenance([(c.condition.id[:12], c.done) for c in conditions], _seeds(conditions))
+    seeds = sorted({c.condition.seed for c in conditions})
+    return provenance([(c.condition.id[:12], c.done) for c in conditions], seeds)
 
 
-def _notices(results: Results) -> Iterator[Notice]:
+def _notices(results: Results) -> Iterator[tuple[str, str]]:
     """Yield the remarks on replicates that are missing, cannot be read or were added."""
     fixed = planned_replicates(results) if results.experiment else 0
     missing, lost, added = list[str](), list[str](), list[str]()
@@ -128,19 +121,19 @@ def _notices(results: Results) -> Iterator[Notice]:
             added.append(f"{c.label}: {count} of {c.done}")
     if missing:
         text = f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
-        yield Notice("Partial results", text)
+        yield "Partial results", text
     if lost:
         text = (
             f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
             "experiment runs them again."
         )
-        yield Notice("Damaged logs", text)
+        yield "Damaged logs", text
     if added:
         text = (
             f"{'; '.join(added)}: asked for when results of earlier ones were stored already. "
             "Numbers and verdicts below use all of them."
         )
-        yield Notice("Replicates added later", text)
+        yield "Replicates added later", text
 
 
 def _table(
@@ -157,8 +150,9 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
     for c in results.conditions:
         solved, found = "–", c.verdicts
         if c.done:
-            interval = Proportion(c.solved, c.done).interval(settings.confidence)
-            solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
+            low, high = Proportion(c.solved, c.done).interval(settings.confidence)
+            share = markdown.share(c.solved, c.done)
+            solved = f"{share} ({100 * low:.0f}–{100 * high:.0f} %)"
         exact: tuple[object, ...] = ("–",) * 5
         if found.judged:
             proven = found.certified, found.refuted, found.undecided

@@ -6,6 +6,7 @@ from typing import Any, cast
 
 from evoexp.report.pages import GENERIC, page_registration, swept
 from evoexp.report.pages.assumptions import Headline
+from evoexp.report.pages.motion_pictures import best_motions
 from evoexp.report.pages.page_file import PageFile, own_pages, read_page_file
 from evoexp.report.pages.page_parts import (
     Claim,
@@ -41,15 +42,11 @@ def page_of(results: Results, settings: ReportSettings) -> Page:
 
     A page that shows no motion is given the figure of the scene, with the best motions; claims on
     conditions that were left out are named as not judged.
-
-    Raises:
-        UnknownOption: If there is none of this name.
-        RegistrationError: If its package registered it wrongly.
     """
     chosen = page_registration(settings)
     if sweep := sweep_of(results):
-        motions = swept.best_condition(sweep, results)
-        return own_page("sweep", results, settings, sweep=sweep, motion_results=motions)
+        motions = best_motions(swept.best_condition(sweep, results))
+        return own_page("sweep", results, settings, sweep=sweep, best_motions=motions)
     if chosen.target.endswith(".yaml"):
         page = build(read_page_file(*chosen.target.split(":")), chosen.name, results, settings)
     else:

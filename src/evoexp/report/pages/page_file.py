@@ -39,17 +39,8 @@ KEYS: dict[str, set[str]] = {
 _EACH = re.compile(r"(\w+(?:, \w+)*) in ([\w.]+)")
 _FIRST = re.compile(r"[.\[]")  # ends the first part of a name
 _NAMED = (
-    "fits",
-    "when",
-    "among",
-    "row",
-    "rows",
-    "values",
-    "judge",
-    "families",
-    "conditions",
-    "plays",
-    "shows",
+    *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
+    *("plays", "shows"),
 )
 _TEXTS = ("title", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (

@@ -137,13 +137,6 @@ class Figures(NamedTuple):
     heading: str = "Figures"
 
 
-class Notice(NamedTuple):
-    """A remark at the top of a page, of its results as a whole."""
-
-    title: str
-    text: str
-
-
 class LogText(NamedTuple):
     """A replicate of a stored run: where its log is, or why there is none."""
 
@@ -175,16 +168,11 @@ class Document(NamedTuple):
     command: str  # that makes it
     experiment: str  # name of the experiment; empty for runs given by their hashes
     budget: str  # name of the budget; empty for runs given by their hashes
-    notices: tuple[Notice, ...]  # remarks on the results as a whole
+    notices: tuple[tuple[str, str], ...]  # (title, text): remarks on the results as a whole
     introduction: str  # one paragraph
     sections: tuple[Table | Figures, ...]  # without empty ones
     runs: tuple[RunText, ...]  # those that it shows
-    seeds: tuple[int, ...] = ()  # of their conditions, each once
-
-    @property
-    def provenance(self) -> str:
-        """The sentence that tells the runs: how many, of which seeds and hashes."""
-        return provenance([(run.hash12, run.done) for run in self.runs], self.seeds)
+    provenance: str = ""  # the sentence that tells them: how many, of which seeds and hashes
 
     @property
     def origin(self) -> str:

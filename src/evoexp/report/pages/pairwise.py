@@ -9,7 +9,7 @@ from evoexp.report.pages import markdown
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, Measure, Values, by_column, compared
+from evoexp.report.statistics.comparisons import Comparison, Values, by_column, compared
 from evoexp.report.statistics.comparisons import adjusted as adjusted_rows
 from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 
@@ -18,12 +18,12 @@ MOST = 6  # conditions of which every pair is tabled; of more, the first against
 Pair = tuple[ConditionResults, ConditionResults]
 
 
-EFFORTS = (  # quantities that every planner records; lower is better
-    Measure("best cost", by_column("best_cost")),
-    Measure("evaluations", by_column("evaluations")),
-    Measure("collision queries", by_column("collision_queries")),
-    Measure("CPU time, search [s]", search_seconds),
-)
+EFFORTS: dict[str, Values] = {  # quantities that every planner records; lower is better
+    "best cost": by_column("best_cost"),
+    "evaluations": by_column("evaluations"),
+    "collision queries": by_column("collision_queries"),
+    "CPU time, search [s]": search_seconds,
+}
 SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
     "solved": success,
     # of the motions that the exact verdict judged
@@ -32,18 +32,13 @@ SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
 }
 
 
-def differing(results: Results) -> list[Measure]:
-    """Return the quantities that are not the same in every run."""
-    return [
-        one
-        for one in EFFORTS
-        if len(np.unique(np.concatenate([one.values(c) for c in results.evolved]))) > 1
-    ]
-
-
-def differing_values(differing: list[Measure]) -> dict[str, Values]:
-    """Return the values of these quantities by name."""
-    return {one.name: one.values for one in differing}
+def differing(results: Results) -> dict[str, Values]:
+    """Return the quantities that are not the same in every run, by name."""
+    return {
+        name: values
+        for name, values in EFFORTS.items()
+        if len(np.unique(np.concatenate([values(c) for c in results.evolved]))) > 1
+    }
 
 
 def pairs(results: Results) -> list[Pair]:
@@ -55,15 +50,15 @@ def pairs(results: Results) -> list[Pair]:
 
 
 def pairs_of_conditions(
-    results: Results, settings: ReportSettings, differing: list[Measure]
+    results: Results, settings: ReportSettings, differing: dict[str, Values]
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare pairs in every quantity in which they differ; p-values are adjusted within each."""
     of = "pairs of conditions"
     if len(results.evolved) > MOST:
         of = f"{results.evolved[0].label} against each other condition"
     found = (
-        (f"{one.name}: {of}", compared(pairs(results), one.values, settings, named=_named))
-        for one in differing
+        (f"{name}: {of}", compared(pairs(results), values, settings, named=_named))
+        for name, values in differing.items()
     )
     return tuple((heading, rows) for heading, rows in found if rows)
 
@@ -94,16 +89,15 @@ def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]
 
 
 def compared_pairs(
-    results: Results, settings: ReportSettings, differing: list[Measure]
+    results: Results, settings: ReportSettings, differing: dict[str, Values]
 ) -> list[tuple[tuple[str, str], Comparison]]:
     """Return (labels, comparison of best costs) of all pairs of three conditions or more."""
-    best = EFFORTS[0]
-    if len(results.evolved) < 3 or best not in differing:
+    if len(results.evolved) < 3 or "best cost" not in differing:
         return []
     every = [
         ((a.label, b.label), row)
         for a, b in itertools.combinations(results.evolved, 2)
-        for row in compared([(a, b)], best.values, settings)
+        for row in compared([(a, b)], differing["best cost"], settings)
     ]
     tested = adjusted_rows([row for _, row in every])
     return [(labels, row) for (labels, _), row in zip(every, tested, strict=True)]

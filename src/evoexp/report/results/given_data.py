@@ -144,7 +144,7 @@ def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
     given = []
     for (planner, name), runs in cells.items():
         seeds = tuple(sorted(runs))  # the runs of a planner on a problem, in their order
-        rows = [
+        proven = [
             (seed, row.queries, row.cost, True)
             for seed in seeds
             for row in sorted(runs[seed], key=lambda each: each.queries)
@@ -156,7 +156,7 @@ def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
             marked,
             known[name],
             f"{name}: {marked}" if named else marked,
-            pd.DataFrame(rows, columns=columns).astype({"certified": bool}),
+            pd.DataFrame(proven, columns=columns).astype({"certified": bool}),
             seeds,
             np.array(spent, dtype=np.float64),
             None,

@@ -13,6 +13,7 @@ import pandas as pd
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.results.proven_answers import answers_of, straight_line
+from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults
 
 MULTIPLES = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of a problem's unit of length
@@ -205,11 +206,10 @@ def _task(c: ConditionResults) -> Hashable:
     return c.robot, c.scenario
 
 
-def _by_task(conditions: Sequence[ConditionResults]) -> dict[Hashable, list[ConditionResults]]:
-    found: dict[Hashable, list[ConditionResults]] = {}
-    for c in conditions:
-        found.setdefault(_task(c), []).append(c)
-    return found
+def _by_task(
+    conditions: Sequence[ConditionResults],
+) -> dict[Hashable, tuple[ConditionResults, ...]]:
+    return {_task(own[0]): own for own in grouped(conditions, _task)}
 
 
 def _option(c: ConditionResults, group: str) -> str:

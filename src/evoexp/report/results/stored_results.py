@@ -149,11 +149,7 @@ class ConditionResults:
         return self.condition.prepare()
 
     def problem(self, kind: type[Kind]) -> Kind:
-        """Return the problem that the planner prepared, of the public type that a page expects.
-
-        Raises:
-            TypeError: If another planner was run.
-        """
+        """Return the problem that the planner prepared, of the public type that a page expects."""
         found = self.prepared.problem
         if not isinstance(found, kind):
             raise TypeError(f"{self.label}: a {kind.__qualname__} is expected, was {type(found)}")
@@ -165,11 +161,7 @@ class ConditionResults:
         return dict(planner.evaluate(problem, solution))
 
     def motion(self, replicate: int) -> Motion:
-        """Return the motion of a replicate's best solution.
-
-        Raises:
-            TypeError: If the planner's answer is no motion.
-        """
+        """Return the motion of a replicate's best solution, which must be one."""
         planner, problem = self.prepared
         found = planner.motion(problem, self.solutions[replicate])
         if not isinstance(found, Motion):

@@ -5,20 +5,19 @@
 
 import itertools
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles, quantile
 
 JOIN = " · "  # between the parts of a label
 _SETTING = re.compile(r"([\w.@/-]+)=(.*)")
 FEWEST = 2  # combinations of values that are a sweep
-
-Values = Callable[[ConditionResults], np.ndarray]
 
 
 class Swept(NamedTuple):

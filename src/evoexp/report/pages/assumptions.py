@@ -65,23 +65,22 @@ class Judged(NamedTuple):
 
 def families(assumed_results: Results) -> tuple[Family, ...]:
     """Return the conditions as assumed, each with those that change its settings by overrides."""
-    results = assumed_results
     changed = {
         c: tuple(
             p.name
-            for p in parameters(results, c)
+            for p in parameters(assumed_results, c)
             if p.source == OVERRIDE and p.name not in ("seed", "num_replicates")
         )
-        for c in results.main
+        for c in assumed_results.main
     }
-    options = {c: sorted((each.group, each.name) for each in c.options) for c in results.main}
+    options = {c: sorted((each.group, each.name) for each in c.options) for c in changed}
     return tuple(
         Family(
             shipped,
             tuple((c, own) for c, own in changed.items() if own and options[c] == options[shipped]),
         )
-        for shipped in results.main
-        if not changed[shipped]
+        for shipped, own_changes in changed.items()
+        if not own_changes
     )
 
 

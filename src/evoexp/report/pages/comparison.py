@@ -155,10 +155,7 @@ def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
         return row
     solved = own.table[own.table["solved"].astype(bool)]
     first = solved.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
-    spent = {
-        "evaluations": condition.column("evaluations"),
-        "cpu_s": search_seconds(condition),
-    }
+    spent = {"evaluations": condition.column("evaluations"), "cpu_s": search_seconds(condition)}
     per_answer: dict[str, Any] = {
         name: expected_effort(*own.first_reached(effort=name, spent=whole))
         for name, whole in spent.items()

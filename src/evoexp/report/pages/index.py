@@ -150,9 +150,8 @@ def _conditions(results: Results, settings: ReportSettings) -> Table:
     for c in results.conditions:
         solved, found = "–", c.verdicts
         if c.done:
-            low, high = Proportion(c.solved, c.done).interval(settings.confidence)
-            share = markdown.share(c.solved, c.done)
-            solved = f"{share} ({100 * low:.0f}–{100 * high:.0f} %)"
+            interval = Proportion(c.solved, c.done).interval(settings.confidence)
+            solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
         exact: tuple[object, ...] = ("–",) * 5
         if found.judged:
             proven = found.certified, found.refuted, found.undecided

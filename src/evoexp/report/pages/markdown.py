@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from evoexp.report.pages.page_parts import Document
-from evoexp.report.statistics.inference import Proportion, Spread
+from evoexp.report.statistics.inference import Interval, Proportion, Spread
 from evoexp.report.statistics.inference import spread as spread_of
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
@@ -127,6 +127,11 @@ def p_value(p: float) -> str:
 def share(count: int, total: int) -> str:
     """Return a count of a total."""
     return f"{count} of {total}"
+
+
+def percent(interval: Interval) -> str:
+    """Return an interval of a proportion in percent."""
+    return f"{100 * interval.low:.0f}–{100 * interval.high:.0f} %"
 
 
 def spread(values: Spread) -> str:

@@ -81,7 +81,8 @@ def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame
     found: dict[str, list[Answer]] = {c.label: [] for c in conditions}
     for (condition, replicate, path), cpu_s in zip(logs, times, strict=True):
         found[condition.label] += [
-            Answer(replicate, *answer, float(cpu_s[answer[0]])) for answer in kept[path]
+            Answer(replicate, *answer)._replace(cpu_s=float(cpu_s[answer[0]]))
+            for answer in kept[path]
         ]
     return {label: answer_table(own) for label, own in found.items()}
 

@@ -28,6 +28,7 @@ PARTS: dict[str, Callable[..., Any]] = {
     "main": lambda results: results.main,  # without controls and references
     "first": lambda results: results.with_data[0],
     "unit": lambda first: first.length_unit,  # of the first condition's scene
+    "several": lambda results: len(results.with_data) > 1,  # there is something to compare
     "are_few": lambda results: len(results.evolved) <= FEW,
     "whole": lambda conditions: (Family.of(conditions),),  # the first one against all others
     "played": lambda condition: (PlayedRun(condition, condition.best_replicate),),

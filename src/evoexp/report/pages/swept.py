@@ -1,4 +1,4 @@
-"""What the page of a sweep shows: each combination, the effect of each setting, facets.
+"""Rows and words of the page of a sweep: each combination, the effect of each setting, facets.
 
 What does not depend on the sweep, the scene and the motion, is shown once, of the best condition.
 The functions give what the page `sweep` of `page.yaml` names.

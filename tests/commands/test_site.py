@@ -1,5 +1,6 @@
 """`evoexp site`, `evoexp report --all` and `evoexp report --check`."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -104,9 +105,8 @@ def test_all_reports_are_drawn_again_by_their_own_commands(
 ) -> None:
     evoexp("site")
     before = reports(stored)
-    for path in (drawn / "index.html", drawn / "fig_5_fitness.svg"):
-        path.write_bytes(b"")
-    (drawn / "index.md").write_bytes(before[drawn / "index.md"])  # which names the command
+    for name in ("index.md", "fig_5_fitness.svg"):
+        (drawn / name).write_bytes(b"")
     said = evoexp("report", "--all")
     assert said.code == 0, said
     assert said.out.splitlines() == [
@@ -162,11 +162,12 @@ def test_a_report_that_names_no_command_is_left_as_it_is(
     drawn: Path, stored: Path, evoexp: Evoexp
 ) -> None:
     strange = stored / "reports" / "strange"
-    strange.mkdir()
-    (strange / "index.md").write_text("# strange\n\nMade by `evoexp clean --delete`.\n")
-    other = stored / "reports" / "other"
-    other.mkdir()
-    (other / "index.md").write_text("# other\n\nMade by `evoexp report --nonsense`.\n")
+    for name, command in (("strange", "clean --delete"), ("other", "report --nonsense")):
+        summary = json.dumps({"title": name, "command": command})
+        (stored / "reports" / name).mkdir()
+        (stored / "reports" / name / "index.html").write_text(
+            f'<script type="application/json" id="summary">{summary}</script>'
+        )
     before = content(strange)
     said = evoexp("report", "--all")
     assert said.code == 1

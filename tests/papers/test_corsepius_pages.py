@@ -19,7 +19,7 @@ from evoexp.papers.corsepius.figures import (
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.report.statistics.inference import Interval, Proportion

@@ -15,7 +15,7 @@ from evoexp.papers.curkovic.figures import (
     pareto_fronts,
     robot_motions,
 )
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_file import read_page_file
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.results.stored_results import ConditionResults, Results

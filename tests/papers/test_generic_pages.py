@@ -3,7 +3,7 @@
 import pytest
 
 from evoexp.registry import PAGES, registrations
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
 from report_samples import REPORT

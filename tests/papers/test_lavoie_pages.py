@@ -13,7 +13,7 @@ from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.report.figures import shares
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.stored_results import ConditionResults, gather
 from evoexp.report.statistics.inference import Proportion

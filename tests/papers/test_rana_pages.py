@@ -9,7 +9,7 @@ from evoexp.papers.rana import claims as paper_claims
 from evoexp.papers.rana import measures, motions
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.records import generations
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import run_measures
 from evoexp.report.results import stored_results as report_results
 from evoexp.report.results.stored_results import Results

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from evoexp.report.results.proven_answers import Answer, answer_table, best_lengths, first_reached
+from evoexp.report.results.planner_runs import PlannerRuns, Problem
+from evoexp.report.results.proven_answers import Answer, answer_table
 
 SOME = [
     Answer(0, 0, 50, 1000, 9.0, 4.0, True, False),
@@ -13,10 +14,15 @@ SOME = [
 ]
 
 
+def runs_of(answers: list[Answer], *spent: float) -> PlannerRuns:
+    table, replicates = answer_table(answers), tuple(range(len(spent)))
+    return PlannerRuns("", Problem("p"), "", table, replicates, np.array(spent), None)
+
+
 def test_the_first_and_the_best_answers_of_runs() -> None:
-    table, spent = answer_table(SOME), np.array([9000.0, 9100.0, 9200.0])
-    assert best_lengths(table, [0, 1, 2]).tolist() == [5.0, np.inf, 7.0]
-    effort, reached = first_reached(table, [0, 1, 2], 5.5, spent)
+    runs = runs_of(SOME, 9000.0, 9100.0, 9200.0)
+    assert runs.best_lengths.tolist() == [5.0, np.inf, 7.0]
+    effort, reached = runs.first_reached(5.5)
     assert effort.tolist() == [8000.0, 9100.0, 9200.0]
     assert reached.tolist() == [True, False, False]
 
@@ -24,8 +30,9 @@ def test_the_first_and_the_best_answers_of_runs() -> None:
 def test_no_answer_at_all_is_a_table_too() -> None:
     table = answer_table([])
     assert list(table.dtypes) == list(answer_table(SOME).dtypes)
-    assert best_lengths(table, [0, 1]).tolist() == [np.inf, np.inf]
-    effort, reached = first_reached(table, [0, 1], np.inf, np.array([3.0, 4.0]))
+    runs = runs_of([], 3.0, 4.0)
+    assert runs.best_lengths.tolist() == [np.inf, np.inf]
+    effort, reached = runs.first_reached()
     assert effort.tolist() == [3.0, 4.0]
     assert not reached.any()
     assert table[table["solved"]].groupby("replicate")["collision_queries"].min().empty

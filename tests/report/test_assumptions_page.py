@@ -2,9 +2,9 @@
 
 import pytest
 
-from evoexp.report.pages import assumptions
 from evoexp.report.pages.assumptions import Headline
-from evoexp.report.pages.page_parts import Claim
+from evoexp.report.pages.page_builder import own_page
+from evoexp.report.pages.page_parts import Claim, Page
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.claim_rules import Rule
 from evoexp.report.statistics.comparisons import by_column
@@ -32,13 +32,21 @@ RULES = {
 CONTROLS: dict[str, list[str]] = {}
 
 
-def judged(
-    judge: Judge, condition: ConditionResults, controls: tuple[ConditionResults, ...]
-) -> Claim:
+def judged(condition: ConditionResults, controls: tuple[ConditionResults, ...]) -> Claim:
     """Judge by the number of obstacles, so that one variation differs."""
     CONTROLS[condition.label] = [c.label for c in controls]
-    hearing = judge.on("short", who="")._replace(reason="")
+    hearing = Judge("", SETTINGS, RULES).on("short", who="")
     return hearing.own("told", 2, len(condition.condition.scenario.obstacles) > 1)  # type: ignore[attr-defined]
+
+
+SETTINGS = page_settings("chen_path", "generic")
+HEADLINE = Headline("short", "length [node]", by_column("term_distance"), judged)
+
+
+def page_of(results: Results) -> Page:
+    """Return the page of one headline claim."""
+    own = {"paper": "Chen", "assumed_results": results, "headlines": [HEADLINE]}
+    return own_page("assumptions", results, SETTINGS, **own)
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +60,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 
 def test_every_assumed_number_stands_with_its_reason_and_its_variations(results: Results) -> None:
-    settings = page_settings("chen_path", "generic")
-    headline = Headline("short", "length [node]", by_column("term_distance"), judged)
-    page = assumptions.page(results, settings, RULES, "Chen", [headline])
+    page = page_of(results)
     effects, numbers = page.tables
     rows = {str(row[0]): row for row in numbers.rows}
     assert rows["`ga.num_elites`"][1:] == ("0", "–", "not printed", "one elite")
@@ -74,10 +80,7 @@ def test_every_assumed_number_stands_with_its_reason_and_its_variations(results:
 
 
 def test_a_claim_survives_where_no_variation_changes_its_verdict(results: Results) -> None:
-    settings = page_settings("chen_path", "generic")
-    headline = Headline("short", "length [node]", by_column("term_distance"), judged)
-    found = assumptions.page(results, settings, RULES, "Chen", [headline]).claims
-    first, survives = found
+    first, survives = page_of(results).claims
     assert (first.text, first.verdict) == ("as assumed: a short path", "reproduced")
     assert "1 of 2 variations: a smaller map (contradicted)" in survives.evidence
     assert survives.verdict == "not judged (budget smoke)"
@@ -85,10 +88,7 @@ def test_a_claim_survives_where_no_variation_changes_its_verdict(results: Result
 
 
 def test_the_figure_has_a_row_for_every_condition(results: Results) -> None:
-    headline = Headline("short", "length [node]", by_column("term_distance"), judged)
-    page = assumptions.page(
-        results, page_settings("chen_path", "generic"), RULES, "Chen", [headline]
-    )
+    page = page_of(results)
     table = page.drawings[0].table()
     assert list(table["condition"]) == ["as assumed", "one elite", "a smaller map"]
     assert list(table["verdict"]) == ["reproduced", "reproduced", "contradicted"]

@@ -109,7 +109,7 @@ def test_targets_are_multiples_of_the_best_known_not_of_the_best_here(
     low, high = (share_table(runs)["share"].astype(float).max() for runs in (known, plain))
     assert low <= high
     for runs, words in ((plain, "straight line"), (known, "best known")):
-        table = comparison.page_of_runs(runs, results, settings).tables[0]
+        table = comparison.page(results, settings, runs).tables[0]
         assert table.rows[0][-1] == words and table.rows[0][1] == f"`{key}`"
 
 

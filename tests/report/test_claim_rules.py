@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.claim_rules import KINDS, Rules, read_rules

@@ -1,12 +1,11 @@
-"""The table of a comparison as files: read back, every number and name is there."""
+"""The answers of a comparison as CSV: read back, every number and name is there."""
 
 import csv
 import io
 
 import numpy as np
 
-from evoexp.report.pages.comparison import Rated
-from evoexp.report.pages.comparison_files import as_csv, as_latex
+from evoexp.report.pages.comparison import Rated, as_csv
 from evoexp.report.statistics.inference import Interval, Spread
 
 ROWS = [
@@ -56,17 +55,3 @@ def test_csv_has_all_digits() -> None:
     assert [float(cell) for cell in first[4:]] == numbers
     unknown = ["", "", ""]  # of runs that were given
     assert second == ["C (given)", "q, {a}", "2", "0", "inf", "1000000.0", *["inf"] * 4, *unknown]
-
-
-def test_latex_has_a_row_per_planner_and_problem() -> None:
-    text = as_latex(ROWS, "evoexp compare x\ny", 0.95).decode()
-    lines = text.splitlines()
-    assert lines[0] == "% made by evoexp compare x y"
-    assert [line for line in lines if "rule" in line] == [r"\toprule", r"\midrule", r"\bottomrule"]
-    rows = lines[lines.index(r"\midrule") + 1 : lines.index(r"\bottomrule")]
-    assert rows == [
-        r"{[}A] \& B\_1 50\% & p\_1 & 4 & 3 & 1234 (900--2000) & 1.333 [1, 2] \\",
-        r"C (given) & q, \{a\} & 2 & 0 & $\infty$ (1000000--$\infty$) "
-        r"& $\infty$ [$\infty$, $\infty$] \\",
-    ]
-    assert lines[2] == r"\begin{tabular}{llrrrr}" and lines[-1] == r"\end{tabular}"

@@ -14,14 +14,8 @@ from evoexp.report.figures.effort_curves import draw_shares, length_table, share
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import proven_answers
-from evoexp.report.results.planner_runs import MULTIPLES, of_results
-from evoexp.report.results.proven_answers import (
-    answers_of,
-    best_lengths,
-    first_reached,
-    motion_length,
-    straight_line,
-)
+from evoexp.report.results.planner_runs import MULTIPLES, PlannerRuns, Problem, of_results
+from evoexp.report.results.proven_answers import answers_of, motion_length, straight_line
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.store.log_reader import read_log
 from report_samples import expand, store
@@ -89,11 +83,12 @@ TABLE = pd.DataFrame(
 
 def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
     spent = np.array([100.0, 200.0, 300.0])
-    effort, reached = first_reached(TABLE, [0, 1, 2], np.inf, spent)
+    runs = PlannerRuns("", Problem("p"), "", TABLE, (0, 1, 2), spent, None)
+    effort, reached = runs.first_reached()
     assert (effort.tolist(), reached.tolist()) == ([10.0, 200.0, 15.0], [True, False, True])
-    effort, reached = first_reached(TABLE, [0, 1, 2], 4.0, spent)
+    effort, reached = runs.first_reached(4.0)
     assert (effort.tolist(), reached.tolist()) == ([30.0, 200.0, 15.0], [True, False, True])
-    assert best_lengths(TABLE, [0, 1, 2]).tolist() == [2.0, np.inf, 3.0]
+    assert runs.best_lengths.tolist() == [2.0, np.inf, 3.0]
     assert straight_line(TABLE) == 2.0
     assert np.isnan(straight_line(TABLE.assign(straight=[1.0, 2.0, 2.0, 2.0])))
 
@@ -120,12 +115,11 @@ def test_shares_are_counts_of_targets(results: Results) -> None:
 
 
 def test_the_last_median_is_that_of_the_best_lengths(results: Results) -> None:
-    found = answers_of(results.evolved)
-    table = length_table(of_results(results.evolved))
-    for condition in results.evolved:
-        best = best_lengths(found[condition.label], condition.summaries.index)
-        last = table[table["planner"] == condition.label].iloc[-1]
-        assert last["median"] == pytest.approx(np.median(best))
+    runs = of_results(results.evolved)
+    table = length_table(runs)
+    for own in runs:
+        last = table[table["planner"] == own.label].iloc[-1]
+        assert last["median"] == pytest.approx(np.median(own.best_lengths))
 
 
 def test_the_page_tells_every_condition_and_every_pair(

@@ -74,7 +74,7 @@ def test_the_page_marks_given_planners(
 ) -> None:
     ours = of_results(results.evolved)
     data = read_given(str(given))
-    page = comparison.page_of_runs([*ours, *of_given(data, ours)], results, settings, data)
+    page = comparison.page(results, settings, [*ours, *of_given(data, ours)], data)
     assert data.sha256[:12] in page.introduction and "(given)" in page.introduction
     last = page.tables[1].rows[-1]
     assert last[0] == "elsewhere: my, own (given)" and last[-1] == "–"

@@ -18,9 +18,7 @@ def summary(folder: str, command: str = "", picture: str = "") -> ReportSummary:
     headings = (("Claims", "claims"), ("GA against others", "ga-against-others"))
     words = command or f"report {folder}"
     runs = ((HASH, "GA"),)
-    return ReportSummary(
-        folder, "index.html", f"about {folder}", words, "", 0, headings, CLAIMS, runs, picture
-    )
+    return ReportSummary(folder, f"about {folder}", words, "", 0, headings, CLAIMS, runs, picture)
 
 
 def test_a_card_counts_the_claims_of_whole_experiments() -> None:
@@ -30,12 +28,12 @@ def test_a_card_counts_the_claims_of_whole_experiments() -> None:
         summary("rana_three@smoke"),
     ]
     (card,) = site(found, [RANA], [])["papers"]
-    assert card.counts == (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
-    assert card.unjudged == 3
-    assert card.missing == ("rana_puma",)
-    assert card.face.picture == "rana_planar/fig_5.svg"
-    assert [link.text for link in card.links] == [each.folder for each in found]
-    assert card.links[1].url == "rana_planar%2B12345678/index.html?home"
+    assert card["counts"] == (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
+    assert card["unjudged"] == 3
+    assert card["missing"] == ["rana_puma"]
+    assert card["face"].picture_url == "rana_planar/fig_5.svg"
+    assert card["reports"] == found
+    assert found[1].url() == "rana_planar%2B12345678/index.html?home"
 
 
 def test_reports_of_no_paper_stand_by_themselves() -> None:
@@ -45,7 +43,8 @@ def test_reports_of_no_paper_stand_by_themselves() -> None:
         summary("ranaplanar"),
     ]
     groups = {
-        name: [link.text for link in links] for name, links in site(found, [RANA], [])["others"]
+        name: [report.folder for report in reports]
+        for name, reports in site(found, [RANA], [])["others"]
     }
     assert groups == {
         "Arenas and other experiments": ["arena_rana", "ranaplanar"],
@@ -101,7 +100,6 @@ def test_what_strangers_write_is_only_text(text: str) -> None:
     folder = text.replace("/", "")
     hostile = ReportSummary(
         folder,
-        "index.html",
         text,
         text,
         text,

@@ -21,7 +21,8 @@ RUNS = tuple(RunText(f"condition {k}", f"{k}" * 64, 20, 0, False) for k in range
 
 
 def document(*tables: Table, runs: tuple[RunText, ...] = RUNS[:1]) -> Document:
-    return Document("A & B", "evoexp report x", "exp_1", "paper", (), "", tables, runs, (0, 7))
+    words = "A & B", "evoexp report x", "exp_1", "paper", (), ""
+    return Document(*words, tables, runs, "n = 20, seeds 0, 7; run `000000000000`.")
 
 
 def lines_of(table: Table = TABLE) -> list[str]:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from evoexp.errors import EvoexpError, SettingError, UnknownSetting
-from evoexp.report.pages import page_of
-from evoexp.report.pages.page_builder import build
+from evoexp.report.pages.page_builder import build, page_of
 from evoexp.report.pages.page_file import PageFile, read_page_file
 from evoexp.report.pages.page_scope import Functions, Scope
 from evoexp.report.report_settings import ReportSettings
@@ -130,7 +129,7 @@ def test_a_value_is_computed_once_for_all_that_name_it() -> None:
         calls.append(f"item {item}")
         return item + base
 
-    scope = Scope(Functions(base=base, of_item=of_item), {})
+    scope = Scope(Functions({"base": base, "of_item": of_item}), {})
     assert [scope.inner(item=k)["of_item"] for k in (4, 5, 4)] == [5, 6, 5]
     assert sorted(calls) == ["base", "item 4", "item 5"]
     with pytest.raises(KeyError):
@@ -143,5 +142,5 @@ PAPERS = ("chen", "corsepius", "curkovic", "lavoie", "rana")
 @pytest.mark.parametrize("package", ["report.pages", *(f"papers.{name}" for name in PAPERS)])
 def test_every_figure_has_a_table_and_a_drawing(package: str) -> None:
     file = read_page_file(f"evoexp.{package}")
-    for entry in file.words.words["figures"].values():
+    for entry in file.entries["figures"].values():
         assert "kind" in entry or len(file.table_and_drawing(entry["functions"])) == 2

@@ -168,7 +168,7 @@ RANKED = ("performance_profiles", "critical_difference")
 def test_the_page_says_why_there_is_no_test_or_no_ranking(settings: ReportSettings) -> None:
     def page_parts(problems: str, planners: str) -> tuple[str, str, list[str]]:
         runs = [runs_of(a, p, [float(k + 1)]) for p in problems for k, a in enumerate(planners)]
-        page = comparison.page_of_runs(runs, Results("", "", ()), settings)
+        page = comparison.page(Results("", "", ()), settings, runs)
         notes = {table.heading: table.note for table in page.tables}
         stems = [drawing.stem for drawing in page.drawings if drawing.stem in RANKED]
         return notes["Problems"], notes.get("Ranks over problems", ""), stems

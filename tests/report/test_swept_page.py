@@ -173,7 +173,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 @pytest.mark.parametrize("width", ["page", "column"])
 def test_all_its_figures_are_drawn(swept: Results, width: Any) -> None:
-    from evoexp.report.pages import page_of
+    from evoexp.report.pages.page_builder import page_of
 
     page = page_of(swept, SETTINGS)
     assert page.title == "rana_planar: a sweep" and page.claims == ()

@@ -12,7 +12,7 @@ from evoexp.commands.report_requests import request_of
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
-from evoexp.report.pages import page_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.statistics.claim_rules import Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 

@@ -16,7 +16,6 @@ from evoexp.condition import Condition
 from evoexp.configuration.labels import SAME
 from evoexp.errors import SettingError
 from evoexp.report.pages import build, comparison, markdown
-from evoexp.report.pages.comparison_files import as_csv, as_latex
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import read_best_known, shipped_best_known
 from evoexp.report.results.given_data import of_given, read_given, strange_problems
@@ -44,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "multiples of them",
     )
     parser.add_argument("--csv", metavar="FILE", help="write the table as CSV, with all digits")
-    parser.add_argument("--latex", metavar="FILE", help="write the table as LaTeX (booktabs)")
+    parser.add_argument("--latex", metavar="FILE", help="write the answers as LaTeX (booktabs)")
     parser.add_argument(
         "--ioh", metavar="FOLDER", help="write the runs for IOHanalyzer and iohinspector"
     )
@@ -62,10 +61,10 @@ def main(arguments: argparse.Namespace) -> int:
     page = build.write_report(files)
     rows = comparison.rated(runs, settings)
     if arguments.csv:
-        write_file(Path(arguments.csv), as_csv(rows))
+        write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:
-        command = f"evoexp compare {request.words}"
-        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
+        (table,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
+        write_file(Path(arguments.latex), table)
     if arguments.ioh:
         written = {folder / name: content for name, content in ioh_files(runs).items()}
         for path in written:
@@ -114,7 +113,7 @@ def drawn(
     if given:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
-    page = comparison.page_of_runs(runs, found, settings, given)
+    page = comparison.page(found, settings, runs, given)
     return build.page_files(request, page, found, settings), request, settings, runs, strange
 
 

@@ -11,8 +11,7 @@ from evoexp.papers.corsepius.figures.posture_motions import ShownPath
 from evoexp.papers.corsepius.measures import Conditions, Tasks
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Quantity
-from evoexp.report.pages.page_words import quantity
+from evoexp.report.pages.page_parts import Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results

@@ -10,8 +10,7 @@ from evoexp.papers.curkovic import link_motions, measures
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Claim, Quantity
-from evoexp.report.pages.page_words import quantity
+from evoexp.report.pages.page_parts import Claim, Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results

@@ -198,7 +198,10 @@ class PostureEs(PlannerDefaults, Component):
         """Describe the collision model and list the body pairs that it skips."""
         objects = zip(problem.task.names, problem.task.objects, strict=True)
         hulls = [name for name, each in objects if each.shape == "hull"]
-        return (*problem.bodies.notes(problem.task.length_unit, is_complete=True), *hull_notes(hulls))
+        return (
+            *problem.bodies.notes(problem.task.length_unit, is_complete=True),
+            *hull_notes(hulls),
+        )
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the spheres or capsules around the robot's bodies."""

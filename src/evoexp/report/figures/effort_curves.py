@@ -12,7 +12,6 @@ from evoexp.records import FloatArray
 from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
-from evoexp.report.results.proven_answers import best_lengths
 from evoexp.report.statistics.inference import quantiles
 
 POINTS = 200  # along the axis of effort
@@ -86,7 +85,7 @@ def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
         least = float(table["collision_queries"].min()) if len(table) else 0.5 * most
         axis = np.geomspace(max(least, 1.0), most, POINTS // 2)
         early = (table[table["collision_queries"] <= x] for x in axis)
-        best = np.array([best_lengths(part, own.replicates) for part in early])  # (points, runs)
+        best = np.array([own._replace(table=part).best_lengths for part in early])  # (points, runs)
         spread = dict(
             zip(("median", "lower", "upper"), quantiles(best, (0.5, 0.25, 0.75)), strict=True)
         )

@@ -14,7 +14,8 @@ from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
 from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import MainEffect, Sweep, Values, labelled
+from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled
+from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import quantile
 
 PER_LINE = 3  # panels side by side

@@ -1,43 +1,24 @@
 """The page of what a paper leaves open: every assumed number, and which claims survive another one.
 
-A paper has an experiment `<paper>_assumptions` (`conf/experiment`) for it. Its first condition of a
-family is the shipped one, without overrides; each other condition changes assumed settings by
-overrides (`planner.num_via_points=10`), and keeps all options; controls stand beside their
-conditions as everywhere:
-
-    defaults: [..., {override /report: rana_assumptions}]
-    conditions:
-      "as assumed": []
-      "as assumed, multi-start": [control=multi_start]
-      "N = 10": [planner.num_via_points=10]
-      "N = 10, multi-start": [planner.num_via_points=10, control=multi_start]
-
-The paper's `page.yaml` (see `page_file`) has a page with `headlines`: its headline claims, each
-with its rule in `claims.yaml`, a quantity that is drawn, and a function that judges it on one
-condition:
-
-    headlines:
-      - {claim: free_at_via_points, quantity: "free runs [%]", values: free, judge: judge_free}
-
-    def judge_free(judge, condition, controls):  # -> Claim
-        return judge.on("free_at_via_points", who="").every(...)
+The functions below give what the page `assumptions` of `page.yaml` shows. `assumed_results` are
+those of the experiment `<paper>_assumptions`, or of some of its conditions.
 """
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from evoexp.report.pages import generic, markdown
-from evoexp.report.pages.page_builder import own_page
-from evoexp.report.pages.page_parts import Claim, Page
+from evoexp.report.pages import markdown
+from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import OVERRIDE, Parameter, parameters
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.claim_rules import OWN, Rule, Rules
+from evoexp.report.statistics.claim_rules import OWN, Rule
 from evoexp.report.statistics.comparisons import Values, beside
 from evoexp.report.statistics.inference import spread
-from evoexp.report.statistics.judging import Hearing, Judge
+from evoexp.report.statistics.judging import Hearing
 
 ASSUMED = "assumed"
 SHOWN = 4  # values of a list that are written out
@@ -61,7 +42,7 @@ class Headline(NamedTuple):
     quantity: str  # that is drawn, with its unit
     values: Values  # the quantity of a condition's runs, (done,); inf: never
     # Judges the claim on one condition with its controls
-    judge: Callable[[Judge, ConditionResults, tuple[ConditionResults, ...]], Claim]
+    judge: Callable[[ConditionResults, tuple[ConditionResults, ...]], Claim]
 
 
 class Family(NamedTuple):
@@ -82,88 +63,49 @@ class Judged(NamedTuple):
     same: bool  # whether the verdict is that under the assumed numbers
 
 
-def page(
-    results: Results,
-    settings: ReportSettings,
-    rules: Rules,
-    paper: str,
-    headlines: Sequence[Headline],
-) -> Page:
-    """Build the page of a paper's assumptions.
-
-    Args:
-        results: Of the experiment `<paper>_assumptions`.
-        settings: Levels and formats.
-        rules: Of the paper's claims.
-        paper: "Rana & Zalzala 1995".
-        headlines: The claims that are judged again and again.
-    """
-    found = families(results)
-    if not found:
-        return generic.page(results, settings)
-    judge = judging.judge(results, settings, rules)
-    judged = [
-        one
-        for family in found
-        for headline in headlines
-        for one in _heard(results, judge, family, headline)
-    ]
-    return own_page(
-        "assumptions",
-        results,
-        settings,
-        paper=paper,
-        judged=judged,
-        headline_claims=tuple(_claims(judge, judged)),
-        headline_rows=_effects(judged),
-        headline_quantities=[f"{each.name}: {each.quantity}" for each in headlines],
-        assumed_rows=_assumed(results, found),
-    )
-
-
-def families(results: Results) -> tuple[Family, ...]:
+def families(assumed_results: Results) -> tuple[Family, ...]:
     """Return the conditions as assumed, each with those that change its settings by overrides."""
-    named = {c.label: _changed(results, c) for c in results.main}
-    shipped = [c for c in results.main if not named[c.label]]
+    changed = {
+        c: tuple(
+            p.name
+            for p in parameters(assumed_results, c)
+            if p.source == OVERRIDE and p.name not in ("seed", "num_replicates")
+        )
+        for c in assumed_results.main
+    }
+    options = {c: sorted((each.group, each.name) for each in c.options) for c in changed}
     return tuple(
         Family(
-            own,
-            tuple(
-                (c, named[c.label])
-                for c in results.main
-                if named[c.label] and _options(c) == _options(own)
-            ),
+            shipped,
+            tuple((c, own) for c, own in changed.items() if own and options[c] == options[shipped]),
         )
-        for own in shipped
+        for shipped, own_changes in changed.items()
+        if not own_changes
     )
 
 
-def _options(condition: ConditionResults) -> list[tuple[str, str]]:
-    """Return the options of a condition, by group."""
-    return sorted((each.group, each.name) for each in condition.options)
+def judged(
+    assumed_results: Results, families: Sequence[Family], headlines: Sequence[Headline]
+) -> Iterator[Judged]:
+    """Judge every headline claim on every condition of a family, first as assumed."""
+    for family, headline in itertools.product(families, headlines):
+        first = ""
+        for condition in (family.shipped, *(varied for varied, _ in family.varied)):
+            controls = tuple(
+                c
+                for c in assumed_results.evolved
+                if c.is_control and beside(condition.condition, c.condition)
+            )
+            claim = headline.judge(condition, controls)
+            first = first or claim.verdict
+            yield Judged(headline, family, condition, claim, claim.verdict == first)
 
 
-def _changed(results: Results, condition: ConditionResults) -> tuple[str, ...]:
-    """Return the names of settings that a condition changes by overrides."""
-    own = parameters(results, condition)
-    ignored = ("seed", "num_replicates")
-    return tuple(p.name for p in own if p.source == OVERRIDE and p.name not in ignored)
-
-
-def _heard(results: Results, judge: Judge, family: Family, headline: Headline) -> Iterator[Judged]:
-    """Judge a headline claim on every condition of a family, first as assumed."""
-    first = ""
-    for condition in (family.shipped, *(varied for varied, _ in family.varied)):
-        controls = tuple(
-            c for c in results.evolved if c.is_control and beside(condition.condition, c.condition)
-        )
-        claim = headline.judge(judge, condition, controls)
-        first = first or claim.verdict
-        yield Judged(headline, family, condition, claim, claim.verdict == first)
-
-
-def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
+def headline_claims(
+    assumed_results: Results, settings: ReportSettings, judged: Sequence[Judged]
+) -> Iterator[Claim]:
     """Yield each claim as assumed, then whether it survives every variation."""
+    reason = judging.not_judged(assumed_results)
     for family, headline in dict.fromkeys((one.family, one.headline) for one in judged):
         first, *others = (
             one for one in judged if one.family is family and one.headline is headline
@@ -178,11 +120,11 @@ def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
             f"{first.claim.verdict} as assumed; another verdict under "
             f"{len(differing)} of {len(others)} variations: {', '.join(differing) or '–'}"
         )
-        hearing = Hearing(SURVIVES.about(claim=text), judge.reason, judge.significance)
+        hearing = Hearing(SURVIVES.about(claim=text), reason, settings.significance)
         yield hearing.own(told, f"{len(others)} variations", not differing if others else None)
 
 
-def _effects(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
+def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
     """Return all verdicts, one row per condition: in the first family it is of."""
     first = {one.condition: one.family for one in reversed(judged)}
     rows = list[tuple[object, ...]]()
@@ -200,12 +142,17 @@ def _effects(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
     return rows
 
 
-def _assumed(results: Results, found: Sequence[Family]) -> list[tuple[object, ...]]:
+def headline_quantities(headlines: Sequence[Headline]) -> list[str]:
+    """Return the headers of the headline claims."""
+    return [f"{each.name}: {each.quantity}" for each in headlines]
+
+
+def assumed_rows(assumed_results: Results, families: Sequence[Family]) -> list[tuple[object, ...]]:
     """Return every assumed number, with the conditions that vary it."""
     # name of a setting, or of a list of settings → its entries; entry → the varying conditions
     lists: dict[str, dict[Parameter, list[str]]] = {}
-    for family in found:
-        for parameter in parameters(results, family.shipped):
+    for family in families:
+        for parameter in parameters(assumed_results, family.shipped):
             if ASSUMED in parameter.source:
                 names = {parameter.name, parameter.name.split("[")[0]}
                 by = [c.label for c, changed in family.varied if names & set(changed)]

@@ -1,19 +1,18 @@
 """Builds a report; no other module of it writes its files."""
 
-import functools
 import hashlib
-import inspect
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from evoexp.condition import Condition
-from evoexp.report.pages import markdown, page_of
+from evoexp.report.pages import markdown
 from evoexp.report.pages.html_page import HTML, html_page
 from evoexp.report.pages.index import document
 from evoexp.report.pages.latex_tables import latex_tables
 from evoexp.report.pages.motion_pictures import players_of
+from evoexp.report.pages.page_builder import page_of
 from evoexp.report.pages.page_parts import Drawing, Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results, gather
@@ -44,11 +43,7 @@ class Request(NamedTuple):
         if self.arguments:
             return self.arguments
         if self.experiment and "+" not in self.report_name:
-            return (
-                self.experiment
-                if self.budget == "paper"
-                else f"{self.experiment} budget={self.budget}"
-            )
+            return self.experiment + f" budget={self.budget}" * (self.budget != "paper")
         return " ".join(dict.fromkeys(condition.id[:12] for _, condition in self.conditions))
 
     @property
@@ -60,8 +55,8 @@ class Request(NamedTuple):
 
     def results(self, outputs: Path, num_replicates: int | None) -> Results:
         """Read the stored results, see `gather`."""
-        where = outputs, self.conditions, num_replicates
-        return gather(*where, self.experiment, self.budget, self.hint, self.options)
+        words = self.experiment, self.budget, self.hint
+        return gather(outputs, self.conditions, num_replicates, *words, self.options)
 
 
 class ReportFiles(NamedTuple):
@@ -74,19 +69,7 @@ class ReportFiles(NamedTuple):
 def derived(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> ReportFiles:
-    """Return a report as it follows from the outputs; nothing is written.
-
-    Args:
-        request: Names its conditions.
-        settings: Formats and levels.
-        outputs: Root of all outputs.
-        num_replicates: Planned for every condition; None: as many as each one has.
-
-    Raises:
-        NothingStored: If nothing of it has been run.
-        UnknownOption: If the settings name a page that does not exist.
-        CorruptLog: If a log cannot be trusted.
-    """
+    """Return a report as it follows from the outputs; nothing is written."""
     found = request.results(outputs, num_replicates)
     return page_files(request, page_of(found, settings), found, settings)
 
@@ -121,13 +104,7 @@ def write_report(report: ReportFiles) -> Path:
 def stale_files(report: ReportFiles) -> list[Path]:
     """Return the files in a report's folder that it does not have: those of an earlier one."""
     directory, files = report
-    if not directory.is_dir():
-        return []
-    return sorted(
-        path
-        for path in directory.iterdir()
-        if path.name not in files and not path.name.startswith(".")
-    )
+    return sorted(path for path in directory.glob("[!.]*") if path.name not in files)
 
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
@@ -142,7 +119,17 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     sidecar = {
         "figure": drawing.title,
         "code_version": __version__,
-        "conditions": _provenance(drawing),
+        "conditions": [
+            {
+                "label": c.label,
+                "run": c.condition.id,
+                "planned": c.planned,
+                "done": c.done,
+                "failed": c.failed,
+                "run_code": c.code,
+            }
+            for c in drawing.conditions
+        ],
         "data": {
             "file": f"{drawing.stem}.csv",
             "rows": len(table),
@@ -151,7 +138,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
             "columns": {
                 str(name): _KINDS.get(table[name].dtype.kind, "text") for name in table.columns
             },
-            "description": drawing.columns or description(drawing.table),
+            "description": drawing.columns,
         },
         "files": {name: _sha256(content) for name, content in pictures.items()},
     }
@@ -159,26 +146,5 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
 
 
-def _provenance(drawing: Drawing) -> list[dict[str, Any]]:
-    return [
-        {
-            "label": c.label,
-            "run": c.condition.id,
-            "planned": c.planned,
-            "done": c.done,
-            "failed": c.failed,
-            "run_code": c.code,
-        }
-        for c in drawing.conditions
-    ]
-
-
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def description(source: Callable[..., Any]) -> str:
-    """Return a function's docstring as one line."""
-    while isinstance(source, functools.partial):
-        source = source.func
-    return " ".join((inspect.getdoc(source) or "").split())

@@ -2,22 +2,22 @@
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
-from evoexp.report.pages import markdown, ranking
+from evoexp.report.pages import markdown
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import shipped_best_known
 from evoexp.report.results.given_data import MARK, GivenData
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
-from evoexp.report.results.proven_answers import first_reached
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Comparison, compared
@@ -30,7 +30,7 @@ from evoexp.report.statistics.inference import (
     quantile,
     spread,
 )
-from evoexp.report.statistics.problem_ranks import standing
+from evoexp.report.statistics.problem_ranks import Standing, standing
 
 
 class Rated(NamedTuple):
@@ -59,67 +59,53 @@ class Rated(NamedTuple):
     # The planner's own cost of its last solution: median and quartiles over runs
     own_cost: Spread = Spread(np.nan, np.nan, np.nan, 0)
 
-    @property
-    def in_units(self) -> Spread:
-        """The lengths in units of the targets."""
-        median, lower, upper, count = self.lengths
-        return Spread(median / self.unit, lower / self.unit, upper / self.unit, count)
 
-
-def page(results: Results, settings: ReportSettings) -> Page:
-    """Build the page.
+def page(
+    results: Results,
+    settings: ReportSettings,
+    runs: Sequence[PlannerRuns] | None = None,
+    given: GivenData | None = None,
+) -> Page:
+    """Build the page, of runs that are judged already or of all results.
 
     Raises:
         NothingStored: If no run has a motion.
     """
-    known = {key: each.length for key, each in shipped_best_known().items()}
-    return page_of_runs(of_results(results.evolved, known), results, settings)
-
-
-def page_of_runs(
-    runs: Sequence[PlannerRuns],
-    results: Results,
-    settings: ReportSettings,
-    given: GivenData | None = None,
-) -> Page:
-    """Build the page from runs that are judged already.
-
-    Raises:
-        NothingStored: If there are none.
-    """
+    if runs is None:
+        known = {key: each.length for key, each in shipped_best_known().items()}
+        runs = of_results(results.evolved, known)
     if not runs:
         raise NothingStored(f"{results.experiment or 'compare'}: no stored solution is a motion")
-    ranks, rows = standing(runs), rated(runs, settings)
-    num_problems, ranked = len(problem_order(runs)), set(ranks.problems)
-    first = f" The first {MAX_PANELS} of {num_problems}; the CSV has all."
-    return own_page(
-        "comparison",
-        results,
-        settings,
-        runs=runs,
-        given_words=_of_file(given) if given else "",
-        problem_rows=tuple(_problem_rows(runs)),
-        too_few_ranks=ranking.too_few(ranks),
-        answer_rows=tuple(_answers(rows, settings)),
-        coin_rows=tuple(_coins(rows)),
-        compared_lengths=_comparisons(runs, settings),
-        compared_conditions=stored_conditions(runs),
-        unequal=_unequal(runs),
-        one_problem=num_problems == 1,
-        more_problems=num_problems > 1,
-        more_panels=first * (num_problems > MAX_PANELS),
-        ranks=ranks,
-        rank_rows=ranking.rank_rows(ranks),
-        left_out=ranking.left_out(ranks),
-        rank_test=ranking.rank_test(ranks, settings),
-        never_proven=ranking.never_proven(ranks),
-        num_ranked=len(ranks.problems),
-        ranked_conditions=stored_conditions(own for own in runs if own.problem.name in ranked),
-    )
+    return own_page("comparison", results, settings, runs=runs, given=given)
 
 
-def _of_file(given: GivenData) -> str:
-    """Say whose word the given answers are."""
+# what the page `comparison` of `page.yaml` names
+
+
+ranks = standing
+compared_conditions = stored_conditions
+
+
+def ranked_conditions(runs: Sequence[PlannerRuns], ranks: Standing) -> tuple[ConditionResults, ...]:
+    """Return the conditions of problems that count for ranks."""
+    return stored_conditions(own for own in runs if own.problem.name in ranks.problems)
+
+
+def one_problem(runs: Sequence[PlannerRuns]) -> bool:
+    """Return whether there is but one."""
+    return len(problem_order(runs)) == 1
+
+
+def more_panels(runs: Sequence[PlannerRuns]) -> str:
+    """Tell how many problems have no panel; empty if all have one."""
+    count = len(problem_order(runs))
+    return f" The first {MAX_PANELS} of {count}; the CSV has all." if count > MAX_PANELS else ""
+
+
+def given_words(given: GivenData | None) -> str:
+    """Say whose word the given answers are; empty if none is given."""
+    if given is None:
+        return ""
     return (
         f" Planners marked{MARK} were not run here: their answers count as {given.name} "
         f"(SHA-256 {given.sha256[:12]}…) tells them, the certifier has not seen them, and as seeds "
@@ -127,7 +113,7 @@ def _of_file(given: GivenData) -> str:
     )
 
 
-def _unequal(runs: Sequence[PlannerRuns]) -> str:
+def unequal(runs: Sequence[PlannerRuns]) -> str:
     """Warn where planners were run on different problems; empty if all were run on the same."""
     problems: dict[str, set[str]] = {}
     for own in runs:
@@ -146,55 +132,44 @@ def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
 
 
 def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
+    condition = own.condition
     effort, reached = own.first_reached()
-    verdicts = own.condition.verdicts if own.condition else None
-    found = Rated(
-        own.label,
-        own.planner,
-        own.problem.name,
-        len(own.replicates),
-        int(reached.sum()),
-        _first_own(own),
-        expected_effort(effort, reached),
-        expected_interval(effort, reached, settings.confidence, settings.num_resamples),
-        spread(own.best_lengths),
-        own.problem.straight,
-        own.problem.best_known,
-        own.problem.unit,
-        verdicts.solved_refuted if verdicts else 0,
-        verdicts.judged if verdicts else 0,
+    verdicts = condition.verdicts if condition else None
+    row = Rated(
+        condition=own.label,
+        planner=own.planner,
+        problem=own.problem.name,
+        runs=len(own.replicates),
+        proven=int(reached.sum()),
+        first_own=np.nan,
+        queries=expected_effort(effort, reached),
+        interval=expected_interval(effort, reached, settings.confidence, settings.num_resamples),
+        lengths=spread(own.best_lengths),
+        straight=own.problem.straight,
+        best_known=own.problem.best_known,
+        unit=own.problem.unit,
+        refuted=verdicts.solved_refuted if verdicts else 0,
+        judged=verdicts.judged if verdicts else 0,
     )
-    return found if own.condition is None else _in_other_coins(found, own, own.condition)
-
-
-def _in_other_coins(row: Rated, own: PlannerRuns, condition: ConditionResults) -> Rated:
-    """Add tests of bodies, evaluations and CPU time to an answer, and the planner's own cost."""
-
-    def to_an_answer(name: str, spent: FloatArray) -> float:
-        if own.table[name].isna().any():
-            return np.nan
-        effort, reached = first_reached(own.table, own.replicates, np.inf, spent, name)
-        return expected_effort(effort, reached)
-
-    _, problem = condition.prepared
+    if condition is None:
+        return row
+    solved = own.table[own.table["solved"].astype(bool)]
+    first = solved.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
+    spent = {"evaluations": condition.column("evaluations"), "cpu_s": search_seconds(condition)}
+    per_answer: dict[str, Any] = {
+        name: expected_effort(*own.first_reached(effort=name, spent=whole))
+        for name, whole in spent.items()
+        if not own.table[name].isna().any()
+    }
     return row._replace(
-        body_tests=num_body_tests(problem),
-        evaluations=to_an_answer("evaluations", condition.column("evaluations")),
-        cpu_s=to_an_answer("cpu_s", search_seconds(condition)),
+        first_own=quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5),
+        body_tests=num_body_tests(condition.prepared.problem),
         own_cost=spread(condition.column("best_cost")),
+        **per_answer,
     )
 
 
-def _first_own(own: PlannerRuns) -> float:
-    """Return the median effort to an answer that the planner's own model accepts; NaN: unknown."""
-    if own.condition is None:
-        return np.nan
-    good = own.table[own.table["solved"].astype(bool)]
-    first = good.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
-    return quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5)
-
-
-def _problem_rows(runs: Sequence[PlannerRuns]) -> Iterator[tuple[str, ...]]:
+def problem_rows(runs: Sequence[PlannerRuns]) -> Iterator[tuple[str, ...]]:
     """Yield of each problem the lengths that answers are measured by."""
     found: dict[str, tuple[Problem, list[float]]] = {}
     for own in runs:
@@ -202,12 +177,17 @@ def _problem_rows(runs: Sequence[PlannerRuns]) -> Iterator[tuple[str, ...]]:
         best.append(float(own.best_lengths.min()))
     for name, (problem, best) in found.items():
         lengths = map(markdown.number, (problem.straight, problem.best_known, min(best)))
-        yield name, f"`{problem.key}`" if problem.key else "–", *lengths, problem.unit_name
+        unit = "straight line" if np.isnan(problem.best_known) else "best known"
+        if np.isnan(problem.unit):
+            unit = "none: any proven answer is the only target"
+        yield name, f"`{problem.key}`" if problem.key else "–", *lengths, unit
 
 
-def _answers(rows: Sequence[Rated], settings: ReportSettings) -> Iterator[tuple[object, ...]]:
+def answer_rows(rated: Sequence[Rated], settings: ReportSettings) -> Iterator[tuple[object, ...]]:
     """Yield each condition's proven answers: how many, their effort and their lengths."""
-    for row in rows:
+    for row in rated:
+        median, lower, upper, count = row.lengths
+        in_units = Spread(median / row.unit, lower / row.unit, upper / row.unit, count)
         yield (
             row.condition,
             row.runs,
@@ -215,14 +195,14 @@ def _answers(rows: Sequence[Rated], settings: ReportSettings) -> Iterator[tuple[
             markdown.number(row.first_own),
             f"{effort_text(row.queries)} ({' to '.join(map(effort_text, row.interval))})",
             markdown.spread(row.lengths),
-            markdown.spread(row.in_units) if row.unit > 0.0 else "–",
+            markdown.spread(in_units) if row.unit > 0.0 else "–",
             f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
 
 
-def _coins(rows: Sequence[Rated]) -> Iterator[tuple[str, ...]]:
+def coin_rows(rated: Sequence[Rated]) -> Iterator[tuple[str, ...]]:
     """Yield the effort of each condition that was run here, counted in other ways."""
-    for row in rows:
+    for row in rated:
         if row.own_cost.num_values:
             yield (
                 row.condition,
@@ -239,7 +219,7 @@ def effort_text(queries: float) -> str:
     return markdown.number(round(queries) if np.isfinite(queries) else queries)
 
 
-def _comparisons(
+def compared_lengths(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare the planners of each problem."""
@@ -256,3 +236,30 @@ def _comparisons(
 
     rows = compared(pairs, lengths, settings, named=lambda a, b: f"{a.label} – {b.label}")
     return (("best proven length", rows),) if rows else ()
+
+
+def as_csv(rows: Sequence[Rated]) -> bytes:
+    """Return the answers as CSV, numbers with all digits, `inf` where there is no proven answer.
+
+    Efforts are expected to a proven answer, in collision queries with their interval, in pairs of
+    shapes (body_queries), evaluations and CPU time; those that are not known are empty.
+    """
+    table = pd.DataFrame(
+        {
+            "planner": row.planner,
+            "problem": row.problem,
+            "n": row.runs,
+            "proven": row.proven,
+            "effort": row.queries,
+            "effort_low": row.interval.low,
+            "effort_high": row.interval.high,
+            "length": row.lengths.median,
+            "length_lower": row.lengths.lower,
+            "length_upper": row.lengths.upper,
+            "body_queries": row.queries * row.body_tests,
+            "evaluations": row.evaluations,
+            "cpu_s": row.cpu_s,
+        }
+        for row in rows
+    )
+    return table.to_csv(index=False, lineterminator="\n").encode()

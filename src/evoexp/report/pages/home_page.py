@@ -1,6 +1,5 @@
 """The home page of all reports: papers, other reports, stored runs, and a search over them."""
 
-import html
 import json
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,14 +11,12 @@ from pydantic import Field, TypeAdapter
 
 from evoexp.report.pages.html_page import HTML, script_json, telling_rank, verdict_counts, written
 
-MARKDOWN = "index.md"
 MAX_LINKS = 3  # reports named beside a run
 FROM_HOME = "?home"  # tells a report that it can link back
 COMPARE = "compare"
 USUAL = {"Conditions", "Results", "Claims", "Motions", "Figures", "Parameters", "Failures"}
 """Headings of nearly every report, which nobody looks for."""
 _SUMMARY = re.compile(r'<script type="application/json" id="summary">(.*?)</script>', re.DOTALL)
-_MADE_BY = re.compile(r"^Made by `evoexp ([^`]*)`", re.MULTILINE)
 
 Hash = Annotated[str, Field(pattern="^[0-9a-f]{12}$")]
 Picture = Annotated[str, Field(pattern=r"^([\w.-]+\.(svg|png))?$")]  # in the report's own folder
@@ -29,7 +26,6 @@ class ReportSummary(NamedTuple):
     """A report that is there, as its page says."""
 
     folder: str  # its name under `reports`
-    file: str  # its page in the folder
     title: str  # heading
     command: str = ""  # that draws it, without `evoexp`; empty where it is not known
     partial: str = ""  # the remark that results are missing; empty if none is
@@ -44,6 +40,15 @@ class ReportSummary(NamedTuple):
     def experiment(self) -> str:
         """Name of the experiment in its folder's name: without budget and overrides."""
         return re.split("[@+]", self.folder)[0]
+
+    def url(self, place: str = "") -> str:
+        """Return its address, or that of a place in it, relative to the home page."""
+        return f"{quote(self.folder)}/{HTML}{FROM_HOME}" + f"#{place}" * bool(place)
+
+    @property
+    def picture_url(self) -> str:
+        """The address of its picture."""
+        return f"{quote(self.folder)}/{quote(self.picture)}"
 
     @property
     def is_comparison(self) -> bool:
@@ -92,50 +97,15 @@ class StoredRun(NamedTuple):
         return "partial" if self.done else "planned"
 
 
-class Link(NamedTuple):
-    """A link to a report."""
-
-    text: str  # name of its folder
-    url: str  # relative to the home page
-    partial: bool = False  # whether results are missing
-    failed: int = 0  # number of failed replicates
-    detail: str = ""  # its title
-    picture: str = ""  # address of its figure; empty if it has none
-
-
-class PaperCard(NamedTuple):
-    """A paper on the home page."""
-
-    title: str  # authors and year
-    subtitle: str  # what it is about
-    face: Link | None  # the report whose figure is shown; None if none has any
-    # (verdict, number of claims), over the reports of its experiments
-    counts: tuple[tuple[str, int], ...]
-    unjudged: int  # claims of experiments without a report at the paper's budget
-    links: tuple[Link, ...]  # to its reports
-    missing: tuple[str, ...]  # experiments without a report
-
-
 def read_summary(folder: Path) -> ReportSummary | None:
-    """Return the summary of a report's folder; None if it holds no report.
-
-    A report of an earlier version, which has no HTML page, has only a title and its command.
-    """
+    """Return the summary of a report's folder; None if it holds no report."""
     try:
-        found = _SUMMARY.search((folder / HTML).read_text(encoding="utf-8"))
-        if found:
-            named = {"folder": folder.name, "file": HTML, **json.loads(found[1])}
-            return _REPORT.validate_python(named)
+        text = (folder / HTML).read_text(encoding="utf-8")
+        if found := _SUMMARY.search(text):
+            return _REPORT.validate_python({"folder": folder.name, **json.loads(found[1])})
     except (OSError, ValueError, TypeError):
         pass  # nobody's page, or no page of ours
-    try:
-        text = (folder / MARKDOWN).read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return None
-    title = text.partition("\n")[0].removeprefix("# ")
-    made = _MADE_BY.search(text)
-    command = html.unescape(made[1]) if made else ""
-    return ReportSummary(folder.name, MARKDOWN, html.unescape(title) or folder.name, command)
+    return None
 
 
 def summaries(reports: Path) -> list[ReportSummary]:
@@ -168,55 +138,37 @@ def site(
     }
     return {
         "num_reports": len(found),
-        "partial": [_link(each) for each in found if each.partial],
-        # of which only the title is known
-        "num_earlier": sum(each.file != HTML for each in found),
+        "partial": [each for each in found if each.partial],
         "unfinished": sum(run.state != "done" for run in runs),
         "papers": [_card(paper, owned[paper.name]) for paper in papers],
-        "others": [(name, list(map(_link, group))) for name, group in groups.items() if group],
-        "runs": [(run, list(_links(run, found))) for run in runs],
+        "others": [item for item in groups.items() if item[1]],
+        "runs": [
+            (run, [each for each in found if run.hash12 in dict(each.runs)][:MAX_LINKS])
+            for run in runs
+        ],
     }
 
 
-def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
+def _card(paper: Paper, reports: Sequence[ReportSummary]) -> dict[str, Any]:
     """Return the card of a paper; its claims are those of whole experiments, not of variants."""
     whole = [each for each in reports if each.folder == each.experiment]
     drawn, shown = {each.folder for each in whole}, {each.experiment for each in reports}
     names = (*paper.experiments, *paper.claims)
-    face = min(
-        (each for each in whole or reports if each.picture),
-        key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
-        default=None,
-    )
-    return PaperCard(
-        paper.title,
-        paper.subtitle,
-        _link(face) if face else None,
-        verdict_counts(verdict for each in whole for _, verdict in each.claims),
-        sum(count for name, count in paper.claims.items() if name not in drawn),
-        tuple(map(_link, reports)),
-        tuple(sorted({name for name in names if paper.has(name)} - shown)),
-    )
-
-
-def _link(report: ReportSummary) -> Link:
-    picture = f"{quote(report.folder)}/{quote(report.picture)}" * bool(report.picture)
-    told = bool(report.partial), report.failed, report.title
-    return Link(report.folder, _url(report), *told, picture)
-
-
-def _url(report: ReportSummary, place: str = "") -> str:
-    """Return the address of a report, or of a place in it."""
-    if report.file != HTML:
-        return f"{quote(report.folder)}/{report.file}"
-    return f"{quote(report.folder)}/{HTML}{FROM_HOME}" + f"#{place}" * bool(place)
-
-
-def _links(run: StoredRun, found: Iterable[ReportSummary]) -> Iterator[Link]:
-    """Yield links to a run's place in the reports that show it, at most `MAX_LINKS`."""
-    shown = [each for each in found if run.hash12 in dict(each.runs)]
-    for each in shown[:MAX_LINKS]:
-        yield Link(each.folder, _url(each, f"run-{run.hash12}"))
+    return {
+        "paper": paper,
+        # the report whose figure is shown
+        "face": min(
+            (each for each in whole or reports if each.picture),
+            key=lambda each: (telling_rank(each.picture), -len(each.claims), each.folder),
+            default=None,
+        ),
+        "counts": verdict_counts(verdict for each in whole for _, verdict in each.claims),
+        # claims of experiments without a report at the paper's budget
+        "unjudged": sum(count for name, count in paper.claims.items() if name not in drawn),
+        "reports": reports,
+        # experiments without a report
+        "missing": sorted({name for name in names if paper.has(name)} - shown),
+    }
 
 
 def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
@@ -229,4 +181,4 @@ def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
             *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
         ]
         for kind, text, place in entries:
-            yield {"text": text, "kind": kind, "report": each.folder, "url": _url(each, place)}
+            yield {"text": text, "kind": kind, "report": each.folder, "url": each.url(place)}

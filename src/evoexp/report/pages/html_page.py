@@ -1,19 +1,17 @@
 """A page in HTML: complete in itself, readable without scripts, offline; all values are escaped."""
 
-import functools
 import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
+
+from markdown_it import MarkdownIt
+from markupsafe import Markup
 
 from evoexp.report.pages.index import CLAIMS, FAILURES
-from evoexp.report.pages.page_parts import Document, Figures, FigureText, Table, Verdict
-from evoexp.report.pages.templates import asset, environment
-
-if TYPE_CHECKING:  # loaded only where a page is written
-    from markdown_it import MarkdownIt
-    from markupsafe import Markup
+from evoexp.report.pages.markdown import asset, environment
+from evoexp.report.pages.page_parts import Document, Figures, Verdict
 
 HTML = "index.html"
 FEW = 3  # failures named at the top
@@ -29,54 +27,20 @@ _HASH = re.compile("<code>([0-9a-f]{12})</code>")
 _COUNT = re.compile(r"\s\(n\s=\s\d+\)")  # behind a condition in the head of a table
 
 
-class FigurePlace(NamedTuple):
-    """A figure on the page."""
-
-    text: FigureText  # title, caption, files
-    anchor: str  # its address on the page
-    file: str  # the picture that is shown; empty if there is none
-    size: tuple[int, int] | None  # width and height [px]; None: not known
-
-
-class SectionPlace(NamedTuple):
-    """A section on the page."""
-
-    heading: str  # above it
-    anchor: str  # its address on the page
-    table: Table | None  # None: it is that of the figures
-    figures: tuple[FigurePlace, ...]  # those in it
-    verdicts: tuple[tuple[str, int], ...]  # (verdict, number of claims); empty where it has none
+READER = MarkdownIt("zero").enable("backticks")  # knows code alone: all else in a text is as it is
 
 
 def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
-    """Return a page as HTML; the same text gives the same bytes.
-
-    Args:
-        pictures: File name → content of its pictures.
-    """
+    """Return a page as HTML, with the sizes of its pictures; the same text gives the same bytes."""
     sections = tuple(_places(document, pictures))
-    return written(
-        "report_page.html",
-        {run.hash12: run.label for run in document.runs},
-        document=document,
-        sections=sections,
-        failures=document.rows_below(FAILURES),
-        failures_anchor=next((s.anchor for s in sections if s.heading == FAILURES), ""),
-        few=FEW,
-        summary=script_json(_summary(document, sections)),
-    )
-
-
-def _summary(document: Document, sections: Sequence[SectionPlace]) -> dict[str, Any]:
-    """Return the summary of a page that it carries for the home page."""
-    figures = [figure for section in sections for figure in section.figures]
-    places = [(section.heading, section.anchor) for section in sections]
-    return {
+    figures = [figure for section in sections for figure in section["figures"]]
+    headings = [(section["heading"], section["anchor"]) for section in sections]
+    summary = {  # that the page carries for the home page
         "title": document.title,
         "command": document.command.removeprefix("evoexp "),
-        "partial": "".join(n.text for n in document.notices if n.title == "Partial results"),
+        "partial": dict(document.notices).get("Partial results", ""),
         "failed": sum(run.failed for run in document.runs),
-        "headings": [*places, *((each.text.title, each.anchor) for each in figures)],
+        "headings": [*headings, *((each["text"].title, each["anchor"]) for each in figures)],
         "claims": [
             [str(row[0]), cell.text]
             for row in document.rows_below(CLAIMS)
@@ -84,8 +48,20 @@ def _summary(document: Document, sections: Sequence[SectionPlace]) -> dict[str, 
             if isinstance(cell, Verdict)
         ],
         "runs": [[run.hash12, run.label] for run in document.runs],
-        "picture": min((each.file for each in figures if each.file), key=telling_rank, default=""),
+        "picture": min(
+            (each["file"] for each in figures if each["file"]), key=telling_rank, default=""
+        ),
     }
+    return written(
+        "report_page.html",
+        {run.hash12: run.label for run in document.runs},
+        document=document,
+        sections=sections,
+        failures=document.rows_below(FAILURES),
+        failures_anchor=dict(headings).get(FAILURES, ""),
+        few=FEW,
+        summary=script_json(summary),
+    )
 
 
 def telling_rank(name: str) -> int:
@@ -95,14 +71,15 @@ def telling_rank(name: str) -> int:
 
 def verdict_counts(verdicts: Iterable[str]) -> tuple[tuple[str, int], ...]:
     """Return how often each verdict was given, without the reasons in brackets, in one order."""
-    found = Counter(verdict.split(" (")[0] for verdict in verdicts)
-    ranks = {word: rank for rank, word in enumerate(VERDICTS)}
+    counts = Counter(verdict.split(" (")[0] for verdict in verdicts)
+    order = {word: rank for rank, word in enumerate(VERDICTS)}
     return tuple(
-        sorted(found.items(), key=lambda item: (ranks.get(verdict_class(item[0]), 9), item[0]))
+        sorted(counts.items(), key=lambda each: (order.get(verdict_class(each[0]), 9), each[0]))
     )
 
 
-def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[SectionPlace]:
+def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[dict[str, Any]]:
+    """Yield sections and their figures with their addresses on the page, for its template."""
     taken: Counter[str] = Counter({"commands": 1, "content": 1})
 
     def anchor(name: str) -> str:
@@ -112,40 +89,28 @@ def _places(document: Document, pictures: Mapping[str, bytes]) -> Iterator[Secti
         return slug if taken[slug] == 1 else f"{slug}--{taken[slug]}"
 
     for section in document.sections:
-        place = anchor(section.heading)
+        place: dict[str, Any] = {"heading": section.heading, "anchor": anchor(section.heading)}
+        place |= {"table": None, "figures": [], "verdicts": ()}
         if isinstance(section, Figures):
-            shown = [(figure, figure.picture("svg", "png")) for figure in section.figures]
-            figures = tuple(
-                FigurePlace(figure, anchor(figure.stem), file, _size(pictures.get(file, b"")))
-                for figure, file in shown
-            )
-            yield SectionPlace(section.heading, place, None, figures, ())
+            for figure in section.figures:
+                file, own = figure.picture("svg", "png"), anchor(figure.stem)
+                size = _SIZE.search(pictures.get(file, b"")[:2000])  # width and height [px]
+                pixels = size and [round(float(size[k]) * PIXELS_PER_POINT) for k in (2, 1)]
+                place["figures"].append(
+                    {"text": figure, "anchor": own, "file": file, "size": pixels}
+                )
         else:
             cells = (cell for row in section.rows for cell in row)
-            verdicts = verdict_counts(cell.text for cell in cells if isinstance(cell, Verdict))
-            yield SectionPlace(section.heading, place, section, (), verdicts)
-
-
-def _size(picture: bytes) -> tuple[int, int] | None:
-    """Return width and height of an SVG [px]."""
-    found = _SIZE.search(picture[:2000])
-    if found is None:
-        return None
-    width, height = float(found[2]), float(found[1])
-    return round(width * PIXELS_PER_POINT), round(height * PIXELS_PER_POINT)
+            place["table"] = section
+            place["verdicts"] = verdict_counts(c.text for c in cells if isinstance(c, Verdict))
+        yield place
 
 
 def written(template: str, runs: Mapping[str, str] | None = None, **values: Any) -> bytes:
-    """Return a page.
+    """Return a page by its template in `assets/site`, filled with values.
 
-    Args:
-        template: Name of its file in `assets/site`.
-        runs: Hash → label of the runs that the page has a place for: codes that name a hash, and
-            heads of tables that name a label, link to it.
-        values: By the names that the template has for them.
+    Codes that name the hash of a run, and heads of tables that name its label, link to its place.
     """
-    from markupsafe import Markup
-
     known = frozenset(runs or {})
     places = {label: name for name, label in reversed(list((runs or {}).items()))}
 
@@ -173,31 +138,20 @@ def written(template: str, runs: Mapping[str, str] | None = None, **values: Any)
     return text.lstrip("\n").encode()
 
 
-def inline(text: str, hashes: frozenset[str] = frozenset()) -> "Markup":
+def inline(text: str, hashes: frozenset[str] = frozenset()) -> Markup:
     """Return anybody's text as HTML: words between grave accents as code, all else as it is.
 
     Codes that are one of the hashes link to the place of their run.
     """
-    from markupsafe import Markup
 
     def linked(code: re.Match[str]) -> str:
         return f'<a href="#run-{code[1]}">{code[0]}</a>' if code[1] in hashes else code[0]
 
-    return Markup(_HASH.sub(linked, _reader().renderInline(text)))
+    return Markup(_HASH.sub(linked, READER.renderInline(text)))
 
 
-@functools.cache
-def _reader() -> "MarkdownIt":
-    """Return a reader of Markdown that knows code alone: all else in a text is as it is."""
-    from markdown_it import MarkdownIt
-
-    return MarkdownIt("zero").enable("backticks")
-
-
-def script_json(value: Any) -> "Markup":
+def script_json(value: Any) -> Markup:
     """Return data for a script element: nothing in it can end the element."""
-    from markupsafe import Markup
-
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
     return Markup(text.replace("<", "\\u003c"))
 

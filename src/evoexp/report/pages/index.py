@@ -5,14 +5,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from evoexp.report.pages import markdown
+from evoexp.report.pages.page_file import own_pages
 from evoexp.report.pages.page_parts import (
     Claim,
     Document,
-    Drawing,
     Figures,
     FigureText,
     LogText,
-    Notice,
     Page,
     Player,
     RunText,
@@ -20,7 +19,6 @@ from evoexp.report.pages.page_parts import (
     Verdict,
     provenance,
 )
-from evoexp.report.pages.page_words import WORDS
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -45,36 +43,43 @@ def document(
     command: str,
     players: Mapping[tuple[str, int], Player] | None = None,
 ) -> Document:
-    """Return the text of a page; the same results give the same text.
-
-    `players` are the pages that play motions, by the keys of the played runs.
-    """
-    notices = (_incomplete(results), _damaged(results), _added(results))
+    """Return the text of a page, with the players of motions by the keys of the played runs."""
     first = _conditions(results, settings), _quantities(page, results)
     later = (
         _claims(page.claims),
         Table("Known defects and checks", ("check", "finding"), page.checks),
         *(_comparison(heading, rows, settings) for heading, rows in page.comparisons),
     )
-    figures = Figures(tuple(_figure(each, settings, players or {}) for each in page.drawings))
-    sections = (
-        *(table for table in first if table.rows),
-        *page.tables,
-        *(table for table in later if table.rows),
-        *((figures,) if figures.figures else ()),
-        _parameters(results),
-        *_failures(results),
+    figures = Figures(
+        tuple(
+            FigureText(
+                each.stem,
+                each.title,
+                f"{each.caption} {_provenance(each.conditions)}".strip(),
+                tuple(settings.formats),
+                tuple(players[run.key] for run in each.plays if players and run.key in players),
+            )
+            for each in page.drawings
+        )
     )
+    sections = list[Table | Figures]()
+    for table in (*first, *page.tables, *later, figures, _parameters(results), _failures(results)):
+        if isinstance(table, Table) and table.rows:
+            number = 1 + sum(isinstance(section, Table) for section in sections)
+            words = "_".join(re.findall("[a-z0-9]+", table.heading.lower()))[:LONGEST_NAME]
+            sections.append(table._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex"))
+        elif isinstance(table, Figures) and table.figures:
+            sections.append(table)
     return Document(
         page.title,
         command,
         results.experiment,
         results.budget,
-        tuple(notice for notice in notices if notice.text),
+        tuple(_notices(results)),
         page.introduction,
-        tuple(_with_files(sections)),
+        tuple(sections),
         tuple(map(_run, results.conditions)),
-        _seeds(results.conditions),
+        _provenance(results.conditions),
     )
 
 
@@ -97,79 +102,63 @@ def _run(c: ConditionResults) -> RunText:
     return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, logs)
 
 
-def _with_files(sections: Iterable[Table | Figures]) -> Iterator[Table | Figures]:
-    """Name the files of tables: by their number and heading."""
-    number = 0
-    for section in sections:
-        if isinstance(section, Table):
-            number += 1
-            words = "_".join(re.findall("[a-z0-9]+", section.heading.lower()))[:LONGEST_NAME]
-            section = section._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex")
-        yield section
+def _provenance(conditions: Sequence[ConditionResults]) -> str:
+    seeds = sorted({c.condition.seed for c in conditions})
+    return provenance([(c.condition.id[:12], c.done) for c in conditions], seeds)
 
 
-def _seeds(conditions: Iterable[ConditionResults]) -> tuple[int, ...]:
-    return tuple(sorted({c.condition.seed for c in conditions}))
-
-
-def _incomplete(results: Results) -> Notice:
-    """Name the replicates that are missing; empty if none is."""
-    missing = [
-        f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed"
-        for c in results.conditions
-        if c.done < c.planned
-    ]
-    return Notice(
-        "Partial results",
-        f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
-        * bool(missing),
-    )
-
-
-def _damaged(results: Results) -> Notice:
-    """Name the logs that are damaged and left out; empty if none is."""
-    lost = [
-        f"{c.label}: {len(c.damaged)} ({', '.join(list(c.damaged)[:FEW])}"
-        + f"{', …' if len(c.damaged) > FEW else ''})"
-        for c in results.conditions
-        if c.damaged
-    ]
-    return Notice(
-        "Damaged logs",
-        f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
-        "experiment runs them again." * bool(lost),
-    )
-
-
-def _added(results: Results) -> Notice:
-    """Name the replicates that were added when results could be known; empty if none was."""
+def _notices(results: Results) -> Iterator[tuple[str, str]]:
+    """Yield the remarks on replicates that are missing, cannot be read or were added."""
     fixed = planned_replicates(results) if results.experiment else 0
-    added = [
-        f"{c.label}: {n} of {c.done}"
-        for c in results.conditions
-        if (n := c.added(c.condition.num_replicates(fixed)))
-    ]
-    return Notice(
-        "Replicates added later",
-        f"{'; '.join(added)}: asked for when results of earlier ones were stored already. Numbers "
-        "and verdicts below use all of them." * bool(added),
-    )
+    missing, lost, added = list[str](), list[str](), list[str]()
+    for c in results.conditions:
+        if c.done < c.planned:
+            missing.append(f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed")
+        if c.damaged:
+            names = [*list(c.damaged)[:FEW], *["…"] * (len(c.damaged) > FEW)]
+            lost.append(f"{c.label}: {len(c.damaged)} ({', '.join(names)})")
+        if count := c.added(c.condition.num_replicates(fixed)):
+            added.append(f"{c.label}: {count} of {c.done}")
+    if missing:
+        text = f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
+        yield "Partial results", text
+    if lost:
+        text = (
+            f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
+            "experiment runs them again."
+        )
+        yield "Damaged logs", text
+    if added:
+        text = (
+            f"{'; '.join(added)}: asked for when results of earlier ones were stored already. "
+            "Numbers and verdicts below use all of them."
+        )
+        yield "Replicates added later", text
+
+
+def _table(
+    name: str, rows: Iterable[tuple[object, ...]], behind: Sequence[str] = (), **words: object
+) -> Table:
+    """Return a table of `page.yaml`, with the words in braces filled in, and further columns."""
+    entry = own_pages().entries["tables"][name]
+    heading, note = (entry.get(part, "").format(**words) for part in ("heading", "note"))
+    return Table(heading, (*entry["headers"], *behind), tuple(rows), note)
 
 
 def _conditions(results: Results, settings: ReportSettings) -> Table:
     rows = []
     for c in results.conditions:
-        solved, verdicts, found = "–", ("–",) * 5, c.verdicts
+        solved, found = "–", c.verdicts
         if c.done:
             interval = Proportion(c.solved, c.done).interval(settings.confidence)
             solved = f"{markdown.share(c.solved, c.done)} ({markdown.percent(interval)})"
-        exact: tuple[object, ...] = verdicts
+        exact: tuple[object, ...] = ("–",) * 5
         if found.judged:
             proven = found.certified, found.refuted, found.undecided
             exact = (*proven, found.solved_refuted, found.margin_broken)
         name = f"`{c.condition.id[:12]}`"
         rows.append((c.label, name, c.done, c.planned, c.failed, solved, *exact))
-    return WORDS.table("conditions", rows, level=100 * settings.confidence)
+    return _table("conditions", rows, level=100 * settings.confidence)
 
 
 def _quantities(page: Page, results: Results) -> Table:
@@ -179,9 +168,9 @@ def _quantities(page: Page, results: Results) -> Table:
     if len(labels) > WIDEST:
         names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
         below = zip(heads, *cells, strict=True) if cells else ()
-        return WORDS.table("results", below)._replace(headers=("condition", *names))
+        return _table("results", below)._replace(headers=("condition", *names))
     rows = [(q.name, q.unit, *own) for q, own in zip(page.quantities, cells, strict=True)]
-    return WORDS.table("results", rows * bool(labels), behind=heads)
+    return _table("results", rows * bool(labels), behind=heads)
 
 
 def _claims(claims: Sequence[Claim]) -> Table:
@@ -189,7 +178,7 @@ def _claims(claims: Sequence[Claim]) -> Table:
         (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
         for c in claims
     ]
-    return WORDS.table("claims", rows)
+    return _table("claims", rows)
 
 
 def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettings) -> Table:
@@ -203,17 +192,7 @@ def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettin
         )
         for c in rows
     ]
-    return WORDS.table("comparison", cells, heading=heading, level=100 * settings.confidence)
-
-
-def _figure(
-    drawing: Drawing, settings: ReportSettings, players: Mapping[tuple[str, int], Player]
-) -> FigureText:
-    runs = [(c.condition.id[:12], c.done) for c in drawing.conditions]
-    whose = provenance(runs, _seeds(drawing.conditions))
-    caption = f"{drawing.caption} {whose}".strip()
-    motions = tuple(players[run.key] for run in drawing.plays if run.key in players)
-    return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats), motions)
+    return _table("comparison", cells, heading=heading, level=100 * settings.confidence)
 
 
 def _parameters(results: Results) -> Table:
@@ -223,6 +202,10 @@ def _parameters(results: Results) -> Table:
         for parameter in parameters(results, condition):
             by_name.setdefault(parameter.name, {}).setdefault(parameter, []).append(condition.label)
     every = [condition.label for condition in results.conditions]
+    # settings group by group, seed and number of replicates last
+    groups = list(dict.fromkeys(re.split(r"[.[]", name)[0] for name in by_name))
+    groups.sort(key=lambda group: group in ("seed", "num_replicates"))
+    ordered = sorted(by_name, key=lambda name: groups.index(re.split(r"[.[]", name)[0]))
     rows = [
         (
             f"`{name}`"
@@ -231,29 +214,20 @@ def _parameters(results: Results) -> Table:
             parameter.unit or "–",
             parameter.source or "–",
         )
-        for name in _ordered(by_name)
+        for name in ordered
         for parameter, labels in by_name[name].items()
     ]
-    return WORDS.table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
+    return _table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
 
 
-def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
-    """Yield settings group by group, seed and number of replicates last."""
-    groups = list(dict.fromkeys(name.split(".")[0].split("[")[0] for name in by_name))
-    groups.sort(key=lambda group: group in ("seed", "num_replicates"))
-    for group in groups:
-        yield from (name for name in by_name if name.split(".")[0].split("[")[0] == group)
-
-
-def _failures(results: Results) -> Iterator[Table]:
-    """Yield the table of failed replicates, if there are any."""
-    rows = [
+def _failures(results: Results) -> Table:
+    """Return the table of failed replicates."""
+    rows = (
         (c.label, replicate, reason)
         for c in results.conditions
         for replicate, reason in c.failures.items()
-    ]
-    if rows:
-        yield WORDS.table("failures", rows)
+    )
+    return _table("failures", rows)
 
 
 def have_two_parts(labels: Sequence[str]) -> bool:
@@ -264,16 +238,11 @@ def have_two_parts(labels: Sequence[str]) -> bool:
 
 
 def in_few_words(labels: Sequence[str], every: Sequence[str]) -> str:
-    """Return a list of labels; a part of them stands for all labels that have it.
+    """Return some of every label of a page; a part of them stands for all labels that have it.
 
-    Args:
-        labels: Some of them.
-        every: All labels of the page.
-
-    Returns:
-        "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
-        labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
-        themselves where they have not two parts.
+    "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
+    labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
+    themselves where they have not two parts.
     """
     if not have_two_parts(every):
         return ", ".join(labels)

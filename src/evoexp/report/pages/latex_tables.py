@@ -1,8 +1,6 @@
 r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs}`."""
 
-import functools
 import re
-from collections.abc import Iterable, Sequence
 from importlib import resources
 
 import pandas as pd
@@ -13,21 +11,18 @@ from evoexp.report.pages.page_parts import Document, Table
 LONG_TEXT = 30  # letters of a cell, from which on its column breaks lines
 NARROWEST = 14  # letters of a line in such a column
 BETWEEN = 3  # letters that the space between two columns takes
+NUMBERS = "0123456789−–∞"  # signs that numbers begin with
 SIZES = {"small": 84, "footnotesize": 94, "scriptsize": 108}
 """Size of the type → its letters in a line of 345 pt, the width of LaTeX's own classes."""
+
+SIGNS: dict[str, str] = yaml.safe_load(
+    resources.files("evoexp").joinpath("assets/latex_signs.yaml").read_text(encoding="utf-8")
+)
 
 
 def escaped(text: str) -> str:
     """Return a text that LaTeX prints as it is."""
-    signs = _signs()
-    return "".join(signs.get(sign, sign) for sign in " ".join(text.split()))
-
-
-@functools.cache
-def _signs() -> dict[str, str]:
-    path = resources.files("evoexp").joinpath("assets/latex_signs.yaml")
-    signs: dict[str, str] = yaml.safe_load(path.read_text(encoding="utf-8"))
-    return signs
+    return "".join(SIGNS.get(sign, sign) for sign in " ".join(text.split()))
 
 
 def latex_tables(document: Document) -> dict[str, bytes]:
@@ -35,15 +30,13 @@ def latex_tables(document: Document) -> dict[str, bytes]:
     return {t.file: _latex(t, document).encode() for t in document.tables if t.file}
 
 
-def tabular(headers: Iterable[str], rows: Iterable[Iterable[str]], columns: str) -> list[str]:
-    """Return the lines of a table without its frame; heads and cells are LaTeX, columns "lrr"."""
-    style = pd.DataFrame(map(tuple, rows), columns=list(headers)).style.hide(axis="index")
-    return style.to_latex(column_format=columns, hrules=True).splitlines()
-
-
 def _latex(table: Table, document: Document) -> str:
     size, columns, fits = _layout(table)
-    lines = tabular(map(_cell, table.headers), (map(_cell, row) for row in table.rows), columns)
+    headers, *rows = (
+        [escaped(_plain(each)) for each in row] for row in (table.headers, *table.rows)
+    )
+    style = pd.DataFrame(rows, columns=headers).style.hide(axis="index")
+    lines = style.to_latex(column_format=columns, hrules=True).splitlines()
     # heading, note, and whose runs these are
     note = f" {table.note}" if table.note else ""
     caption = f"{document.title}: {table.heading}.{note} {document.provenance}".replace("`", "")
@@ -82,19 +75,12 @@ def _layout(table: Table) -> tuple[str, str, bool]:
     size = fitting[0] if fitting else next(iter(SIZES))
     letters = max(room[size] // max(len(wide), 1), NARROWEST)
     share = letters / SIZES[size]
+    numbers = [all(cell[:1] in NUMBERS for cell in column if cell) for column in cells]
     kinds = [
-        rf"p{{{share:.2f}\linewidth}}" if k in wide else "r" if k and _is_number(cells[k]) else "l"
+        rf"p{{{share:.2f}\linewidth}}" if k in wide else "r" if k and numbers[k] else "l"
         for k in range(len(cells))
     ]
     return size, "".join(kinds), bool(fitting)
-
-
-def _is_number(column: Sequence[str]) -> bool:
-    return all(cell[:1] in "0123456789−–∞" for cell in column if cell)
-
-
-def _cell(value: object) -> str:
-    return escaped(_plain(value))
 
 
 def _plain(value: object) -> str:

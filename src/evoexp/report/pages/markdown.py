@@ -1,19 +1,42 @@
 """A page in Markdown, and its numbers as text."""
 
+import functools
 import math
 import re
 import string
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from importlib import resources
 from typing import Any, NamedTuple
 
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+
 from evoexp.report.pages.page_parts import Document
-from evoexp.report.pages.templates import environment
 from evoexp.report.statistics.inference import Interval, Proportion, Spread
 from evoexp.report.statistics.inference import spread as spread_of
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")
 _OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json|tex|html)")
+
+
+@functools.cache
+def asset(name: str) -> str:
+    """Return a file of `assets/site`: a template, the style sheet, the script."""
+    path = resources.files("evoexp").joinpath("assets/site", name)
+    return path.read_text(encoding="utf-8")
+
+
+@functools.cache
+def environment() -> Environment:
+    """Return the environment that fills in templates; it refuses a value that is missing."""
+    return Environment(
+        loader=FunctionLoader(asset),
+        autoescape=lambda name: not (name or "").endswith(".md"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
 
 
 def page(document: Document) -> str:
@@ -49,8 +72,8 @@ def number(value: float) -> str:
     return (f"{value + 0.0:.0f}" if whole else f"{value:.4g}").replace("-", "−")  # −0.0 is 0
 
 
-def filled(template: str, words: Mapping[str, Any]) -> str:
-    """Fill in the words of a sentence.
+def filled(template: str, words: Any) -> str:
+    """Fill in the words of a sentence: values by name, a mapping or a `Scope`.
 
     `{x!n}` is written as `number` does, `{p!p}` as `p_value`, `{xs!d}` as the median of its values,
     `{xs!m}` as that with quartiles, `{runs!i}` as a proportion with its interval at the level
@@ -66,7 +89,7 @@ def filled(template: str, words: Mapping[str, Any]) -> str:
 class Sentence(string.Formatter):
     """Reads and writes the words in braces of a sentence."""
 
-    def __init__(self, words: Mapping[str, Any]) -> None:
+    def __init__(self, words: Any) -> None:
         self.words = words
 
     def get_field(self, field_name: str, args: Any, kwargs: Any) -> Any:

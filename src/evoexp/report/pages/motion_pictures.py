@@ -21,47 +21,25 @@ class ShownMotion(NamedTuple):
     condition: ConditionResults  # the condition
     recording: Recording  # the motion of its best replicate
 
-    @property
-    def title(self) -> str:
-        """Label and verdict, as one line."""
-        return f"{self.condition.label}: {VERDICTS[self.recording.verdict.certified]}"
-
-    @property
-    def run(self) -> PlayedRun:
-        """The run, to be played beside a figure."""
-        return PlayedRun(self.condition, self.recording.heading.replicate)
-
 
 def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, int], Player]:
-    """Return the players of all motions that figures show, each once, by the keys of the runs.
-
-    The name of the experiment is empty for runs given by their hashes.
-    """
-    runs = {run.key: run for drawing in drawings for run in drawing.plays}
-    players = ((key, _player(experiment, run)) for key, run in runs.items())
-    return {key: player for key, player in players if player}
-
-
-def _player(experiment: str, run: PlayedRun) -> Player | None:
-    """Return the player of a run; None if its solution is no motion."""
-    c, k = run
-    try:
+    """Return the players of all motions that figures show, each once, by the keys of the runs."""
+    players = dict[tuple[str, int], Player]()
+    for c, k in {run.key: run for drawing in drawings for run in drawing.plays}.values():
         title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
-        found = record(c.condition, c.solutions[k], Heading(title, k))
-    except NoMotion:
-        return None
-    words = f"{c.label}, replicate {k}: {VERDICTS[found.verdict.certified]}"
-    return Player(words, f"motion_{c.condition.id[:12]}_{k:04d}.html", player_page.page([found]))
+        try:
+            motion = record(c.condition, c.solutions[k], Heading(title, k))
+        except NoMotion:
+            continue
+        words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
+        file = f"motion_{c.condition.id[:12]}_{k:04d}.html"
+        players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
+    return players
 
 
-def motion_results(results: Results) -> Results:
-    """Return the results whose motions are shown."""
-    return results
-
-
-def best_motions(motion_results: Results) -> list[ShownMotion]:
+def best_motions(results: Results) -> list[ShownMotion]:
     """Return the motions of the conditions with the least costs that have one, at most `MOST`."""
-    results, found = motion_results, list[ShownMotion]()
+    found = list[ShownMotion]()
     for condition in sorted(results.with_data, key=_best_cost):
         if len(found) == MOST:
             break
@@ -89,9 +67,12 @@ def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:
             covered.setdefault(key, (each, covers))
     best = sorted(best_motions, key=lambda each: _best_cost(each.condition))[:1]
     return {
-        "titled": [(each.title, each.recording) for each in best_motions],
+        "titled": [
+            (f"{c.label}: {VERDICTS[recording.verdict.certified]}", recording)
+            for c, recording in best_motions
+        ],
         "conditions": [each.condition for each in best_motions],
-        "runs": [each.run for each in best_motions],
+        "runs": [PlayedRun(c, own.heading.replicate) for c, own in best_motions],
         "best": [each.recording for each in best],
         "best_condition": [each.condition for each in best],
         "covered": [(own.condition.label, own.recording, rows) for own, rows in covered.values()],

@@ -2,14 +2,25 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
-from evoexp.report.pages.page_file import GENERIC, PageFile, own_pages
-from evoexp.report.pages.page_parts import Claim, Drawing, Page, PlayedRun, Quantity, Table
+from evoexp.report.pages import GENERIC, page_registration, swept
+from evoexp.report.pages.assumptions import Headline
+from evoexp.report.pages.motion_pictures import best_motions
+from evoexp.report.pages.page_file import PageFile, own_pages, read_page_file
+from evoexp.report.pages.page_parts import (
+    Claim,
+    Drawing,
+    Page,
+    PlayedRun,
+    Quantity,
+    Table,
+    quantity,
+)
 from evoexp.report.pages.page_scope import Scope
-from evoexp.report.pages.page_words import quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
+from evoexp.report.results.swept_settings import sweep_of
 from evoexp.report.statistics.comparisons import (
     Comparison,
     FamilyComparison,
@@ -18,10 +29,35 @@ from evoexp.report.statistics.comparisons import (
     compared_with_controls,
     headed,
 )
+from evoexp.report.statistics.judging import left_out
 
 TITLE = "{paper}: {experiment}"
 LENGTH = "length"
+PARTS = ("arguments", "words")  # of a figure, which one of its kind adds to
 Entry = Mapping[str, Any]
+
+
+def page_of(results: Results, settings: ReportSettings) -> Page:
+    """Return the page that the settings name, filled from results; a sweep has a page of its own.
+
+    A page that shows no motion is given the figure of the scene, with the best motions; claims on
+    conditions that were left out are named as not judged.
+    """
+    chosen = page_registration(settings)
+    if sweep := sweep_of(results):
+        motions = best_motions(swept.best_condition(sweep, results))
+        return own_page("sweep", results, settings, sweep=sweep, best_motions=motions)
+    if chosen.target.endswith(".yaml"):
+        page = build(read_page_file(*chosen.target.split(":")), chosen.name, results, settings)
+    else:
+        page = cast("Page", chosen.load()(results, settings))
+    page = page._replace(claims=(*page.claims, *left_out(results, page.claims)))
+    if any(drawing.plays for drawing in page.drawings):
+        return page
+    file = own_pages()
+    scope = Scope(file.functions, {"results": results, "settings": settings})
+    scene = PageBuilder(file, scope).drawings("scene")
+    return page._replace(drawings=(*page.drawings, *scene))
 
 
 def own_page(name: str, results: Results, settings: ReportSettings, **values: object) -> Page:
@@ -29,27 +65,27 @@ def own_page(name: str, results: Results, settings: ReportSettings, **values: ob
     return build(own_pages(), name, results, settings, **values)
 
 
-def scene_drawing(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
-    """Return the figure of robots and scenes, with the motions to be played; none without any."""
-    file = own_pages()
-    scope = Scope(file.functions, {"results": results, "settings": settings})
-    return tuple(PageBuilder(file, scope).drawings("scene"))
-
-
 def build(
     file: PageFile, name: str, results: Results, settings: ReportSettings, **values: object
 ) -> Page:
     """Build a page; another one, or the generic one, if the results do not fit it."""
-    entry = file.pages[name]
-    given = {"results": results, "settings": settings, "rules": file.rules, "page": entry}
-    scope = Scope(file.functions, {**given, "paper": file.words.name, **values})
+    entry = file.entries["pages"][name]
+    bound = {"results": results, "settings": settings, "rules": file.rules, "page": entry}
+    scope = Scope(file.functions, {**bound, "paper": file.name, **values})
     if "fits" in entry and not scope.value(entry["fits"]):
         other = entry.get("otherwise", GENERIC)
-        own = own_pages() if other == GENERIC else file
-        return build(own, other, results, settings)
-    if "headlines" in entry:
-        return _assumptions(file, scope, entry)
-    return PageBuilder(file, scope.inner(compared=_compared(scope, entry))).page(entry)
+        return build(own_pages() if other == GENERIC else file, other, results, settings)
+    if "headlines" not in entry:
+        return PageBuilder(file, scope.inner(compared=_compared(scope, entry))).page(entry)
+    return own_page(
+        "assumptions",
+        results,
+        settings,
+        paper=file.name,
+        rules=file.rules,
+        assumed_results=scope.value(entry.get("conditions", "results")),
+        headlines=[_headline(scope, each) for each in entry["headlines"]],
+    )
 
 
 class PageBuilder:
@@ -57,7 +93,7 @@ class PageBuilder:
 
     def __init__(self, file: PageFile, scope: Scope) -> None:
         self.file = file
-        self.words = file.words.words
+        self.entries = file.entries
         self.scope = scope
 
     def page(self, entry: Entry) -> Page:
@@ -77,10 +113,10 @@ class PageBuilder:
         """Yield rows of the table of results, by the names of their lists or functions."""
         results = self.scope["results"]
         for name in names:
-            if name not in self.words["quantities"]:
+            if name not in self.entries["quantities"]:
                 yield from self.scope[name]
             else:
-                for title, unit, values in self.words["quantities"][name]:
+                for title, unit, values in self.entries["quantities"][name]:
                     unit = self.scope["unit"] if unit == LENGTH else unit
                     yield quantity(results, self.scope.text(title), unit, self.scope[values])
 
@@ -96,41 +132,38 @@ class PageBuilder:
     def tables(self, names: Sequence[str]) -> Iterator[Table]:
         """Yield the tables that have rows."""
         for name in names:
-            entry = self.words["tables"][name]
-            rows = tuple(self.rows(entry))
-            if rows:
-                before, behind = (self.scope.value(entry[k]) if k in entry else () for k in SIDES)
-                headers = (*before, *map(self.scope.text, entry["headers"]), *behind)
+            entry = self.entries["tables"][name]
+            if rows := tuple(map(tuple, self.rows(entry))):
+                behind = self.scope.value(entry["behind"]) if "behind" in entry else ()
+                headers = (*map(self.scope.text, entry["headers"]), *behind)
                 note = self.scope.text(entry.get("note", ""))
                 yield Table(self.scope.text(entry["heading"]), headers, rows, note)
 
-    def rows(self, entry: Entry) -> Iterator[tuple[object, ...]]:
+    def rows(self, entry: Entry) -> Iterator[Sequence[object]]:
         """Yield the rows of a table: those of a function, or one per item."""
         if "rows" in entry:
             yield from self.scope.value(entry["rows"])
             return
         for scope in self.items(entry):
-            row = scope.value(entry["row"]) if "row" in entry else map(scope.text, entry["cells"])
-            yield tuple(row)
+            if "row" in entry:
+                yield scope.value(entry["row"])
+            else:
+                yield [scope.text(cell) for cell in entry["cells"]]
 
     def checks(self, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield checks, (title, finding)."""
-        for name in names:
-            for row in self.words["checks"][name]:
-                entry: Entry = (
-                    {"title": row[0], "finding": row[1]} if isinstance(row, list) else row
-                )
-                for scope in self.items(entry):
-                    if "rows" in entry:
-                        yield from scope.value(entry["rows"])
-                    else:
-                        yield scope.text(entry["title"]), self.finding(scope, entry["finding"])
-
-    def finding(self, scope: Scope, entry: str | Entry) -> str:
-        """Return a finding; of several items: their texts, joined."""
-        if isinstance(entry, str):
-            return scope.text(entry)
-        return "; ".join(own.text(entry["text"]) for own in self.items(entry, scope))
+        """Yield checks, (title, finding); a finding of several items is their texts, joined."""
+        for row in (row for name in names for row in self.entries["checks"][name]):
+            entry = dict(zip(("title", "finding"), row, strict=True)) if type(row) is list else row
+            for scope in self.items(entry):
+                if "rows" in entry:
+                    yield from scope.value(entry["rows"])
+                    continue
+                finding = entry["finding"]
+                if isinstance(finding, Mapping):
+                    texts = (each.text(finding["text"]) for each in self.items(finding, scope))
+                    yield scope.text(entry["title"]), "; ".join(texts)
+                else:
+                    yield scope.text(entry["title"]), scope.text(finding)
 
     def comparisons(self, entry: Entry) -> Iterator[tuple[str, tuple[Comparison, ...]]]:
         """Yield (heading, comparisons)."""
@@ -138,8 +171,8 @@ class PageBuilder:
             if isinstance(each, str):
                 yield from self.scope[each]
             elif "controls" in each:
-                found = [measure(self.scope, *row) for row in each["controls"]]
-                own = [(one.name, one.lower_is_better, one.values) for one in found]
+                measures = [measure(self.scope, *row) for row in each["controls"]]
+                own = [(one.name, one.lower_is_better, one.values) for one in measures]
                 yield from compared_with_controls(
                     self.scope["results"], self.scope["settings"], own
                 )
@@ -150,9 +183,18 @@ class PageBuilder:
         own = self.scope if scope is None else scope
         scopes = [own]
         if "each" in entry:
-            names, _, items = str(entry["each"]).rpartition(" in ")
-            scopes = [_bound(own, names.split(", "), item) for item in own.value(items)]
-        return (each for each in scopes if "when" not in entry or _holds(each, entry["when"]))
+            words, _, items = str(entry["each"]).rpartition(" in ")
+            names = words.split(", ")
+            scopes = []
+            for item in own.value(items):
+                inner = own  # of several names one scope inside of the other
+                for name, value in zip(names, item if len(names) > 1 else (item,), strict=True):
+                    inner = inner.inner(**{name: value})
+                scopes.append(inner)
+        if "when" not in entry:
+            return iter(scopes)
+        name = entry["when"].removeprefix("not ")
+        return (each for each in scopes if bool(each.value(name)) == (name == entry["when"]))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""
@@ -165,31 +207,28 @@ class PageBuilder:
 
     def drawings(self, name: str) -> Iterator[Drawing]:
         """Yield a figure, or one of each item; none where what it is drawn of is empty."""
-        entry = {**self.file.shared, **self.words["figures"]}[name]
+        entry = {**self.file.shared, **self.entries["figures"]}[name]
         if "kind" in entry:  # begins with one of the figures that all pages share
             base = self.file.shared[entry["kind"]]
             parts = {part: {**base.get(part, {}), **entry.get(part, {})} for part in PARTS}
             entry = {"stem": entry["kind"], **base, **entry, **parts}
-        for scope in self.items(entry):
-            bound, arguments = self.bound(scope, entry)
-            is_empty = "needs" in entry and not any(bound.value(entry["needs"]).values())
-            if not is_empty and ("shows" not in entry or bound["shown"]):
-                yield self.drawing(name, bound, entry, arguments)
-
-    def bound(self, scope: Scope, entry: Entry) -> tuple[Scope, dict[str, Any]]:
-        """Return the scope of a figure, and the arguments of its table, which are bound in it."""
-        items: dict[str, Any] = {"names": entry.get("names", {})}
-        if "shows" in entry:
-            items["shown"] = scope.value(entry["shows"])
-        if "of" in entry:
-            items["of"] = _argument(scope, entry["of"])
-        if "among" in entry:  # results of some conditions alone
-            items["results"] = scope["results"]._replace(conditions=scope.value(entry["among"]))
-        inner = scope.inner(**items)
-        words = {name: inner.text(text) for name, text in entry.get("words", {}).items()}
-        arguments = entry.get("arguments", {}).items()
-        given = {name: _argument(inner, value) for name, value in arguments}
-        return inner.inner(**words, **given), given
+        for outer in self.items(entry):
+            items: dict[str, Any] = {"names": entry.get("names", {})}
+            if "shows" in entry:
+                items["shown"] = outer.value(entry["shows"])
+            if "of" in entry:
+                items["of"] = _argument(outer, entry["of"])
+            if "among" in entry:  # results of some conditions alone
+                conditions = outer.value(entry["among"])
+                items["results"] = outer["results"]._replace(conditions=conditions)
+            inner = outer.inner(**items)
+            words = {word: inner.text(text) for word, text in entry.get("words", {}).items()}
+            values = entry.get("arguments", {}).items()
+            arguments = {argument: _argument(inner, value) for argument, value in values}
+            scope = inner.inner(**words, **arguments)
+            is_empty = "needs" in entry and not any(scope.value(entry["needs"]).values())
+            if not is_empty and ("shows" not in entry or scope["shown"]):
+                yield self.drawing(name, scope, entry, arguments)
 
     def drawing(
         self, name: str, scope: Scope, entry: Entry, arguments: Mapping[str, Any]
@@ -204,7 +243,7 @@ class PageBuilder:
         else:
             conditions = (scope["condition"],) if "condition" in scope else scope["conditions"]
         played = scope.value(entry["plays"]) if "plays" in entry else shown
-        suffix = scope.get("suffix", "") if "each" in entry else ""
+        suffix = scope["suffix"] if "each" in entry and "suffix" in scope else ""
         title = scope.text(entry["title"])
         return Drawing(
             stem=scope.text(entry.get("stem", name)) + suffix,
@@ -218,17 +257,8 @@ class PageBuilder:
                 for one in played
                 if one.replicate is not None
             ),
-            columns=entry.get("columns", ""),
+            columns=entry.get("columns") or " ".join((table.__doc__ or "").split()),
         )
-
-
-PARTS = ("arguments", "words")  # of a figure, which one of its kind adds to
-
-
-def _holds(scope: Scope, condition: str) -> bool:
-    """Return whether the value of a name is true, or, behind "not", false."""
-    name = condition.removeprefix("not ")
-    return bool(scope.value(name)) == (name == condition)
 
 
 def _argument(scope: Scope, value: Any) -> Any:
@@ -236,16 +266,6 @@ def _argument(scope: Scope, value: Any) -> Any:
     if isinstance(value, Mapping):
         return {scope.text(text): scope.function(name) for text, name in value.items()}
     return scope.value(value) if isinstance(value, str) else value
-
-
-def _bound(scope: Scope, names: Sequence[str], item: Any) -> Scope:
-    """Return the scope of an item: of several names one scope inside of the other."""
-    for name, value in zip(names, item if len(names) > 1 else (item,), strict=True):
-        scope = scope.inner(**{name: value})
-    return scope
-
-
-SIDES = ("before", "behind")  # of a table: headers that a function gives
 
 
 def measure(
@@ -269,21 +289,11 @@ def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
     return tuple(found)
 
 
-def _assumptions(file: PageFile, scope: Scope, entry: Entry) -> Page:
-    """Build the page of what a paper leaves open."""
-    from evoexp.report.pages import assumptions  # which is built here, too
+def _headline(scope: Scope, entry: Entry) -> Headline:
+    """Return a headline claim of a paper, which a function judges on one condition."""
 
-    def headline(each: Entry) -> "assumptions.Headline":
-        def judged(_: Any, condition: Any, controls: Any) -> Claim:
-            own = scope.inner(condition=condition, controls=controls)
-            return own.call(file.functions[each["judge"]])  # type: ignore[no-any-return]
+    def judged(condition: Any, controls: Any) -> Claim:
+        function = scope.functions[entry["judge"]]
+        return cast("Claim", scope.inner(condition=condition, controls=controls).call(function))
 
-        quantity = scope.text(each["quantity"])
-        return assumptions.Headline(each["claim"], quantity, scope[each["values"]], judged)
-
-    results = scope.value(entry["conditions"]) if "conditions" in entry else scope["results"]
-    found = map(headline, entry["headlines"])
-    name = file.words.name
-    page = assumptions.page(results, scope["settings"], file.rules, name, tuple(found))
-    rows = PageBuilder(own_pages(), scope).quantities(["usual"])
-    return page._replace(quantities=tuple(rows))  # of all conditions
+    return Headline(entry["claim"], scope.text(entry["quantity"]), scope[entry["values"]], judged)

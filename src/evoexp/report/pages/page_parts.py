@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
 
-from evoexp.report.results.stored_results import ConditionResults
-from evoexp.report.statistics.comparisons import Comparison
-from evoexp.report.statistics.inference import Spread
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Comparison, Values
+from evoexp.report.statistics.inference import Spread, spread
 
 if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure
@@ -40,7 +40,7 @@ class Drawing(NamedTuple):
     draw: "Callable[[pd.DataFrame], Figure]"  # draws the data
     conditions: tuple[ConditionResults, ...]  # whose results it shows
     plays: tuple[PlayedRun, ...] = ()  # runs whose motions it shows
-    columns: str = ""  # description of the table's columns; empty: the docstring of `table` is it
+    columns: str = ""  # description of the table's columns
 
 
 class Quantity(NamedTuple):
@@ -49,6 +49,11 @@ class Quantity(NamedTuple):
     name: str
     unit: str
     spreads: dict[str, Spread]  # by label
+
+
+def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity:
+    """Return a row of the table of results."""
+    return Quantity(name, unit, {c.label: spread(values(c)) for c in results.with_data})
 
 
 class Table(NamedTuple):
@@ -132,13 +137,6 @@ class Figures(NamedTuple):
     heading: str = "Figures"
 
 
-class Notice(NamedTuple):
-    """A remark at the top of a page, of its results as a whole."""
-
-    title: str
-    text: str
-
-
 class LogText(NamedTuple):
     """A replicate of a stored run: where its log is, or why there is none."""
 
@@ -170,16 +168,11 @@ class Document(NamedTuple):
     command: str  # that makes it
     experiment: str  # name of the experiment; empty for runs given by their hashes
     budget: str  # name of the budget; empty for runs given by their hashes
-    notices: tuple[Notice, ...]  # remarks on the results as a whole
+    notices: tuple[tuple[str, str], ...]  # (title, text): remarks on the results as a whole
     introduction: str  # one paragraph
     sections: tuple[Table | Figures, ...]  # without empty ones
     runs: tuple[RunText, ...]  # those that it shows
-    seeds: tuple[int, ...] = ()  # of their conditions, each once
-
-    @property
-    def provenance(self) -> str:
-        """The sentence that tells the runs: how many, of which seeds and hashes."""
-        return provenance([(run.hash12, run.done) for run in self.runs], self.seeds)
+    provenance: str = ""  # the sentence that tells them: how many, of which seeds and hashes
 
     @property
     def origin(self) -> str:

@@ -6,7 +6,6 @@ returns. Values are computed when they are first named, and once per page or per
 condition, a task) that they depend on.
 """
 
-import functools
 import inspect
 import string
 from collections.abc import Callable, Iterator, Mapping
@@ -29,23 +28,19 @@ COLUMNS = (  # of summaries, which pages may name beside the planner's own terms
 class Functions(dict[str, Callable[..., Any]]):
     """The functions that a page may name."""
 
-    @functools.cached_property
-    def needs(self) -> dict[str, frozenset[str]]:
-        """The items and values that each depends on, through all functions between."""
-        found: dict[str, frozenset[str]] = {}
+    def __init__(self, functions: Mapping[str, Callable[..., Any]]) -> None:
+        super().__init__(functions)
+        self._needs: dict[str, frozenset[str]] = {}
 
-        def collect(name: str) -> frozenset[str]:
-            if name not in self:
-                return frozenset({CONDITION} if is_column(name) else {name})
-            if name not in found:
-                found[name] = frozenset()  # a function that needs itself needs nothing more
-                for each, is_function in parameters(self[name]).items():
-                    found[name] |= collect(each) - ({CONDITION} if is_function else set())
-            return found[name]
-
-        for name in self:
-            collect(name)
-        return found
+    def needs(self, name: str) -> frozenset[str]:
+        """Return the items and values that a name depends on, through all functions between."""
+        if name not in self:
+            return frozenset({CONDITION} if is_column(name) else {name})
+        if name not in self._needs:
+            self._needs[name] = frozenset()  # a function that needs itself needs nothing more
+            for each, is_function in parameters(self[name]).items():
+                self._needs[name] |= self.needs(each) - ({CONDITION} if is_function else set())
+        return self._needs[name]
 
 
 def parameters(function: Callable[..., Any]) -> dict[str, bool]:
@@ -54,10 +49,9 @@ def parameters(function: Callable[..., Any]) -> dict[str, bool]:
     The annotation says so: `effort: FloatArray` is the effort of the condition at hand, `effort:
     Values` the function that gives the effort of any condition.
     """
-    found = inspect.signature(function).parameters.values()
     return {
         each.name: get_origin(each.annotation) is Callable
-        for each in found
+        for each in inspect.signature(function).parameters.values()
         if each.default is each.empty
     }
 
@@ -67,7 +61,7 @@ def is_column(name: str) -> bool:
     return name in COLUMNS or name.startswith(TERM)
 
 
-class Scope(Mapping[str, Any]):
+class Scope:
     """Values by name. An inner scope binds an item and sees everything of its outer one."""
 
     def __init__(
@@ -84,6 +78,10 @@ class Scope(Mapping[str, Any]):
         key = tuple((name, id(item)) for name, item in items.items())
         return self._inner.setdefault(key, Scope(self.functions, items, self))
 
+    def __contains__(self, name: str) -> bool:
+        known = name in self._values or name in self.functions
+        return known or (self.outer is not None and name in self.outer)
+
     def __getitem__(self, name: str) -> Any:
         """Return a value; a function of a condition itself where no condition is bound.
 
@@ -91,33 +89,31 @@ class Scope(Mapping[str, Any]):
             KeyError: If nothing has this name, or a function lacks an argument.
         """
         if name not in self._values:
-            if self.outer is not None and not self._bound & self.needs(name):
+            needs = self.functions.needs(name)
+            if self.outer is not None and not self._bound & needs:
                 return self.outer[name]
-            self._values[name] = self._computed(name)
+            if CONDITION in needs and CONDITION not in self:
+                value = self.function(name)
+            elif name in self.functions:
+                value = self.call(self.functions[name])
+            elif is_column(name):
+                value = self[CONDITION].column(name)
+            else:
+                raise KeyError(name)
+            self._values[name] = value
         return self._values[name]
 
-    def __iter__(self) -> Iterator[str]:
-        outer = () if self.outer is None else self.outer
-        return iter(dict.fromkeys([*outer, *self.functions, *self._values]))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-    def __contains__(self, name: object) -> bool:
-        known = name in self._values or name in self.functions
-        return known or (self.outer is not None and name in self.outer)
-
-    def call(self, function: Callable[..., Any], **given: Any) -> Any:
+    def call(self, function: Callable[..., Any], **arguments: Any) -> Any:
         """Call a function with the values that its arguments name."""
         for name, is_function in parameters(function).items():
-            if name not in given:
-                given[name] = self.function(name) if is_function else self[name]
-        found = function(**given)
-        return tuple(found) if isinstance(found, Iterator) else found
+            if name not in arguments:
+                arguments[name] = self.function(name) if is_function else self[name]
+        value = function(**arguments)
+        return tuple(value) if isinstance(value, Iterator) else value
 
     def function(self, name: str) -> Any:
         """Return the function that gives the value of this name for any condition."""
-        if CONDITION not in self.needs(name):
+        if CONDITION not in self.functions.needs(name):
             return self[name]
         return lambda condition: self.inner(condition=condition)[name]
 
@@ -128,21 +124,6 @@ class Scope(Mapping[str, Any]):
     def text(self, template: object) -> str:
         """Return a text with its words in braces filled in, see `markdown.filled`."""
         return markdown.filled(str(template), self)
-
-    def needs(self, name: str) -> frozenset[str]:
-        """Return the items and values that a name depends on, through all functions between."""
-        if name in self.functions:
-            return self.functions.needs[name]
-        return frozenset({CONDITION} if is_column(name) else {name})
-
-    def _computed(self, name: str) -> Any:
-        if CONDITION in self.needs(name) and CONDITION not in self:
-            return self.function(name)
-        if name in self.functions:
-            return self.call(self.functions[name])
-        if not is_column(name):
-            raise KeyError(name)
-        return self[CONDITION].column(name)
 
 
 def names_in(template: object) -> Iterator[str]:

@@ -1,15 +1,13 @@
 """Values that every page may name: the parts of its results and settings, its comparisons."""
 
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
-from evoexp.report.pages.page_parts import PlayedRun, Quantity
-from evoexp.report.pages.page_words import quantity
-from evoexp.report.report_settings import ReportSettings
+from evoexp.report.pages.page_parts import PlayedRun, Quantity, quantity
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import (
     Comparison,
     Family,
@@ -19,84 +17,50 @@ from evoexp.report.statistics.comparisons import (
     rows_by_name,
 )
 from evoexp.report.statistics.inference import Proportion
-from evoexp.report.statistics.judging import Judge
 from evoexp.store.messages import TERM
 
-
-def experiment(results: Results) -> str:
-    """Return the name of the experiment, as titles have it."""
-    return results.experiment or "stored runs"
+FEW = 4  # conditions whose average costs can be drawn beside the best ones
 
 
-def conditions(results: Results) -> tuple[ConditionResults, ...]:
-    """Return the conditions with data."""
-    return results.with_data
+PARTS: dict[str, Callable[..., Any]] = {
+    "experiment": lambda results: results.experiment or "stored runs",  # as titles have it
+    "conditions": lambda results: results.with_data,
+    "main": lambda results: results.main,  # without controls and references
+    "first": lambda results: results.with_data[0],
+    "unit": lambda first: first.length_unit,  # of the first condition's scene
+    "several": lambda results: len(results.with_data) > 1,  # there is something to compare
+    "are_few": lambda results: len(results.evolved) <= FEW,
+    "whole": lambda conditions: (Family.of(conditions),),  # the first one against all others
+    "played": lambda condition: (PlayedRun(condition, condition.best_replicate),),
+    "judge": lambda results, settings, rules: judging.judge(results, settings, rules),
+    "confidence": lambda settings: settings.confidence,  # of every interval, in (0, 1)
+    "level": lambda settings: 100 * settings.confidence,  # of every interval [%]
+    "significance": lambda settings: settings.significance,
+    "samples": lambda settings: settings.samples_per_segment,
+}
 
 
-def main(results: Results) -> tuple[ConditionResults, ...]:
-    """Return the conditions with data without controls and references."""
-    return results.main
-
-
-def first(results: Results) -> ConditionResults:
-    """Return the first condition with data."""
-    return results.with_data[0]
-
-
-def unit(first: ConditionResults) -> str:
-    """Return the unit of length of the first condition's scene."""
-    return first.length_unit
-
-
-def confidence(settings: ReportSettings) -> float:
-    """Return the level of every interval, in (0, 1)."""
-    return settings.confidence
-
-
-def level(settings: ReportSettings) -> float:
-    """Return the level of every interval [%]."""
-    return 100 * settings.confidence
-
-
-def judge(results: Results, settings: ReportSettings, rules: Rules) -> Judge:
-    """Return the judge of the paper's claims."""
-    return judging.judge(results, settings, rules)
-
-
-def several(results: Results) -> bool:
-    """Return whether there is something to compare: two conditions with data or more."""
-    return len(results.with_data) > 1
-
-
-def significance(settings: ReportSettings) -> float:
-    """Return the adjusted p-value below which a difference counts."""
-    return settings.significance
-
-
-def samples(settings: ReportSettings) -> int:
-    """Return the configurations per segment of a path at which figures measure distances."""
-    return settings.samples_per_segment
-
-
-def whole(conditions: tuple[ConditionResults, ...]) -> tuple[Family, ...]:
-    """Return the first condition against all others."""
-    return (Family.of(conditions),)
-
-
-def played(condition: ConditionResults) -> tuple[PlayedRun, ...]:
-    """Return the best replicate, whose motion a figure shows."""
-    return (PlayedRun(condition, condition.best_replicate),)
+def scenes(results: Results) -> str:
+    """Warn where conditions differ in robot or scenario; empty if they do not."""
+    if len({(c.robot, c.scenario) for c in results.with_data}) < 2:
+        return ""
+    return (
+        "The conditions differ in robot or scenario: their costs are compared as numbers, whatever "
+        "they measure."
+    )
 
 
 def terms(results: Results) -> Iterator[Quantity]:
     """Yield the rows of the planner's own terms, those of the best solutions."""
-    for term in results.terms:
+    columns = {str(name) for c in results.with_data for name in c.summaries}
+    for column in sorted(name for name in columns if name.startswith(TERM)):
+        term = column.removeprefix(TERM)
         name, unit = term.replace("_", " "), "–"
         if term.endswith(("_deg", "_rad")):
             name, _, unit = name.rpartition(" ")
         elif "distance" in term or "clearance" in term:
             unit = results.with_data[0].length_unit or "–"
-        yield quantity(results, name, unit, by_column(TERM + term))
+        yield quantity(results, name, unit, by_column(column))
 
 
 def known(of: Mapping[str, Values], results: Results) -> dict[str, Values]:

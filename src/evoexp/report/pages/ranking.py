@@ -1,4 +1,7 @@
-"""The part of `evoexp compare`'s page that ranks planners over problems."""
+"""The part of `evoexp compare`'s page that ranks planners over problems.
+
+The functions give what the page `comparison` of `page.yaml` names.
+"""
 
 import numpy as np
 
@@ -13,29 +16,29 @@ from evoexp.report.statistics.problem_ranks import (
 )
 
 
-def rank_rows(found: Standing) -> list[tuple[str, ...]]:
+def rank_rows(ranks: Standing) -> list[tuple[str, ...]]:
     """Return mean ranks, best first; none where there is but one planner, or one problem."""
-    if not found.can_be_profiled:
+    if not ranks.can_be_profiled:
         return []
-    lengths = found.lengths
+    lengths = ranks.lengths
     best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
     return [
         (
             planner,
-            f"{found.mean_ranks[k]:.2f}",
+            f"{ranks.mean_ranks[k]:.2f}",
             markdown.share(int(best[:, k].sum()), len(lengths)),
             markdown.share(int(np.isfinite(lengths[:, k]).sum()), len(lengths)),
-            markdown.share(int(np.isfinite(found.efforts[:, k]).sum()), len(lengths)),
+            markdown.share(int(np.isfinite(ranks.efforts[:, k]).sum()), len(lengths)),
         )
         for k, planner in sorted(
-            enumerate(found.planners), key=lambda each: found.mean_ranks[each[0]]
+            enumerate(ranks.planners), key=lambda each: ranks.mean_ranks[each[0]]
         )
     ]
 
 
-def too_few(found: Standing) -> str:
+def too_few_ranks(ranks: Standing) -> str:
     """Say why planners are not ranked; empty if they are."""
-    if found.can_be_profiled:
+    if ranks.can_be_profiled:
         return ""
     return (
         " Planners are not ranked: a problem counts once, however many seeds it has, and it takes "
@@ -43,26 +46,26 @@ def too_few(found: Standing) -> str:
     )
 
 
-def left_out(found: Standing) -> str:
+def left_out(ranks: Standing) -> str:
     """Name the problems and planners that do not count; empty if all do."""
-    names = ", ".join(found.left_out)
+    names = ", ".join(ranks.left_out)
     problems = f" Left out, as some planner was not run on them: {names}." if names else ""
-    if not found.outsiders:
+    if not ranks.outsiders:
         return problems
-    planners = ", ".join(found.outsiders)
+    planners = ", ".join(ranks.outsiders)
     return f"{problems} Not ranked, as run on less than half of the problems: {planners}."
 
 
-def rank_test(found: Standing, settings: ReportSettings) -> str:
+def rank_test(ranks: Standing, settings: ReportSettings) -> str:
     """Tell the outcome of the tests, or why there are none."""
-    planners, problems = len(found.planners), len(found.problems)
-    if not found.can_be_tested:
+    planners, problems = len(ranks.planners), len(ranks.problems)
+    if not ranks.can_be_tested:
         return (
             f"Too few for a test of ranks and its diagram: that takes {MIN_PLANNERS} planners and "
             f"{MIN_PROBLEMS} problems that all of them were run on; here are {planners} planners "
             f"and {problems} such problems."
         )
-    test = friedman(found.lengths)
+    test = friedman(ranks.lengths)
     difference = critical_difference(planners, problems, settings.significance)
     says = (
         "the planners rank differently"
@@ -76,7 +79,7 @@ def rank_test(found: Standing, settings: ReportSettings) -> str:
     )
 
 
-def never_proven(found: Standing) -> str:
+def never_proven(ranks: Standing) -> str:
     """Tell how many problems no planner has a proven answer on; empty if there is none."""
-    unsolved = int(np.isinf(found.efforts).all(axis=1).sum())
+    unsolved = int(np.isinf(ranks.efforts).all(axis=1).sum())
     return f" No planner has a proven answer on {unsolved} of them." if unsolved else ""

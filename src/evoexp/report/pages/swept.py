@@ -1,60 +1,80 @@
-"""The page of a sweep: each combination, the effect of each setting, convergence in facets.
+"""Rows and words of the page of a sweep: each combination, the effect of each setting, facets.
 
 What does not depend on the sweep, the scene and the motion, is shown once, of the best condition.
+The functions give what the page `sweep` of `page.yaml` names.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from evoexp.report.figures import sweeps
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_builder import own_page
-from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import certified, search_seconds, success
-from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
-from evoexp.report.statistics.comparisons import by_column
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled, main_effects
+from evoexp.report.statistics.comparisons import Values, by_column
 from evoexp.report.statistics.inference import Proportion, spread
 
 MOST_CURVES = 60  # curves of convergence on a page
 SHARES = ("solved", "solved and proven free of contact")
+MEASURES: dict[str, Values] = {  # that pages of sweeps tell, by name
+    "best cost": by_column("best_cost"),
+    "evaluations": by_column("evaluations"),
+    "CPU time of the search [s]": search_seconds,
+}
 
 
-def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
-    """Build the page of a sweep."""
-    cost, of_base = by_column("best_cost"), ("condition",)
-    effects = tuple(main_effects(sweep, cost, settings.confidence, settings.num_resamples))
-    done = [each.results for each in sweep.conditions if each.results.done]
+def best_condition(sweep: Sweep, results: Results) -> Results:
+    """Return the results of the condition of the least median cost alone."""
+    best = sorted(swept_conditions(sweep), key=lambda c: c.spread("best_cost").median)[:1]
+    return results._replace(conditions=tuple(best))
+
+
+def swept_conditions(sweep: Sweep) -> list[ConditionResults]:
+    """Return the conditions with data."""
+    return [each.results for each in sweep.conditions if each.results.done]
+
+
+def curves_are_few(swept_conditions: list[ConditionResults]) -> bool:
+    """Return whether convergence is drawn."""
+    return 0 < len(swept_conditions) <= MOST_CURVES
+
+
+def effects(sweep: Sweep, settings: ReportSettings) -> Iterator[MainEffect]:
+    """Yield the effect of each value of each setting on the best cost."""
+    cost = by_column("best_cost")
+    return main_effects(sweep, cost, settings.confidence, settings.num_resamples)
+
+
+def sweep_words(sweep: Sweep) -> dict[str, object]:
+    """Return the words of the page's texts."""
     bases = [base for base in sweep.bases if base]
-    best = sorted(done, key=lambda c: spread(cost(c)).median)[:1]
-    headers = (*sweep.settings, "hash", "n", *SHARES, *measures())
-    return own_page(
-        "sweep",
-        results,
-        settings,
-        sweep=sweep,
-        num_conditions=len(sweep.conditions),
-        num_combinations=len({each.values for each in sweep.conditions}),
-        swept_names=" and ".join(f"`{name}`" for name in sweep.settings),
-        bases=f", each of {', '.join(bases)}" if len(bases) > 1 else "",
-        combination_headers=(*of_base * bool(bases), *headers),
-        combinations=tuple(_combinations(sweep, settings.confidence)),
-        effects=effects,
-        effect_headers=of_base * any(each.base for each in effects),
-        effect_rows_by_value=tuple(_effect_rows(effects)),
-        swept_conditions=done,
-        curves_are_few=0 < len(done) <= MOST_CURVES,
-        swept_settings=labelled(sweep, ["…"] * len(sweep.settings)).replace(" = …", ""),
-        last_setting=sweep.settings[-1],
-        cost_of_runs=cost,
-        search_seconds_of_runs=search_seconds,
-        more_grids=_more(len({(each.base, *each.values[:-2]) for each in sweep.conditions})),
-        more_facets=_more(len(sweeps.facets(sweep))),
-        motion_results=results._replace(conditions=tuple(best)),
-    )
+    panels = {(each.base, *each.values[:-2]) for each in sweep.conditions}
+    return {
+        "conditions": len(sweep.conditions),
+        "combinations": len({each.values for each in sweep.conditions}),
+        "names": " and ".join(f"`{name}`" for name in sweep.settings),
+        "bases": f", each of {', '.join(bases)}" if len(bases) > 1 else "",
+        "settings": labelled(sweep, ["…"] * len(sweep.settings)).replace(" = …", ""),
+        "last": sweep.settings[-1],
+        "more_grids": _more(len(panels)),
+        "more_facets": _more(len(sweeps.facets(sweep))),
+    }
 
 
-def _combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]]:
+def combination_headers(sweep: Sweep) -> tuple[str, ...]:
+    """Return the headers of the table of combinations."""
+    of_base = ("condition",) if any(sweep.bases) else ()
+    return (*of_base, *sweep.settings, "hash", "n", *SHARES, *MEASURES)
+
+
+def effect_headers(effects: Sequence[MainEffect]) -> tuple[str, ...]:
+    """Return the headers of the table of effects."""
+    of_base = ("condition",) if any(each.base for each in effects) else ()
+    return (*of_base, "setting", "value", "pairs", "change of the best cost", "better in")
+
+
+def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]]:
     """Yield a row per combination: shares of runs, and the spreads of what they took."""
     for each in sweep.conditions:
         c = each.results
@@ -66,11 +86,11 @@ def _combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...
             f"`{c.condition.id[:12]}`",
             c.done,
             *(shares if c.done else ("–", "–")),
-            *(markdown.spread(spread(of(c))) for of in measures().values()),
+            *(markdown.spread(spread(of(c))) for of in MEASURES.values()),
         )
 
 
-def _effect_rows(effects: tuple[MainEffect, ...]) -> Iterator[tuple[object, ...]]:
+def effect_rows_by_value(effects: Sequence[MainEffect]) -> Iterator[tuple[object, ...]]:
     """Yield a row per value that is compared with the first one of its setting."""
     number = markdown.number
     for each in effects:

@@ -14,7 +14,7 @@ Run and replicate are those that found it.
 import math
 import re
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
@@ -57,23 +57,19 @@ def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
         raise SettingError(name, "YAML", str(error).splitlines()[0]) from None
     if not isinstance(found, dict):
         raise SettingError(name, "a mapping of keys of problems", found)
-    return {_key(key, name): _entry(entry, f"{name}, {key}") for key, entry in found.items()}
-
-
-def _key(key: Any, name: str) -> str:
-    if not isinstance(key, str) or not _HASH.fullmatch(key):
-        raise SettingError(name, "keys of 12 hex digits in quotation marks", key)
-    return key
-
-
-def _entry(entry: Any, where: str) -> BestKnown:
-    if not isinstance(entry, dict) or set(entry) != set(BestKnown._fields):
-        raise SettingError(where, f"a mapping of {', '.join(BestKnown._fields)}", entry)
-    length, run, replicate = entry["length"], entry["run"], entry["replicate"]
-    if type(length) not in (int, float) or not 0.0 < length < math.inf:
-        raise SettingError(f"{where}, length", "a number above 0", length)
-    if not isinstance(run, str) or not _HASH.fullmatch(run):
-        raise SettingError(f"{where}, run", "12 hex digits in quotation marks", run)
-    if type(replicate) is not int or replicate < 0:
-        raise SettingError(f"{where}, replicate", "a whole number, at least 0", replicate)
-    return BestKnown(str(entry["problem"]), float(length), run, replicate)
+    known = {}
+    for key, entry in found.items():
+        if not isinstance(key, str) or not _HASH.fullmatch(key):
+            raise SettingError(name, "keys of 12 hex digits in quotation marks", key)
+        where = f"{name}, {key}"
+        if not isinstance(entry, dict) or set(entry) != set(BestKnown._fields):
+            raise SettingError(where, f"a mapping of {', '.join(BestKnown._fields)}", entry)
+        length, run, replicate = entry["length"], entry["run"], entry["replicate"]
+        if type(length) not in (int, float) or not 0.0 < length < math.inf:
+            raise SettingError(f"{where}, length", "a number above 0", length)
+        if not isinstance(run, str) or not _HASH.fullmatch(run):
+            raise SettingError(f"{where}, run", "12 hex digits in quotation marks", run)
+        if type(replicate) is not int or replicate < 0:
+            raise SettingError(f"{where}, replicate", "a whole number, at least 0", replicate)
+        known[key] = BestKnown(str(entry["problem"]), float(length), run, replicate)
+    return known

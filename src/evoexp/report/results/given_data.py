@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from evoexp.errors import SettingError, nearest, printable
-from evoexp.input_files import NUMBER, TableError, TableRow, read_bounded, read_table
+from evoexp.input_files import NUMBER, TableError, read_bounded, read_table
 from evoexp.report.results.planner_runs import PlannerRuns, Problem
 
 COLUMNS = ("planner", "problem", "seed", "queries", "cost")
@@ -52,23 +52,18 @@ def read_given(path: str) -> GivenData:
     content = read_bounded(path)
     name = printable(Path(path).name)
     try:
-        answers = tuple(_rows(name, read_table(content)))
+        table = read_table(content)
     except TableError as error:
         raise SettingError(f"{name}, line {error.line}", error.must, error.was) from None
+    columns = _header(f"{name}, line {table[0].line}", table[0].cells) if table else []
+    answers = tuple(
+        _row(f"{name}, line {line}", line, dict(zip(columns, cells, strict=True)))
+        for line, cells in table[1:]
+    )
     if not answers:
         raise SettingError(name, "a file with a row per improvement of a run", "no row")
     _check_runs(name, answers)
     return GivenData(name, hashlib.sha256(content).hexdigest(), answers)
-
-
-def _rows(name: str, table: list[TableRow]) -> Iterator[GivenAnswer]:
-    order: list[str] = []
-    for line, cells in table:
-        where = f"{name}, line {line}"
-        if not order:
-            order = _header(where, cells)
-        else:
-            yield _row(where, line, dict(zip(order, cells, strict=True)))
 
 
 def _header(where: str, names: list[str]) -> list[str]:
@@ -146,10 +141,28 @@ def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
         known.setdefault(problem.name, problem)
         cells.setdefault((planner, problem.name), {}).setdefault(seed, []).extend(rows)
     named = len({*(own.problem.name for own in ours), *(name for _, name in cells)}) > 1
-    return [
-        _runs(f"{planner}{MARK}", known[name], runs, named)
-        for (planner, name), runs in cells.items()
-    ]
+    given = []
+    for (planner, name), runs in cells.items():
+        seeds = tuple(sorted(runs))  # the runs of a planner on a problem, in their order
+        proven = [
+            (seed, row.queries, row.cost, True)
+            for seed in seeds
+            for row in sorted(runs[seed], key=lambda each: each.queries)
+            if not math.isnan(row.cost)
+        ]
+        columns = ["replicate", "collision_queries", "length", "certified"]
+        marked, spent = planner + MARK, [max(row.queries for row in runs[seed]) for seed in seeds]
+        own = PlannerRuns(
+            marked,
+            known[name],
+            f"{name}: {marked}" if named else marked,
+            pd.DataFrame(proven, columns=columns).astype({"certified": bool}),
+            seeds,
+            np.array(spent, dtype=np.float64),
+            None,
+        )
+        given.append(own)
+    return given
 
 
 def strange_problems(data: GivenData, ours: Sequence[PlannerRuns]) -> Iterator[str]:
@@ -168,26 +181,3 @@ def _known(ours: Sequence[PlannerRuns]) -> dict[str, Problem]:
         known.setdefault(own.label, own.problem)
         known.setdefault(own.problem.key, own.problem)
     return known
-
-
-def _runs(
-    planner: str, problem: Problem, runs: dict[int, list[GivenAnswer]], named: bool
-) -> PlannerRuns:
-    """Return the runs of a planner on a problem, in the order of their seeds."""
-    rows = [
-        (seed, row.queries, row.cost, True)
-        for seed in sorted(runs)
-        for row in sorted(runs[seed], key=lambda each: each.queries)
-        if not math.isnan(row.cost)
-    ]
-    table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length", "certified"])
-    spent = [max(row.queries for row in runs[seed]) for seed in sorted(runs)]
-    return PlannerRuns(
-        planner,
-        problem,
-        f"{problem.name}: {planner}" if named else planner,
-        table.astype({"certified": bool}),
-        tuple(sorted(runs)),
-        np.array(spent, dtype=np.float64),
-        None,
-    )

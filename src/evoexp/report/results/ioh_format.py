@@ -11,7 +11,7 @@ them, also where that is another run's, and with them runs without an answer.
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from evoexp.report.results.planner_runs import PlannerRuns
@@ -25,22 +25,29 @@ Rows = list[tuple[int, float]]
 
 
 def ioh_files(runs: Sequence[PlannerRuns]) -> dict[str, bytes]:
-    """Return the contents of all files by their paths in the folder.
-
-    Args:
-        runs: Of each planner on each problem; the problems are numbered from 1 in their order.
-    """
+    """Return the contents of all files by their paths in the folder, problems numbered from 1."""
     problems = list(dict.fromkeys(own.problem.name for own in runs))
     folders = _slugs(dict.fromkeys(own.planner for own in runs))
-    names, nothing = _slugs(problems), no_answer(runs)
-    dimensions = {
-        name: _dimension(own for own in runs if own.problem.name == name) for name in problems
-    }
+    names, dimensions = _slugs(problems), {name: _dimension(runs, name) for name in problems}
+    # for no answer stands a power of ten above all lengths
+    longest = max((float(own.table["length"].max()) for own in runs if len(own.table)), default=0.0)
+    nothing = NO_ANSWER
+    while nothing <= longest:
+        nothing *= 10.0
     cells: dict[tuple[str, str], list[PlannerRuns]] = {}
     for own in runs:
         cells.setdefault((own.planner, own.problem.name), []).append(own)
     files: dict[str, bytes] = {}
     for (planner, problem), same in cells.items():
+        summaries, lines = list[dict[str, Any]](), list[str]()
+        for own in same:
+            for seed, spent in zip(own.replicates, own.spent, strict=True):
+                rows = run_rows(own, seed, float(spent), nothing + len(summaries))
+                evaluations, y = rows[-1]
+                best = {"evals": min(at for at, value in rows if value == y), "y": y, "x": []}
+                run = {"instance": INSTANCE, "evals": evaluations, "best": best, "seed": seed}
+                summaries.append(run)
+                lines += [" ".join(HEADER), *(f"{at} {value!r}" for at, value in rows)]
         number, size = problems.index(problem) + 1, dimensions[problem]
         data = f"data_f{number}_{names[problem]}/IOHprofiler_f{number}_DIM{size}.dat"
         content = {
@@ -52,22 +59,13 @@ def ioh_files(runs: Sequence[PlannerRuns]) -> dict[str, bytes]:
             "algorithm": {"name": planner, "info": "evoexp"},
             "run_attributes": ["seed"],
             "attributes": list(HEADER),
-            "scenarios": [{"dimension": size, "path": data, "runs": _summaries(same, nothing)}],
+            "scenarios": [{"dimension": size, "path": data, "runs": summaries}],
         }
         text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         folder = folders[planner]
         files[f"{folder}/IOHprofiler_f{number}_{names[problem]}.json"] = text.encode()
-        files[f"{folder}/{data}"] = _data(same, nothing).encode()
+        files[f"{folder}/{data}"] = "\n".join([*lines, ""]).encode()
     return files
-
-
-def no_answer(runs: Sequence[PlannerRuns]) -> float:
-    """Return the length that stands for no answer: a power of ten above all lengths."""
-    longest = max((float(own.table["length"].max()) for own in runs if len(own.table)), default=0.0)
-    value = NO_ANSWER
-    while value <= longest:
-        value *= 10.0
-    return value
 
 
 def run_rows(own: PlannerRuns, replicate: int, spent: float, nothing: float) -> Rows:
@@ -90,45 +88,15 @@ def run_rows(own: PlannerRuns, replicate: int, spent: float, nothing: float) -> 
     return rows
 
 
-def _every_run(same: Sequence[PlannerRuns], nothing: float) -> Iterator[tuple[int, Rows]]:
-    """Yield seed and rows of every run."""
-    number = 0
-    for own in same:
-        for replicate, spent in zip(own.replicates, own.spent, strict=True):
-            yield replicate, run_rows(own, replicate, float(spent), nothing + number)
-            number += 1
-
-
-def _summaries(same: Sequence[PlannerRuns], nothing: float) -> list[dict[str, Any]]:
-    found = []
-    for seed, rows in _every_run(same, nothing):
-        y = rows[-1][1]
-        first = next(evaluations for evaluations, value in rows if value == y)
-        best = {"evals": first, "y": y, "x": []}
-        evals = rows[-1][0]
-        found.append({"instance": INSTANCE, "evals": evals, "best": best, "seed": seed})
-    return found
-
-
-def _data(same: Sequence[PlannerRuns], nothing: float) -> str:
-    lines = []
-    for _, rows in _every_run(same, nothing):
-        lines.append(" ".join(HEADER))
-        lines += [f"{evaluations} {value!r}" for evaluations, value in rows]
-    return "\n".join([*lines, ""])
-
-
-def _dimension(runs: Iterable[PlannerRuns]) -> int:
-    """Return the number of joints that a problem's motions have; 0 where nobody here knows it."""
-    for own in runs:
-        if own.condition is None:
-            continue
-        planner, problem = own.condition.prepared
-        for solution in own.condition.solutions.values():
-            motion = planner.motion(problem, solution)
-            if motion is not None:
-                return int(motion.q.shape[1])
-    return 0
+def _dimension(runs: Sequence[PlannerRuns], problem: str) -> int:
+    """Return the number of joints of a problem's motions; 0 where nobody here knows it."""
+    conditions = (own.condition for own in runs if own.problem.name == problem and own.condition)
+    motions = (
+        c.prepared.planner.motion(c.prepared.problem, solution)
+        for c in conditions
+        for solution in c.solutions.values()
+    )
+    return next((int(motion.q.shape[1]) for motion in motions if motion is not None), 0)
 
 
 def _slugs(names: Iterable[str]) -> dict[str, str]:

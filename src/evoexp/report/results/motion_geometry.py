@@ -43,12 +43,9 @@ def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:
 def straight_line(
     shape: Sequence[tuple[int, int]], start: FloatArray, goal: FloatArray
 ) -> FloatArray:
-    """Return the solution that goes straight from start to goal in equal steps, flat.
+    """Return the solution that goes straight from start to goal, (sum of joints,), flat.
 
-    Args:
-        shape: Of a solution, part by part: (rows, joints).
-        start: (sum of joints,).
-        goal: (sum of joints,) in the same unit.
+    It has equal steps; the shape of a solution is (rows, joints), part by part.
     """
     parts, first = [], 0
     for rows, joints in shape:
@@ -59,11 +56,7 @@ def straight_line(
 
 
 def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
-    """Return a motion sampled along its straight segments.
-
-    Args:
-        q: (nq, instants).
-        samples: Per segment.
+    """Return a motion, q (nq, instants), at so many samples per straight segment.
 
     Returns:
         Times in instants, (segments · samples + 1,), and configurations, (nq, the same).
@@ -77,11 +70,7 @@ def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
 def joint_positions(
     assembly: Assembly, q: FloatArray
 ) -> Iterator[tuple[int, int, FloatArray, FloatArray]]:
-    """Yield (arm, link of the arm, start (instants, 3), end (instants, 3)) of every link.
-
-    Args:
-        q: (nq, instants) [deg].
-    """
+    """Yield (arm, its link, start (instants, 3), end (instants, 3)) at q (nq, instants) [deg]."""
     data, frames = assembly.model.createData(), list[FloatArray]()
     for configuration in q.T:
         pin.forwardKinematics(assembly.model, data, DEGREE * configuration)
@@ -99,9 +88,7 @@ def joint_positions(
 def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
     """Return the closed outlines of obstacles as seen along z, each (points, 2).
 
-    Args:
-        reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth
-            of it deep.
+    A half-space is a strip of length `reach` to both sides of its point, a tenth of it deep.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -177,13 +164,9 @@ def link_distance(assembly: Assembly) -> BodyDistance:
 
 
 def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
-    """Return all links at every instant of a motion.
+    """Return all links at every instant of a motion, q (nq, instants) [deg], link by link.
 
-    Args:
-        q: (nq, instants) [deg].
-
-    Returns:
-        Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit], link by link.
+    Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit].
     """
     rows = [
         (instant, arm, link, *start[instant], *end[instant])
@@ -196,13 +179,8 @@ def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
 def in_stages(table: pd.DataFrame, num_stages: int) -> pd.DataFrame:
     """Return the rows of a motion's instants stage by stage, and all of them as the last stage.
 
-    Args:
-        table: With the column instant, whole numbers from 0 on.
-        num_stages: Stages that the motion is cut into, as far as it has instants.
-
-    Returns:
-        The columns of the table, stage, first and last (instants of the stage); an instant between
-        two stages belongs to both.
+    The column instant holds whole numbers from 0 on; stage, first and last (instants of the stage)
+    are added. An instant between two stages belongs to both.
     """
     last = int(table["instant"].max())
     cuts = np.unique(np.round(np.linspace(0, last, min(num_stages, last) + 1)).astype(np.int64))
@@ -241,27 +219,6 @@ class Extremes(NamedTuple):
     at_lowest: FloatArray  # (nq, instants), of the first replicate of several
     at_highest: FloatArray  # (nq, instants), of the first replicate of several
 
-    def with_others(self, later: "Extremes") -> "Extremes":
-        """Return the extremes of these and others, of which these come first."""
-        own, later = self._of_length(len(later.lowest)), later._of_length(len(self.lowest))
-        lower, higher = later.lowest < own.lowest, later.highest > own.highest
-        return Extremes(
-            np.where(lower, later.lowest, own.lowest),
-            np.where(higher, later.highest, own.highest),
-            np.where(lower, later.at_lowest, own.at_lowest),
-            np.where(higher, later.at_highest, own.at_highest),
-        )
-
-    def _of_length(self, length: int) -> "Extremes":
-        """Return them with so many instants at least."""
-        more = max(0, length - len(self.lowest))
-        if not more:
-            return self
-        lowest = np.pad(self.lowest, (0, more), constant_values=np.inf)
-        highest = np.pad(self.highest, (0, more), constant_values=-np.inf)
-        at = (np.pad(q, ((0, 0), (0, more))) for q in (self.at_lowest, self.at_highest))
-        return Extremes(lowest, highest, *at)
-
 
 def extremes(
     replicates: Sequence[int], sampled: Callable[[int], FloatArray], measures: Sequence[Measure]
@@ -274,9 +231,28 @@ def extremes(
     for replicate in replicates:
         q = sampled(replicate)
         own = [Extremes(values, values, q, q) for values in (measure(q) for measure in measures)]
-        pairs = zip(found, own, strict=True)
-        found = [seen.with_others(later) for seen, later in pairs] if found else own
+        found = [_both(*each) for each in zip(found, own, strict=True)] if found else own
     return tuple(found)
+
+
+def _both(first: Extremes, later: Extremes) -> Extremes:
+    """Return the extremes of two, with the instants of the longer one."""
+    length = max(len(first.lowest), len(later.lowest))
+    own, other = (
+        Extremes(
+            np.pad(each.lowest, (0, length - len(each.lowest)), constant_values=np.inf),
+            np.pad(each.highest, (0, length - len(each.lowest)), constant_values=-np.inf),
+            *(np.pad(q, ((0, 0), (0, length - len(each.lowest)))) for q in each[2:]),
+        )
+        for each in (first, later)
+    )
+    lower, higher = other.lowest < own.lowest, other.highest > own.highest
+    return Extremes(
+        np.where(lower, other.lowest, own.lowest),
+        np.where(higher, other.highest, own.highest),
+        np.where(lower, other.at_lowest, own.at_lowest),
+        np.where(higher, other.at_highest, own.at_highest),
+    )
 
 
 def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:

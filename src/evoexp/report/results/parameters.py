@@ -7,7 +7,7 @@ the shipped options of its group, and the table names the one that it is most li
 
 import functools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -64,9 +64,12 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
     if not condition.is_reference:  # which has one replicate, however many are planned
         planned = Entry(planned_replicates(results), *root["num_replicates"][1:])
         found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
-    budget = _file("budget", results.budget, taken)
-    caps = option(budget) if budget else {}
-    return [_capped(parameter, results.budget, caps) for parameter in found]
+    caps = _entries("budget", results.budget, taken)
+    for k, parameter in enumerate(found):  # a setting that the budget changed, and no override
+        cap = caps.get(_CAPS.get(parameter.name, ""))
+        if parameter.source == OVERRIDE and cap and str(cap.value) == parameter.value:
+            found[k] = parameter._replace(source=f"budget {results.budget}")
+    return found
 
 
 def planned_replicates(results: Results) -> int:
@@ -79,15 +82,14 @@ def planned_replicates(results: Results) -> int:
 def _of_experiment(results: Results) -> dict[str, Entry]:
     """Return the settings in the file of the experiment itself, by dotted key."""
     taken = {each.group: each for c in results.conditions for each in c.options}
-    path = _file("experiment", results.experiment, taken)
-    return option(path) if path else {}
+    return _entries("experiment", results.experiment, taken)
 
 
-def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:
-    """Return the file of the option taken of a group, else of the shipped option, else None."""
+def _entries(group: str, name: str, taken: dict[str, Option]) -> dict[str, Entry]:
+    """Return the option taken of a group, else the shipped one; nothing if there is no file."""
     shipped = config_directory() / group / f"{name}.yaml"
     path = Path(taken[group].path) if group in taken else shipped
-    return path if path.is_file() else None
+    return option(path) if path.is_file() else {}
 
 
 def overridden(found: Iterable[Parameter]) -> list[str]:
@@ -103,36 +105,31 @@ def overridden(found: Iterable[Parameter]) -> list[str]:
 def option(path: Path) -> dict[str, Entry]:
     """Return the values of an option file, its defaults filled in, with comments, by dotted key."""
     text = path.read_text()
-    node = yaml.compose(text)
     entries: dict[str, Entry] = {}
+    # options that it takes in: `name`, `name@part` or `/group@part: name`
     for base in yaml.safe_load(text).get("defaults", ()):
-        if base != "_self_" and (isinstance(base, str) or all("@" in key for key in base)):
-            entries |= _taken_in(base, path, entries)
-    for key, leaf in _leaves(node, ""):
+        if isinstance(base, dict) and all("@" in key for key in base):
+            ((key, name),) = base.items()
+            group, _, part = key.removeprefix("/").partition("@")
+            entries.pop(part, None)  # of a part that a group is taken in for, the group goes
+        elif isinstance(base, str) and base != "_self_":
+            group, (name, _, part) = path.parent.name, base.partition("@")
+        else:
+            continue
+        beside = path.parents[1] / group / f"{name}.yaml"  # else it is a shipped one
+        own = option(beside if beside.is_file() else config_directory() / group / f"{name}.yaml")
+        entries |= {f"{part}.{key}" if part else key: entry for key, entry in own.items()}
+    lines = text.splitlines()
+    for key, leaf in _leaves(yaml.compose(text), ""):
         value = yaml.safe_load(yaml.serialize(leaf))
         if key.endswith(f".{FILE}"):  # conditions know files by their content
             key, value = key.removesuffix(FILE) + SHA256, keep((path.parent / value).read_bytes())
-        entries[key] = Entry(value, *_comment(text.splitlines(), leaf))
+        mark = leaf.end_mark
+        line = lines[mark.line] if mark.line < len(lines) else ""
+        comment = _COMMENT.match(line[mark.column :].strip())
+        unit, source = ((part or "").strip() for part in comment.groups()) if comment else ("", "")
+        entries[key] = Entry(value, "" if unit == "-" else unit, source)
     return entries
-
-
-def _taken_in(base: Any, path: Path, entries: dict[str, Entry]) -> dict[str, Entry]:
-    """Return the entries of an option that another option takes in.
-
-    Args:
-        base: An item of its defaults: `name`, `name@part` or `/group@part: name`.
-        path: Of the option that takes it in.
-        entries: Found so far; of a part that a group was taken in for, the group goes.
-    """
-    key, name = next(iter(base.items())) if isinstance(base, dict) else ("", str(base))
-    group, _, part = key.removeprefix("/").partition("@")
-    if key:
-        entries.pop(part, None)
-    else:
-        group, (name, _, part) = path.parent.name, name.partition("@")
-    beside = path.parents[1] / group / f"{name}.yaml"  # else it is a shipped one
-    found = option(beside if beside.is_file() else config_directory() / group / f"{name}.yaml")
-    return {f"{part}.{own}" if part else own: entry for own, entry in found.items()}
 
 
 def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
@@ -148,20 +145,10 @@ def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
         yield prefix, node
 
 
-def _comment(lines: list[str], node: Any) -> tuple[str, str]:
-    line = lines[node.end_mark.line] if node.end_mark.line < len(lines) else ""
-    match = _COMMENT.match(line[node.end_mark.column :].strip())
-    if match is None:
-        return "", ""
-    unit = (match["unit"] or "").strip()
-    return "" if unit == "-" else unit, match["source"].strip()
-
-
 def _component(group: str, config: dict[str, Any], taken: dict[str, Option]) -> Iterator[Parameter]:
     """Yield the settings of one component, and of the groups that its option takes in."""
     if group in taken:
-        path = _file(group, "", taken)
-        where, entries = taken[group].source, option(path) if path else {}
+        where, entries = taken[group].source, _entries(group, "", taken)
     else:
         where, entries = _most_like(group, config)
     otherwise = OVERRIDE if entries else where  # of a setting that the option does not have
@@ -190,17 +177,14 @@ def _setting(
     else:
         leaves = dict(_flat(value, key))
         for path, leaf in leaves.items():
-            unknown = OF_FILE if path not in entries and _is_of_file(path, leaves) else otherwise
+            # the hash of a file, or beside one in the item of a list
+            item = f"{path.rpartition('.')[0]}.{FILE}.{SHA256}"
+            is_of_file = path.endswith(f".{SHA256}") or item in leaves
+            unknown = OF_FILE if path not in entries and is_of_file else otherwise
             yield _parameter(f"{group}.{path}", leaf, entries.get(path), unknown)
         items = {path.split("]")[0] for path in entries if path.startswith(f"{key}[")}
         if isinstance(value, list) and len(items) > len(value):  # a list cut short
             yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
-
-
-def _is_of_file(path: str, leaves: Mapping[str, Any]) -> bool:
-    """Whether a setting is the hash of a file, or stands beside one in the item of a list."""
-    item = path.rpartition(".")[0]
-    return path.endswith(f".{SHA256}") or f"{item}.{FILE}.{SHA256}" in leaves
 
 
 def _most_like(group: str, config: dict[str, Any]) -> tuple[str, dict[str, Entry]]:
@@ -240,14 +224,6 @@ def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Pa
         return Parameter(name, _text(value), "", f"as {shared[1]}")
     source = entry.source if _same(value, entry.value) else otherwise
     return Parameter(name, _text(value), entry.unit, source)
-
-
-def _capped(parameter: Parameter, budget: str, caps: dict[str, Entry]) -> Parameter:
-    """Name the budget as the source of a setting if it set the value, and no override did."""
-    key = _CAPS.get(parameter.name)
-    if parameter.source == OVERRIDE and key in caps and str(caps[key].value) == parameter.value:
-        return parameter._replace(source=f"budget {budget}")
-    return parameter
 
 
 def _same(value: Any, shipped: Any) -> bool:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,12 +12,8 @@ import pandas as pd
 
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
-from evoexp.report.results.proven_answers import (
-    answers_of,
-    best_lengths,
-    first_reached,
-    straight_line,
-)
+from evoexp.report.results.proven_answers import answers_of, straight_line
+from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults
 
 MULTIPLES = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of a problem's unit of length
@@ -42,13 +39,6 @@ class Problem(NamedTuple):
         return self.straight if self.straight > 0.0 else np.nan
 
     @property
-    def unit_name(self) -> str:
-        """The length whose multiples are targets, in words."""
-        if np.isnan(self.unit):
-            return "none: any proven answer is the only target"
-        return "straight line" if np.isnan(self.best_known) else "best known"
-
-    @property
     def targets(self) -> tuple[float, ...]:
         """Lengths that answers are to fall below [rad, m]; inf: any proven answer."""
         if np.isnan(self.unit):
@@ -70,30 +60,33 @@ class PlannerRuns(NamedTuple):
     # That was run; None: the runs were given, nobody here judged them
     condition: ConditionResults | None
 
-    def first_reached(self, longest: float = np.inf) -> tuple[FloatArray, np.ndarray]:
-        """Return each run's effort up to an answer that is so short, and whether it has one.
+    def first_reached(
+        self,
+        longest: float = np.inf,
+        effort: str = "collision_queries",
+        spent: FloatArray | None = None,
+    ) -> tuple[FloatArray, np.ndarray]:
+        """Return the effort of each run up to an answer that is so short, and whether it has one.
 
-        Args:
-            longest: Length that an answer may have [rad, m].
+        The effort, a column, is that of the whole run, `spent` (runs,), where no proven answer is
+        at most `longest` [rad, m].
         """
-        effort, reached = first_reached(self.table, self.replicates, longest, self.spent)
-        return effort, reached
+        good = self.table[self.table["certified"] & (self.table["length"] <= longest)]
+        first = good.groupby("replicate")[effort].min().reindex(self.replicates)
+        reached = first.notna().to_numpy()
+        whole = self.spent if spent is None else spent
+        return np.where(reached, first.to_numpy(np.float64, na_value=0.0), whole), reached
 
     @property
     def best_lengths(self) -> FloatArray:
         """Least length of a proven answer of each run, (runs,) [rad, m]; inf: none is proven."""
-        return best_lengths(self.table, self.replicates)
+        proven = self.table[self.table["certified"]].groupby("replicate")["length"].min()
+        return proven.reindex(self.replicates).to_numpy(np.float64, na_value=np.inf)
 
 
 def stored_conditions(runs: Iterable[PlannerRuns]) -> tuple[ConditionResults, ...]:
     """Return the conditions of those runs that were not given."""
     return tuple(own.condition for own in runs if own.condition is not None)
-
-
-def prior_queries(condition: ConditionResults) -> int:
-    """Return how many configurations the task itself says to be free or not, as a map does."""
-    planner, problem = condition.prepared
-    return int(planner.prior_queries(problem))
 
 
 def problem_key(condition: Condition) -> str:
@@ -109,11 +102,8 @@ def of_results(
     """Return the runs of conditions, in order, with their answers judged.
 
     Conditions of a problem that nobody has a motion for are left out: their answers are of another
-    kind. A planner without a motion where others have one has failed, and stays.
-
-    Args:
-        conditions: That are compared.
-        known: Key of a problem → best known length [rad, m].
+    kind. A planner without a motion where others have one has failed, and stays. `known` are the
+    best known lengths [rad, m] by the keys of problems.
     """
     found = answers_of(conditions)
     moving = {_task(c) for c in conditions if len(found[c.label])}
@@ -135,10 +125,12 @@ def of_results(
             c.label,
             found[c.label],
             tuple(int(k) for k in c.summaries.index),
-            c.column("collision_queries") + prior_queries(c),
+            # the configurations that the task itself says to be free or not, as a map does
+            c.column("collision_queries") + int(planner.prior_queries(problem)),
             c,
         )
         for c in kept
+        for planner, problem in (c.prepared,)
     ]
 
 
@@ -161,11 +153,16 @@ def problem_names(conditions: Sequence[ConditionResults]) -> dict[Hashable, str]
         if not names[task] or is_planner:
             names[task] = _option(groups[task][0], "scenario")
     every = list(names.values())
-    robots = {
-        task: f"{name}, {_option(groups[task][0], 'robot')}" if every.count(name) > 1 else name
-        for task, name in names.items()
-    }
-    return _numbered(robots)
+    for task, name in names.items():
+        if every.count(name) > 1:
+            names[task] = f"{name}, {_option(groups[task][0], 'robot')}"
+    # a number behind those that are still not the only ones of their kind
+    every, seen = list(names.values()), Counter[str]()
+    for task, name in names.items():
+        seen[name] += 1
+        if every.count(name) > 1:
+            names[task] = f"{name} {seen[name]}"
+    return names
 
 
 def planner_names(
@@ -209,11 +206,10 @@ def _task(c: ConditionResults) -> Hashable:
     return c.robot, c.scenario
 
 
-def _by_task(conditions: Sequence[ConditionResults]) -> dict[Hashable, list[ConditionResults]]:
-    found: dict[Hashable, list[ConditionResults]] = {}
-    for c in conditions:
-        found.setdefault(_task(c), []).append(c)
-    return found
+def _by_task(
+    conditions: Sequence[ConditionResults],
+) -> dict[Hashable, tuple[ConditionResults, ...]]:
+    return {_task(own[0]): own for own in grouped(conditions, _task)}
 
 
 def _option(c: ConditionResults, group: str) -> str:
@@ -221,13 +217,3 @@ def _option(c: ConditionResults, group: str) -> str:
     part: Any = getattr(c.condition, group)
     taken = [option.name for option in c.options if option.group == group]
     return taken[0] if taken else str(part.component)
-
-
-def _numbered(names: dict[Hashable, str]) -> dict[Hashable, str]:
-    """Return the names, with a number behind those that are not the only ones of their kind."""
-    every, seen = list(names.values()), dict[str, int]()
-    found = {}
-    for task, name in names.items():
-        seen[name] = seen.get(name, 0) + 1
-        found[task] = f"{name} {seen[name]}" if every.count(name) > 1 else name
-    return found

@@ -80,9 +80,9 @@ def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame
             write_kept(places[path], json.dumps(own).encode())
     found: dict[str, list[Answer]] = {c.label: [] for c in conditions}
     for (condition, replicate, path), cpu_s in zip(logs, times, strict=True):
-        answers = (Answer(replicate, *answer) for answer in kept[path])
         found[condition.label] += [
-            answer._replace(cpu_s=float(cpu_s[answer.generation])) for answer in answers
+            Answer(replicate, *answer)._replace(cpu_s=float(cpu_s[answer[0]]))
+            for answer in kept[path]
         ]
     return {label: answer_table(own) for label, own in found.items()}
 
@@ -103,37 +103,6 @@ def motion_length(motion: Motion) -> float:
         speed = c1 + node * (2.0 * c2 + node * 3.0 * c3)
         total += float(weight * np.sqrt((speed * speed).sum(axis=1)).sum())
     return total
-
-
-def first_reached(
-    table: pd.DataFrame,
-    replicates: Any,
-    longest: float,
-    spent: FloatArray,
-    effort: str = "collision_queries",
-) -> Any:
-    """Return the effort of every run up to its first proven answer that is so short.
-
-    Args:
-        table: Of `answers_of`.
-        replicates: (runs,) in order.
-        longest: Length that an answer may have.
-        spent: (runs,) effort of the whole runs.
-        effort: The column that is the effort.
-
-    Returns:
-        (runs,) effort, that of the whole run without such an answer; (runs,) whether there was one.
-    """
-    good = table[table["certified"] & (table["length"] <= longest)]
-    first = good.groupby("replicate")[effort].min().reindex(replicates)
-    reached = first.notna().to_numpy()
-    return np.where(reached, first.to_numpy(np.float64, na_value=0.0), spent), reached
-
-
-def best_lengths(table: pd.DataFrame, replicates: Any) -> FloatArray:
-    """Return the least length of a proven answer of every run, (runs,); inf: none is proven."""
-    good = table[table["certified"]].groupby("replicate")["length"].min().reindex(replicates)
-    return np.asarray(good.to_numpy(np.float64, na_value=np.inf))
 
 
 def straight_line(table: pd.DataFrame) -> float:

@@ -28,11 +28,7 @@ def success(condition: ConditionResults) -> Proportion:
 
 
 def counted(holds: Any) -> Proportion:
-    """Count the runs in which something holds.
-
-    Args:
-        holds: (runs,) of truth values.
-    """
+    """Count the runs in which something holds, (runs,) of truth values."""
     return Proportion(int(np.count_nonzero(holds)), len(holds))
 
 
@@ -51,10 +47,7 @@ def median_replicate(
 ) -> int:
     """Return the replicate that has the median value, the lower one of two.
 
-    Args:
-        condition: The condition of the runs.
-        values: (done,) without NaN.
-        among: (done,) which runs are candidates, at least one; None: all.
+    Values are (done,) without NaN; `among`, (done,), tells which runs are candidates, None: all.
     """
     candidates = np.arange(len(values)) if among is None else np.flatnonzero(among)
     ordered = candidates[np.argsort(values[candidates], kind="stable")]

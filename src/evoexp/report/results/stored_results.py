@@ -21,7 +21,6 @@ from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.files import warn
 from evoexp.store.identity import DamagedFile, Plan
 from evoexp.store.log_reader import read_log, read_solution
-from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import damaged_logs
 from evoexp.store.tables import read_generations, read_summaries
@@ -108,8 +107,7 @@ class ConditionResults:
     def added(self, fixed: int) -> int:
         """Return how many finished replicates were asked for when results were there already.
 
-        Args:
-            fixed: Replicates that the experiment fixes by itself; these never count.
+        The replicates that the experiment fixes by itself never count.
         """
         known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
         seen = [plan.num_replicates for plan in self.plans if plan.stored]
@@ -151,11 +149,7 @@ class ConditionResults:
         return self.condition.prepare()
 
     def problem(self, kind: type[Kind]) -> Kind:
-        """Return the problem that the planner prepared, of the public type that a page expects.
-
-        Raises:
-            TypeError: If another planner was run.
-        """
+        """Return the problem that the planner prepared, of the public type that a page expects."""
         found = self.prepared.problem
         if not isinstance(found, kind):
             raise TypeError(f"{self.label}: a {kind.__qualname__} is expected, was {type(found)}")
@@ -167,11 +161,7 @@ class ConditionResults:
         return dict(planner.evaluate(problem, solution))
 
     def motion(self, replicate: int) -> Motion:
-        """Return the motion of a replicate's best solution.
-
-        Raises:
-            TypeError: If the planner's answer is no motion.
-        """
+        """Return the motion of a replicate's best solution, which must be one."""
         planner, problem = self.prepared
         found = planner.motion(problem, self.solutions[replicate])
         if not isinstance(found, Motion):
@@ -248,12 +238,6 @@ class Results(NamedTuple):
         return tuple(c for c in self.with_data if c.is_reference)
 
     @property
-    def terms(self) -> list[str]:
-        """Names of the terms that any summary has, in order."""
-        columns = {str(name) for c in self.with_data for name in c.summaries}
-        return sorted(name.removeprefix(TERM) for name in columns if name.startswith(TERM))
-
-    @property
     def suffixed(self) -> Iterator[tuple[ConditionResults, str]]:
         """Conditions of `main` with the ends of their files' names, empty for a single one."""
         for k, condition in enumerate(self.main):
@@ -288,19 +272,12 @@ def gather(
     command: str,
     options: Mapping[str, tuple[Option, ...]] | None = None,
 ) -> Results:
-    """Read the stored results of some conditions.
+    """Read the stored results of (label, condition): every replicate, done or failed.
 
-    Args:
-        outputs: Root of all outputs.
-        conditions: (label, condition).
-        num_replicates: Planned for every condition, at least; every stored one is read.
-        experiment: Its name.
-        budget: Its name.
-        command: The command that helps where nothing is stored.
-        options: Label → options that were taken; None: those that the runs' manifests name.
+    At least `num_replicates` are planned of each; `command` helps where nothing is stored.
 
     Raises:
-        NothingStored: If no replicate of any condition is there, done or failed.
+        NothingStored: If no replicate of any condition is there.
         CorruptLog: If a log cannot be trusted.
     """
     found = tuple(
@@ -328,7 +305,20 @@ def _read(
     manifest = run.manifest() if is_stored else {}
     code = {"version": (manifest.get("versions") or {}).get("evoexp")}
     code |= {name: (manifest.get("git") or {}).get(name) for name in ("commit", "dirty")}
-    plans = _plans(run)
+    plans: tuple[Plan, ...] = ()
+    try:
+        plans = tuple(run.plans())
+    except DamagedFile as error:
+        warn(f"{error}; added replicates are not marked")
+    if options is None:  # those that the manifest names; only shipped ones have files to be read
+        recorded: dict[str, dict[str, str]] = manifest.get("options") or {}
+        options = tuple(
+            Option(group, name, origin, str(folder / f"{name}.yaml") if origin == ORIGIN else "")
+            for group, each in recorded.items()
+            for name, origin, folder in (
+                (each["name"], each["origin"], config_directory() / group),
+            )
+        )
     rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
     rows = rows.set_index("replicate")
     asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
@@ -341,27 +331,7 @@ def _read(
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,
         code if is_stored else {},
-        _recorded_options(manifest) if options is None else options,
+        options,
         plans,
         damaged_logs(run),
     )
-
-
-def _plans(run: RunDirectory) -> tuple[Plan, ...]:
-    """Return the plans of a run; without its list of plans, which is said, none."""
-    try:
-        return tuple(run.plans())
-    except DamagedFile as error:
-        warn(f"{error}; added replicates are not marked")
-        return ()
-
-
-def _recorded_options(manifest: Mapping[str, Any]) -> tuple[Option, ...]:
-    """Return the options that a run's manifest names; only shipped ones have files to be read."""
-    recorded: dict[str, dict[str, str]] = manifest.get("options") or {}
-    found = []
-    for group, each in recorded.items():
-        shipped = config_directory() / group / f"{each['name']}.yaml"
-        path = str(shipped) if each["origin"] == ORIGIN else ""
-        found.append(Option(group, each["name"], each["origin"], path))
-    return tuple(found)

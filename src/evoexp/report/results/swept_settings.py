@@ -5,20 +5,19 @@
 
 import itertools
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles, quantile
 
 JOIN = " · "  # between the parts of a label
 _SETTING = re.compile(r"([\w.@/-]+)=(.*)")
 FEWEST = 2  # combinations of values that are a sweep
-
-Values = Callable[[ConditionResults], np.ndarray]
 
 
 class Swept(NamedTuple):
@@ -48,13 +47,6 @@ class Sweep(NamedTuple):
         except ValueError:
             return tuple(found)
 
-    def find(self, base: str, values: tuple[str, ...]) -> ConditionResults | None:
-        """Return the results of one combination; None if it was not run."""
-        for each in self.conditions:
-            if (each.base, each.values) == (base, values) and each.results.done:
-                return each.results
-        return None
-
 
 class MainEffect(NamedTuple):
     """One value of a setting against its first one, all other settings and seeds being equal."""
@@ -71,97 +63,67 @@ class MainEffect(NamedTuple):
 
 def sweep_of(results: Results) -> Sweep | None:
     """Return the sweep that these results are; None if they are none."""
-    parted = [_parted(c.label) for c in results.conditions if not c.is_reference]
-    names = {tuple(settings) for _, settings in parted}
-    if len(names) != 1 or not (settings := next(iter(names))):
+    swept, names = list[Swept](), set[tuple[str, ...]]()
+    for c in results.conditions:
+        if c.is_reference:
+            continue
+        # the base of a label, and the settings behind it
+        parts, settings = c.label.split(JOIN), dict[str, str]()
+        while parts and (found := _SETTING.fullmatch(parts[-1])) and found[1] not in settings:
+            settings = {found[1]: found[2], **settings}
+            parts.pop()
+        names.add(tuple(settings))
+        swept.append(Swept(JOIN.join(parts), tuple(settings.values()), c))
+    combinations = {each.values for each in swept}
+    is_repeated = len({each[:2] for each in swept}) < len(swept)
+    if len(names) != 1 or () in names or len(combinations) < FEWEST or is_repeated:
         return None
-    values = {tuple(own.values()) for _, own in parted}
-    if len(values) < FEWEST or len(parted) != len({(b, *v.values()) for b, v in parted}):
-        return None
-    conditions = [c for c in results.conditions if not c.is_reference]
-    return Sweep(
-        settings,
-        tuple(
-            Swept(base, tuple(own.values()), c)
-            for (base, own), c in zip(parted, conditions, strict=True)
-        ),
-    )
+    return Sweep(names.pop(), tuple(swept))
 
 
 def main_effects(
     sweep: Sweep, values: Values, confidence: float, num_resamples: int
 ) -> Iterator[MainEffect]:
-    """Yield the effect of each value of each setting.
-
-    Args:
-        values: (done,) of a condition, lower is better.
-        confidence: Level of the intervals.
-    """
+    """Yield the effect of each value of each setting; lower values, (done,), are better."""
     for base, (k, setting) in itertools.product(sweep.bases, enumerate(sweep.settings)):
         first, *others = sweep.levels(k)
         for other in others:
             pairs = _pairs(sweep, base, k, (first, other), values)
-            if pairs.size:
-                yield _effect((base, setting, first, other), pairs, confidence, num_resamples)
-
-
-def measures() -> dict[str, Values]:
-    """Return the quantities that pages of sweeps tell, by name."""
-    return {
-        "best cost": lambda c: c.column("best_cost"),
-        "evaluations": lambda c: c.column("evaluations"),
-        "CPU time of the search [s]": search_seconds,
-    }
-
-
-def _parted(label: str) -> tuple[str, dict[str, str]]:
-    """Return the base of a label, and the settings behind it."""
-    parts = label.split(JOIN)
-    settings: dict[str, str] = {}
-    while parts and (found := _SETTING.fullmatch(parts[-1])) and found[1] not in settings:
-        settings[found[1]] = found[2]
-        parts.pop()
-    return JOIN.join(parts), dict(reversed(settings.items()))
+            if not pairs.size:
+                continue
+            rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+            drawn = rng.integers(0, len(pairs), (num_resamples, len(pairs)))
+            interval = percentiles(np.array([_median(pairs[rows]) for rows in drawn]), confidence)
+            known = pairs[~np.isnan(pairs)]
+            better = float((known < 0.0).mean() + 0.5 * (known == 0.0).mean())
+            names = base, setting, first, other
+            yield MainEffect(*names, len(known), _median(pairs), interval, better)
 
 
 def _pairs(
     sweep: Sweep, base: str, setting: int, levels: tuple[str, str], values: Values
 ) -> np.ndarray:
     """Return differences of two values of a setting, (seeds, combinations of the others); NaN."""
-    found: list[dict[int, float]] = []
-    rests = dict.fromkeys(
-        each.values[:setting] + each.values[setting + 1 :] for each in sweep.conditions
-    )
-    for rest in rests:
-        both = [sweep.find(base, (*rest[:setting], level, *rest[setting:])) for level in levels]
-        if both[0] is None or both[1] is None:
-            continue
-        one, other = (
-            dict(zip(map(int, c.summaries.index), values(c), strict=True))
-            for c in both
-            if c is not None
-        )
-        found.append(
-            {
-                seed: 0.0 if other[seed] == one[seed] else other[seed] - one[seed]  # both infinite
-                for seed in one.keys() & other.keys()
-            }
-        )
-    seeds = sorted({seed for each in found for seed in each})
-    table = [[each.get(seed, np.nan) for each in found] for seed in seeds]
-    return np.array(table, dtype=np.float64).reshape(len(seeds), len(found))
-
-
-def _effect(
-    names: tuple[str, str, str, str], pairs: np.ndarray, confidence: float, num_resamples: int
-) -> MainEffect:
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    drawn = rng.integers(0, len(pairs), (num_resamples, len(pairs)))
-    medians = np.array([_median(pairs[rows]) for rows in drawn])
-    known = pairs[~np.isnan(pairs)]
-    better = float((known < 0.0).mean() + 0.5 * (known == 0.0).mean())
-    interval = percentiles(medians, confidence)
-    return MainEffect(*names, len(known), _median(pairs), interval, better)
+    of_level = []
+    for level in levels:
+        own = {
+            each.values[:setting] + each.values[setting + 1 :]: pd.Series(
+                values(each.results), each.results.summaries.index, dtype=np.float64
+            )
+            for each in sweep.conditions
+            if (each.base, each.values[setting]) == (base, level) and each.results.done
+        }
+        of_level.append(own)
+    first, other = of_level
+    differences = [
+        (two - one).where(two != one, 0.0)  # both may be infinite
+        for rest in first
+        if rest in other
+        for one, two in (first[rest].align(other[rest], join="inner"),)  # on common seeds
+    ]
+    if not differences:
+        return np.empty((0, 0))
+    return pd.concat(differences, axis=1).sort_index().to_numpy(np.float64)
 
 
 def _median(values: np.ndarray) -> float:

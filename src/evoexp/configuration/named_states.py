@@ -31,7 +31,7 @@ def with_named_states(config: dict[str, Any]) -> dict[str, Any]:
         robot = build(config.get("robot"), component_class, "robot")
         if not isinstance(robot, Robot):
             raise SettingError("robot", "one whose SRDF names states", None)
-        states = robot.states()
+        states = robot.build().states
         given = value if isinstance(value, list) else [value] * len(states)
         if len(given) != len(states):
             must = f"one state or list per arm of the robot ({len(states)})"

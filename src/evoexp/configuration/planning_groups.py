@@ -10,6 +10,7 @@ from evoexp.condition import PARTS
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
+from evoexp.robots.joint_choice import joint_roles
 from evoexp.robots.urdf import Urdf
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
@@ -66,7 +67,7 @@ def _standing(state: dict[str, float], settings: dict[str, Any]) -> dict[str, fl
     left out, as are joints that follow others.
     """
     robot: Urdf = build(settings, component_class, PARTS[0])
-    moving, found = frozenset[str]().union(*robot.roles.arms), {}
+    moving, found = joint_roles(robot).moving, {}
     for name, value in state.items():
         joint = robot.file.joints.get(name)
         if joint is None or joint.mimic is not None or name in moving:

@@ -62,14 +62,7 @@ AnyBody = Annotated[SphereBody | BoxBody | CapsuleBody | CylinderBody, Field(dis
 
 
 def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
-    """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`.
-
-    Args:
-        field: Its name in the configuration, for errors.
-
-    Raises:
-        SettingError: If the ends of a capsule or cylinder coincide.
-    """
+    """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`."""
     if isinstance(body, SphereBody):
         return coal.Sphere(body.radius), pin.SE3(np.eye(3), np.array(body.center))
     if isinstance(body, BoxBody):

@@ -28,11 +28,7 @@ class PlanarArm(NamedTuple):
 
 
 def planar_arm(assembly: Assembly) -> PlanarArm:
-    """Return the lengths and the base of a built robot that is one planar arm.
-
-    Raises:
-        SettingError: If it is another robot.
-    """
+    """Return the lengths and the base of a built robot that is one planar arm."""
     table, links = assembly.table, assembly.links
     straight = all(not link.start.any() and not link.end[1:].any() for link in links)
     chained = table.planar and np.array_equal(table.parent, np.arange(len(table.parent)) - 1)

@@ -1,7 +1,5 @@
 """An SRDF: groups of joints, named states, end effectors, pairs that are never judged."""
 
-from typing import NamedTuple
-
 from evoexp.errors import SettingError, nearest
 from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint
 from evoexp.robots.xml_files import parsed_xml
@@ -9,41 +7,25 @@ from evoexp.robots.xml_files import parsed_xml
 MOST_GROUPS = 300  # nested in one another
 
 
-class NamedState(NamedTuple):
-    """A configuration that the SRDF names."""
-
-    name: str  # its name
-    group: str  # the group that it is of
-    values: dict[str, float]  # of joints by their names [rad, m]
-
-
 class Srdf:
     """Groups, states and disabled pairs of the robot of a URDF."""
 
     def __init__(self, content: bytes, joints: dict[str, UrdfJoint]) -> None:
-        """Read the text.
-
-        Args:
-            joints: Of the URDF, by their names.
-        """
-        self._root = parsed_xml(content, "robot.srdf", "robot")
+        """Read the text, of the robot that has some joints, by their names."""
+        self._root = root = parsed_xml(content, "robot.srdf", "robot")
         self._joints = joints
         self._above = {joint.child: joint for joint in joints.values()}
-        self._groups = {str(group.get("name")): group for group in self._root.iterfind("group")}
+        self._groups = {str(group.get("name")): group for group in root.iterfind("group")}
         # joints of the groups that were looked up: one may be in many others
         self._joints_of: dict[str, set[str]] = {}
-
-    def group_joints(self, group: str, field: str) -> set[str]:
-        """Find the joints of a group: of its chains, joints, links and groups.
-
-        Args:
-            group: Its name.
-            field: That names it, for errors.
-
-        Raises:
-            SettingError: If there is no such group, or it names something that is not there.
-        """
-        return self._members(group, field, ())
+        # pairs of links that are never judged
+        disabled = root.iterfind("disable_collisions")
+        self.disabled = [(str(pair.get("link1")), str(pair.get("link2"))) for pair in disabled]
+        # the frame to which a virtual joint ties the root, empty where none does: MoveIt's planning
+        # frame is that of a virtual joint that is not fixed (`buildRecursive` in moveit_core's
+        # `robot_model.cpp`)
+        free = (j for j in root.iterfind("virtual_joint") if j.get("type") != "fixed")
+        self.ground = next((str(joint.get("parent_frame")) for joint in free), "")
 
     def tip(self, group: str) -> str:
         """Find the link at the end of a group: of its only chain, or where a hand is mounted.
@@ -63,15 +45,11 @@ class Srdf:
         ]
         return hands[0] if len(hands) == 1 else ""
 
-    def states(self) -> list[NamedState]:
-        """Read the named states.
-
-        Raises:
-            SettingError: If a value is no finite number.
-        """
-        found = []
+    def states(self) -> dict[str, dict[str, float]]:
+        """Return values of joints [rad, m] by the names of states; of several groups, one state."""
+        states: dict[str, dict[str, float]] = {}
         for state in self._root.iterfind("group_state"):
-            values = {}
+            values = states.setdefault(str(state.get("name")), {})
             for joint in state.iterfind("joint"):
                 name, words = str(joint.get("name")), str(joint.get("value")).split()
                 if len(words) != 1:
@@ -80,26 +58,15 @@ class Srdf:
                     must = f"an SRDF whose states are finite numbers, at most {LARGEST:g}"
                     raise SettingError("robot.srdf", must, f"'{words[0]}' of '{name}'")
                 values[name] = float(words[0])
-            found.append(NamedState(str(state.get("name")), str(state.get("group")), values))
-        return found
+        return states
 
-    def ground(self) -> str:
-        """Find the frame to which a virtual joint ties the root; empty where none does.
+    def group_joints(self, group: str, field: str, above: tuple[str, ...] = ()) -> set[str]:
+        """Find the joints of a group: of its chains, joints, links and groups.
 
-        MoveIt's planning frame is that of a virtual joint that is not fixed (`buildRecursive` in
-        moveit_core's `robot_model.cpp`).
+        Args:
+            group: Its name.
+            above: The groups that contain it.
         """
-        free = (j for j in self._root.iterfind("virtual_joint") if j.get("type") != "fixed")
-        return next((str(joint.get("parent_frame")) for joint in free), "")
-
-    def disabled_links(self) -> list[tuple[str, str]]:
-        """List the pairs of links that are never judged."""
-        return [
-            (str(pair.get("link1")), str(pair.get("link2")))
-            for pair in self._root.iterfind("disable_collisions")
-        ]
-
-    def _members(self, group: str, field: str, above: tuple[str, ...]) -> set[str]:
         if group not in self._groups:
             names = list(self._groups)
             must = f"a group of the SRDF ({', '.join(names) or 'it has none'})"
@@ -118,7 +85,7 @@ class Srdf:
                 case "link" if (above_it := self._above.get(str(part.get("name")))) is not None:
                     found.add(above_it.name)
                 case "group":
-                    found |= self._members(str(part.get("name")), field, (*above, group))
+                    found |= self.group_joints(str(part.get("name")), field, (*above, group))
         self._joints_of[group] = found
         return found
 

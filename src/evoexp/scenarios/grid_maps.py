@@ -22,13 +22,9 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
 
     Args:
         size: How many nodes there are along x, y[, z].
-        field: Name of the setting, for errors.
 
     Returns:
         (nodes along x, along y[, along z]), true for blocked nodes.
-
-    Raises:
-        SettingError: If the map has another size or another alphabet, or is no map.
     """
     rows = (
         _read_png(content, size, field) if content.startswith(_PNG) else _read_text(content, field)

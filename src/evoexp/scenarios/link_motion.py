@@ -44,12 +44,8 @@ class Posture(Settings):
         """Return the link angles (2,) [deg].
 
         Args:
-            field: Name, for errors.
             base: (2,) of the robot.
             lengths: (2,) of its links.
-
-        Raises:
-            SettingError: If the tip is out of reach, or an angle lies outside [0, 180].
         """
         if self.angles is not None:
             angles = np.array(self.angles)
@@ -83,9 +79,6 @@ class LinkMotion(Component):
         Args:
             bases: (robots, 2).
             lengths: (robots, 2) of the links.
-
-        Raises:
-            SettingError: If their number is not the robots', or a posture cannot be.
         """
         ends = []
         for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):

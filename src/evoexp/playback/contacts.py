@@ -109,7 +109,9 @@ def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> l
         verdict = certify(watch.scene, rest)
         if verdict.status != "refuted":
             break
-        begin = at_instant(verdict.refuted_at, t)
+        # the instant of the whole motion: the rest's first segment is the rest of a segment
+        begin, segment = verdict.refuted_at, int(t)
+        begin = t + begin * (segment + 1 - t) if begin < 1.0 else segment + begin
         pair = PAIR.join(verdict.refuted_pair or ())
         later = ticks[ticks > begin].tolist()
         in_contact = [begin, *takewhile(watch.touching, later)]
@@ -145,9 +147,3 @@ def remainder(motion: Motion, t: float, last: int) -> Motion:
         w * w * w * c3,
     )
     return Motion(np.vstack([left[:1, 0], q[1:]]), left)
-
-
-def at_instant(t: float, begin: float) -> float:
-    """Return the instant of the whole motion for instant t of its rest from `begin` on."""
-    segment = int(begin)
-    return begin + t * (segment + 1 - begin) if t < 1.0 else segment + t

@@ -265,7 +265,7 @@ def test_distances_are_those_of_all_pairs_though_few_are_asked_for(
     parts = list(planner.parts(problem, motion))
     times = np.linspace(0.0, motion.num_segments, 7)
     few = clearance(parts, motion, times)
-    monkeypatch.setattr(contacts, "FEW", 10**6)
+    monkeypatch.setattr(contacts, "SLACK", 1e6)
     every = clearance(parts, motion, times)
     assert np.array_equal(few.least, every.least)
     assert few[1:] == every[1:]

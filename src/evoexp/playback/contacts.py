@@ -14,7 +14,6 @@ from evoexp.records import FloatArray
 
 UNLIMITED = 10**12  # queries of coal
 SLACK = 1e-6  # [-] of the scene's size: what coal's distances may be below their bounds
-FEW = 8  # pairs that are asked about one by one as fast
 END_RESOLUTION = 1e-6  # [instants] of the end of a contact
 
 
@@ -92,8 +91,6 @@ class _Watch:
 
     def _least(self, t: float) -> FloatArray:
         """Return bounds of the distances from below, (pairs,); coal is asked where they are low."""
-        if len(self.scene.pairs) < FEW:
-            return np.full(len(self.scene.pairs), -np.inf)
         return self._distance.least(t) - SLACK * self.scene.size
 
 

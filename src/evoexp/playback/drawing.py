@@ -54,7 +54,7 @@ def marks(recording: Recording) -> list[Any]:
     colour, across = _colour(TARGET, 1.0), 0.02 * recording.view.radius
     for target in recording.targets:
         place = pin.SE3(np.eye(3), target.point)
-        text = {"pose": _pose(place), "color": colour, "text": f" {target.name}"}
+        text: Fields = {"pose": _pose(place), "color": colour, "text": f" {target.name}"}
         text |= {"billboard": True, "font_size": 14.0, "scale_invariant": True}
         ball = _solid(place, (across,) * 3, colour)
         entities.append(_entity(f"target {target.name}", WORLD, spheres=[ball], texts=[text]))

@@ -97,19 +97,18 @@ def as_ros(found: Trajectory) -> bytes:
     others = sorted(set(found.units) - {"rad", "m"})
     if others:
         raise BadTiming(f"--format ros: joints that slide must do so in m, was {others[0]}")
-    points = []
     nanoseconds = np.rint(found.times * 1e9).astype(np.int64)
-    for k, time in enumerate(nanoseconds.tolist()):
-        rates = [] if found.velocities is None else found.velocities[k].tolist()
-        points.append(
-            {
-                "positions": found.positions[k].tolist(),
-                "velocities": rates,
-                "accelerations": [],
-                "effort": [],
-                "time_from_start": {"sec": time // 10**9, "nanosec": time % 10**9},
-            }
-        )
+    rates = [[]] * len(found.times) if found.velocities is None else found.velocities.tolist()
+    points = [
+        {
+            "positions": q,
+            "velocities": dq,
+            "accelerations": [],
+            "effort": [],
+            "time_from_start": {"sec": time // 10**9, "nanosec": time % 10**9},
+        }
+        for time, q, dq in zip(nanoseconds.tolist(), found.positions.tolist(), rates, strict=True)
+    ]
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     data = {"header": header, "joint_names": list(found.joints), "points": points}
     return json.dumps(data, indent=1, allow_nan=False).encode() + b"\n"

@@ -44,13 +44,12 @@ class Arms(Robot):
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
         """Return settings in which the files that are given count for all arms out of a URDF."""
         settings = dict(settings)
-        files = ("path", "srdf", "packages")
-        given = {name: settings.pop(name) for name in files if name in settings}
-        shared = {name: path for name, path in given.items() if path is not None}
-        if shared and isinstance(settings.get("arms"), list):
-            settings["arms"] = [
-                {**shared, **arm} if arm.get(TARGET) == "urdf" else arm for arm in settings["arms"]
-            ]
+        files = {name: settings.pop(name, None) for name in ("path", "srdf", "packages")}
+        shared = {name: path for name, path in files.items() if path is not None}
+        if shared and isinstance(arms := settings.get("arms"), list):
+            is_urdf = [arm.get(TARGET) == "urdf" for arm in arms]
+            arms = [shared | arm if own else arm for arm, own in zip(arms, is_urdf, strict=True)]
+            settings["arms"] = arms
         return settings
 
     def notes(self) -> list[str]:

@@ -187,8 +187,7 @@ def assembled(arms: tuple[AppendArm, ...]) -> Assembly:
             body.name = prefix + body.name if body.name else f"link_{geometry.ngeoms}"
             geometry.addGeometryObject(body)
             body_arms.append(k)
-        last = part.links[-1]
-        tools.append(part.tool or Tool(last.joint, np.eye(3), last.end))
+        tools.append(part.tool or Tool(part.links[-1].joint, np.eye(3), part.links[-1].end))
         disabled |= {frozenset(prefix + name for name in pair) for pair in part.disabled}
     for follower in (follower for part in parts for follower in part.followers):
         model = pin.transformJointIntoMimic(

@@ -24,6 +24,7 @@ class Srdf:
         # the frame to which a virtual joint ties the root, empty where none does: MoveIt's planning
         # frame is that of a virtual joint that is not fixed (`buildRecursive` in moveit_core's
         # `robot_model.cpp`)
+        self._virtual = [joint.get("name") for joint in root.iterfind("virtual_joint")]
         free = (j for j in root.iterfind("virtual_joint") if j.get("type") != "fixed")
         self.ground = next((str(joint.get("parent_frame")) for joint in free), "")
 
@@ -75,36 +76,30 @@ class Srdf:
             raise SettingError(field, "a group that does not contain itself", group)
         if group in self._joints_of:
             return self._joints_of[group]
-        found: set[str] = set()
+        joints: set[str] = set()
         for part in self._groups[group]:
             match part.tag:
                 case "chain":
-                    found |= self._chain(str(part.get("base_link")), str(part.get("tip_link")))
-                case "joint":
-                    found |= self._joint(str(part.get("name")), group)
+                    joints |= self._chain(str(part.get("base_link")), str(part.get("tip_link")))
+                case "joint" if (name := str(part.get("name"))) in self._joints:
+                    joints.add(name)
+                case "joint" if name not in self._virtual:  # those tie the robot to the world
+                    must = f"an SRDF whose group '{group}' names joints of the URDF"
+                    raise SettingError("robot.srdf", must, name, nearest(name, list(self._joints)))
                 case "link" if (above_it := self._above.get(str(part.get("name")))) is not None:
-                    found.add(above_it.name)
+                    joints.add(above_it.name)
                 case "group":
-                    found |= self.group_joints(str(part.get("name")), field, (*above, group))
-        self._joints_of[group] = found
-        return found
-
-    def _joint(self, name: str, group: str) -> set[str]:
-        """Check that a joint is there; joints that tie the robot to the world are left out."""
-        if name in self._joints:
-            return {name}
-        if name in {joint.get("name") for joint in self._root.iterfind("virtual_joint")}:
-            return set()
-        must = f"an SRDF whose group '{group}' names joints of the URDF"
-        raise SettingError("robot.srdf", must, name, nearest(name, list(self._joints)))
+                    joints |= self.group_joints(str(part.get("name")), field, (*above, group))
+        self._joints_of[group] = joints
+        return joints
 
     def _chain(self, base: str, tip: str) -> set[str]:
-        found, link = set(), tip
+        joints, link = set[str](), tip
         while link != base:
             joint = self._above.get(link)
-            if joint is None or joint.name in found:
+            if joint is None or joint.name in joints:
                 must = "an SRDF whose chains lead from a tip down to a base"
                 raise SettingError("robot.srdf", must, f"'{tip}' does not hang on '{base}'")
-            found.add(joint.name)
+            joints.add(joint.name)
             link = joint.parent
-        return found
+        return joints

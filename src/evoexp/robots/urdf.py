@@ -89,25 +89,23 @@ class Urdf(UrdfSettings):
         file = Path(located(str(path)))
         with _named(file):
             links = urdf_file(content, f"{field}.path").links
-        found: dict[str, bytes] = {}
-        for link, bodies in links.items():
-            for name in (body.mesh for body in bodies):
-                if name is not None and name not in found:
-                    with _named(f"link '{link}' of {file}"):
-                        data = mesh_content(name, file, packages, f"{field}.path")
-                        found[name] = whole_mesh(data, name, f"{field}.path")
+        meshes: dict[str, dict[str, Any]] = {}
+        how: Any = settings.get("decomposition")
+        bodies = ((link, body.mesh) for link, own in links.items() for body in own)
+        for link, name in bodies:
+            if name is None or name in meshes:
+                continue
+            with _named(f"link '{link}' of {file}"):
+                data = mesh_content(name, file, packages, f"{field}.path")
+                data = whole_mesh(data, name, f"{field}.path")
+            meshes[name] = {"name": name, "file": {SHA256: keep(data)}}
+            if how in get_args(Decomposition):
+                cut = mesh_pieces(data, Path(name).suffix, how, f"{field}.decomposition")
+                meshes[name]["pieces"] = {SHA256: keep(cut)}
         settings["urdf"] = {SHA256: keep(content)}
-        if found:
-            how: Any = settings.get("decomposition")
-            settings["meshes"] = [
-                {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
-            ]
-            for mesh, (name, data) in zip(settings["meshes"], found.items(), strict=True):
-                if how in get_args(Decomposition):
-                    cut = mesh_pieces(data, Path(name).suffix, how, f"{field}.decomposition")
-                    mesh["pieces"] = {SHA256: keep(cut)}
-        others = {"spheres": settings.pop("spheres", None), "srdf": srdf}
-        for name, path in others.items():
+        if meshes:
+            settings["meshes"] = list(meshes.values())
+        for name, path in (("spheres", settings.pop("spheres", None)), ("srdf", srdf)):
             if path is None:
                 continue
             content = file_content(path, f"{field}.{name}")

@@ -31,8 +31,7 @@ class ArmMotion(Component):
         sizes = [int(stop - first) for first, stop in arm_slices]
         for name, given in (("q_start", self.q_start), ("q_goal", self.q_goal)):
             if [len(arm) for arm in given] != sizes:
-                must = (
-                    f"one list per arm of the robot, with {', '.join(map(str, sizes))} joint angles"
-                )
+                counts = ", ".join(map(str, sizes))
+                must = f"one list per arm of the robot, with {counts} joint angles"
                 raise SettingError(f"scenario.{name}", must, [list(arm) for arm in given])
         return np.concatenate(self.q_start), np.concatenate(self.q_goal)

@@ -43,12 +43,7 @@ def part_at(parts: list[Part], t: float) -> Part:
 
 
 def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance:
-    """Return the distances at the ticks, and all contacts.
-
-    Args:
-        parts: Pieces of the motion, from `Planner.parts`.
-        times: (ticks,) from 0 to the end [instants].
-    """
+    """Return the distances at times (ticks,) [instants], from 0 to the end, and all contacts."""
     least, pairs, contacts = [], [], list[Contact]()
     watches = {id(part): _Watch(part.scene, motion) for part in parts}
     for t in times:

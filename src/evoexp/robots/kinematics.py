@@ -76,12 +76,7 @@ class KinematicTable(NamedTuple):
         return slides
 
     def local(self, joint: int, point: FloatArray) -> FloatArray:
-        """Express a point, given in Pinocchio's frame of a joint, in the table's frame of it.
-
-        Args:
-            joint: Pinocchio's index of the joint, at least 1.
-            point: (3,) [length unit].
-        """
+        """Express a point (3,), given in Pinocchio's frame of a joint (1, …), in the table's."""
         return matrix_product(self.alignment[joint - 1].T, point)
 
 

@@ -28,7 +28,6 @@ from evoexp.scenarios.moveit_scene import (
     read_allowed,
     read_state,
     read_world,
-    resources,
 )
 from evoexp.validation import Component, NonNegative, Positive
 
@@ -101,13 +100,15 @@ class MoveitTask(Component):
             document = read_document(content, f"{field}.{name}: {path}", message)
             if message == SCENE and has_other_frames(document):
                 settings["frame_names"] = "header"
-            if message == SCENE and (names := resources(document)):
-                place, own = Path(located(path)), f"{field}.{name}"
-                contents = [mesh_content(mesh, place, packages, own) for mesh in names]
-                settings["meshes"] = [
-                    {"name": mesh, "file": {SHA256: keep(content)}}
-                    for mesh, content in zip(names, contents, strict=True)
-                ]
+            # files of meshes, as robowflex names them
+            things = document["world"]["collision_objects"] if message == SCENE else ()
+            meshes = [mesh["resource"].text for thing in things for mesh in thing["meshes"]]
+            files = []
+            for mesh in filter(None, dict.fromkeys(meshes)):
+                content = mesh_content(mesh, Path(located(path)), packages, f"{field}.{name}")
+                files.append({"name": mesh, "file": {SHA256: keep(content)}})
+            if files:
+                settings["meshes"] = files
         return settings
 
     @property
@@ -126,12 +127,7 @@ class MoveitTask(Component):
         return read_state(self._message("scene")["robot_state"]) | self.plan_request.start
 
     def world(self, links: "LinkFrames | None", load: LoadMesh) -> World:
-        """Return the scene's objects.
-
-        Args:
-            links: Of the robot; None: they have no names.
-            load: Reads meshes that the scene names.
-        """
+        """Return the scene's objects, among a robot's links if these have names."""
         scene = self._message("scene")
         if self.frame_names == "child" and has_other_frames(scene):
             must = "header, as MoveIt names frames: give the scene again and run it again"
@@ -141,11 +137,7 @@ class MoveitTask(Component):
         return world
 
     def notes(self, robot: Any) -> tuple[str, ...]:
-        """Name the parts of the messages that are left out and may matter.
-
-        Args:
-            robot: The robot of the condition.
-        """
+        """Name the parts of the messages that are left out and may matter to a robot."""
         name = getattr(robot, "robot_name", "")
         scene, request = (self._message(name).value for name in FILES)
         notes = []

@@ -88,14 +88,7 @@ def read_world(
     meshes: tuple[SceneMesh, ...] = (),
     load: LoadMesh | None = None,
 ) -> World:
-    """Read the objects of a planning scene.
-
-    Args:
-        scene: The message.
-        links: Of the robot; None: they have no names.
-        meshes: Those that the scene names.
-        load: Reads them; None: there are none.
-    """
+    """Read the objects of a planning scene, among a robot's links if these have names."""
     loaded = {}
     for mesh in meshes:
         assert load is not None
@@ -241,13 +234,6 @@ def _are_truths(values: list[Any], count: int) -> bool:
 def _three(values: Any) -> tuple[float, float, float]:
     x, y, z = (float(value) + 0.0 for value in values)
     return x, y, z
-
-
-def resources(scene: MessagePart) -> list[str]:
-    """List the files that the meshes of a scene name, as robowflex writes them."""
-    things = scene["world"]["collision_objects"]
-    names = (mesh["resource"].text for thing in things for mesh in thing["meshes"])
-    return list(dict.fromkeys(filter(None, names)))
 
 
 def _mesh_hulls(

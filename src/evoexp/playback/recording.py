@@ -1,7 +1,7 @@
 """The recording of one motion, from which pages, playable logs and trajectories are written."""
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -129,11 +129,7 @@ def record_motion(
     where = poses(model, motion, times, parts, carried)
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
-    # scenarios that name places have a method that returns names and points, in plane or space
-    named = getattr(condition.scenario, "named_places", lambda robot: ())(robot)
-    places = tuple(
-        Target(name.replace("_", " "), np.array([*point, 0.0][:3])) for name, point in named
-    )
+    places = _targets(condition.scenario, robot)
     velocity_limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
     is_limited = (velocity_limits > 0.0) & (velocity_limits < 1e6)  # Pinocchio's default is none
     return Recording(
@@ -162,6 +158,13 @@ def record_motion(
         parts=tuple(parts),
         velocity_limits=np.where(is_limited, velocity_limits, np.inf),
     )
+
+
+def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
+    """Return the places that a scenario names for a robot, by points in the plane or in space."""
+    named = scenario.named_places(robot) if hasattr(scenario, "named_places") else ()
+    places = ((name.replace("_", " "), np.array([*point, 0.0][:3])) for name, point in named)
+    return tuple(Target(*place) for place in places)
 
 
 def joints_of(assembly: Assembly) -> tuple[Joint, ...]:

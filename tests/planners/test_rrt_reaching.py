@@ -11,7 +11,7 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
 from evoexp.records import generations
-from evoexp.robots.planar_postures import bring_tip_to, tip
+from evoexp.robots.planar_ends import bring_tip_to, tip
 
 ARMS = "lavoie_7dof", "lavoie_10dof"
 TREES = "planner=rrt_reaching", "ga=rrt_connect", "objective=null", "collision=lavoie"

@@ -3,8 +3,7 @@
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.robots.planar_ends import PlanarArm
-from evoexp.robots.planar_postures import CLOSE, DAMPING, MOST_STEPS, bring_tip_to
+from evoexp.robots.planar_ends import CLOSE, DAMPING, MOST_STEPS, PlanarArm, bring_tip_to
 
 
 def plain_steps(q: FloatArray, target: FloatArray, limits: FloatArray, arm: PlanarArm) -> bool:

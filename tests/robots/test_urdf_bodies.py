@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.attachments import located
+from evoexp.attachments import File, keep, located
 from evoexp.batch.replicate import run_replicate
 from evoexp.cli import main
 from evoexp.errors import SettingError
@@ -21,8 +21,7 @@ from evoexp.mesh_files import mesh_content
 from evoexp.records import FloatArray
 from evoexp.robots.robot_data import ROBOT_DATA
 from evoexp.robots.urdf import Urdf
-from evoexp.robots.urdf_model import JointRules, urdf_model
-from evoexp.robots.urdf_reading import urdf_file
+from evoexp.robots.urdf_model import urdf_model
 from evoexp.testing import conditions
 
 DATA = Path(__file__).parent / "data"
@@ -180,7 +179,7 @@ def test_every_body_of_every_link_is_built_where_the_file_has_it(path: Path) -> 
 
 @pytest.mark.parametrize("path", [*map(Path, SHIPPED)], ids=lambda path: path.name)
 def test_joints_and_frames_stand_as_by_pinocchios_reader_bit_by_bit(path: Path) -> None:
-    model = urdf_model(urdf_file(path.read_bytes()), JointRules(1.0, 180.0, 1.0, "fixed"))
+    model = urdf_model(Urdf(urdf=File(sha256=keep(path.read_bytes()))))
     other = pin.buildModelFromUrdf(str(path))
     assert list(model.names) == list(other.names)
     for placement, expected in zip(model.jointPlacements, other.jointPlacements, strict=True):

@@ -272,7 +272,7 @@ def test_states_of_an_srdf_are_finite_numbers(tmp_path: Path, value: str) -> Non
     with pytest.raises(
         SettingError, match=f"finite numbers, at most 1e.07, was \"'{value}' of 'j'"
     ):
-        robot(tmp_path, arm(), srdf=str(srdf)).states()
+        robot(tmp_path, arm(), srdf=str(srdf)).build()
 
 
 def test_notes_name_links_without_a_body_and_limits_that_are_not_given(tmp_path: Path) -> None:

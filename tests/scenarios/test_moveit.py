@@ -11,12 +11,11 @@ import yaml
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
-from evoexp.scenarios.moveit_files import MessagePart
+from evoexp.scenarios.moveit import read_link_goal, read_request
+from evoexp.scenarios.moveit_files import MessagePart, read_document
 from evoexp.scenarios.moveit_frames import read_frames
 from evoexp.scenarios.moveit_messages import REQUEST, SCENE
-from evoexp.scenarios.moveit_request import read_link_goal, read_request
 from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world
-from evoexp.scenarios.moveit_yaml import read_document
 from evoexp.scenarios.obstacles import BOX, CYLINDER, HALF_SPACE, SPHERE, obstacle_table
 from moveit_samples import GOAL, JOINTS, START, body, request, scene
 
@@ -33,7 +32,7 @@ def read(plain: Any) -> World:
     file = document(plain)
     read_state(file["robot_state"])
     read_allowed(file)
-    return read_world(file, None, {})
+    return read_world(file, None)
 
 
 def random_pose(rng: np.random.Generator) -> tuple[pin.SE3, dict[str, Any]]:

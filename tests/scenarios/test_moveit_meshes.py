@@ -21,7 +21,7 @@ CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
 def read(*objects: dict[str, Any]) -> tuple[Any, ...]:
-    return read_world(document(scene(*objects)), None, {}).obstacles
+    return read_world(document(scene(*objects)), None).obstacles
 
 
 def shapes(obstacles: tuple[Any, ...]) -> list[tuple[Any, Any]]:

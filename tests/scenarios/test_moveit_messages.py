@@ -138,7 +138,7 @@ def read(plain: Any) -> None:
     file = document(plain)
     read_state(file["robot_state"])
     read_allowed(file)
-    read_world(file, None, {})
+    read_world(file, None)
 
 
 def matrix(*rows: list[bool]) -> dict[str, Any]:
@@ -189,7 +189,7 @@ def test_quaternions_are_normalised_within_a_hundredth_and_refused_beyond() -> N
         half = float(np.sqrt(0.5)) * length
         pose = {"orientation": [0, 0, half, half]}
         thing = body("box", [0.1, 0.2, 0.3], [1, 0, 0], pose=pose)
-        return read_world(document(scene(thing)), None, {}).obstacles[0]
+        return read_world(document(scene(thing)), None).obstacles[0]
 
     for length in (0.9901, 0.995, 1.005, 1.0099):
         assert np.allclose(turned(length).center, [0.0, 1.0, 0.0], atol=1e-12)

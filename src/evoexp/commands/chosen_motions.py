@@ -24,7 +24,7 @@ from evoexp.errors import (
 from evoexp.paths.motion import Motion
 from evoexp.playback.recording import Heading, Recording, joints_of, record, record_motion
 from evoexp.playback.timing import SpeedLimits
-from evoexp.playback.trajectory_files import Columns, JointTrajectory, fitted
+from evoexp.playback.trajectory_files import JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
@@ -218,7 +218,7 @@ def fitting_motions(
         raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
     path = Path(files[0])
     values = read_motion(path)
-    is_trajectory = isinstance(values, Columns | JointTrajectory)
+    is_trajectory = isinstance(values, JointTrajectory)
     fitting, misfits = [], dict[str, None]()
     for experiment in compose.expand(overrides, multirun=multirun, only=only):
         for label, condition in experiment.conditions:
@@ -280,7 +280,7 @@ def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMo
 
 
 def _trajectory(
-    label: str, condition: Condition, given: Columns | JointTrajectory
+    label: str, condition: Condition, given: JointTrajectory
 ) -> tuple[Motion, tuple[str, ...]]:
     """Return a trajectory as a motion of a condition's robot, and remarks."""
     planner, problem = condition.prepare()

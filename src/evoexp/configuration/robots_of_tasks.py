@@ -11,6 +11,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.registry import component_class
 from evoexp.robots.assembly import Robot
+from evoexp.robots.joint_choice import joint_roles
 from evoexp.robots.urdf import Urdf
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import TARGET, build
@@ -65,7 +66,7 @@ def _standing(state: dict[str, float], settings: dict[str, Any]) -> dict[str, fl
     left out, as are joints that follow others.
     """
     robot: Urdf = build(settings, component_class, PARTS[0])
-    moving, found = frozenset[str]().union(*robot.roles.arms), {}
+    moving, found = joint_roles(robot).moving, {}
     for name, value in state.items():
         joint = robot.file.joints.get(name)
         if joint is None or joint.mimic is not None or name in moving:
@@ -94,7 +95,7 @@ def with_named_states(config: dict[str, Any]) -> dict[str, Any]:
         robot = build(config.get("robot"), component_class, "robot")
         if not isinstance(robot, Robot):
             raise SettingError("robot", "one whose SRDF names states", None)
-        states = robot.states()
+        states = robot.build().states
         given = value if isinstance(value, list) else [value] * len(states)
         if len(given) != len(states):
             must = f"one state or list per arm of the robot ({len(states)})"

@@ -13,9 +13,8 @@ from evoexp.robots.assembly import Assembly
 from evoexp.robots.mesh_pieces import loaded_mesh
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit import MoveitTask
+from evoexp.scenarios.moveit import LinkGoal, MoveitTask
 from evoexp.scenarios.moveit_files import Pose
-from evoexp.scenarios.moveit_request import LinkGoal
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask
 
 

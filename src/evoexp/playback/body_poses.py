@@ -55,13 +55,9 @@ def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
 def poses(
     model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
 ) -> Poses:
-    """Return the poses of all frames.
+    """Return the poses of all frames at times (ticks,) [instants].
 
-    Args:
-        model: The `pin.Model`.
-        times: (ticks,) [instants].
-        parts: Pieces of the motion; each places the carried objects.
-        carried: Names of the objects that have frames of their own.
+    Each part of the motion places the carried objects, which have frames of their own.
     """
     data, count = model.createData(), model.njoints - 1 + len(carried)
     world, local = np.empty((2, len(times), count, 7))

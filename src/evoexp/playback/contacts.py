@@ -14,7 +14,6 @@ from evoexp.records import FloatArray
 
 UNLIMITED = 10**12  # queries of coal
 SLACK = 1e-6  # [-] of the scene's size: what coal's distances may be below their bounds
-FEW = 8  # pairs that are asked about one by one as fast
 END_RESOLUTION = 1e-6  # [instants] of the end of a contact
 
 
@@ -44,12 +43,7 @@ def part_at(parts: list[Part], t: float) -> Part:
 
 
 def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance:
-    """Return the distances at the ticks, and all contacts.
-
-    Args:
-        parts: Pieces of the motion, from `Planner.parts`.
-        times: (ticks,) from 0 to the end [instants].
-    """
+    """Return the distances at times (ticks,) [instants], from 0 to the end, and all contacts."""
     least, pairs, contacts = [], [], list[Contact]()
     watches = {id(part): _Watch(part.scene, motion) for part in parts}
     for t in times:
@@ -92,8 +86,6 @@ class _Watch:
 
     def _least(self, t: float) -> FloatArray:
         """Return bounds of the distances from below, (pairs,); coal is asked where they are low."""
-        if len(self.scene.pairs) < FEW:
-            return np.full(len(self.scene.pairs), -np.inf)
         return self._distance.least(t) - SLACK * self.scene.size
 
 
@@ -109,7 +101,9 @@ def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> l
         verdict = certify(watch.scene, rest)
         if verdict.status != "refuted":
             break
-        begin = at_instant(verdict.refuted_at, t)
+        # the instant of the whole motion: the rest's first segment is the rest of a segment
+        begin, segment = verdict.refuted_at, int(t)
+        begin = t + begin * (segment + 1 - t) if begin < 1.0 else segment + begin
         pair = PAIR.join(verdict.refuted_pair or ())
         later = ticks[ticks > begin].tolist()
         in_contact = [begin, *takewhile(watch.touching, later)]
@@ -145,9 +139,3 @@ def remainder(motion: Motion, t: float, last: int) -> Motion:
         w * w * w * c3,
     )
     return Motion(np.vstack([left[:1, 0], q[1:]]), left)
-
-
-def at_instant(t: float, begin: float) -> float:
-    """Return the instant of the whole motion for instant t of its rest from `begin` on."""
-    segment = int(begin)
-    return begin + t * (segment + 1 - begin) if t < 1.0 else segment + t

@@ -26,10 +26,10 @@ Fields = dict[str, Any]
 def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
     """Return one entity per body of some roles, in the frame that moves it."""
     names, radius = frame_names(recording), recording.view.radius
+    shapes = (shape for shape in recording.shapes if shape.role in roles)
     return [
         _body(shape.name, names[shape.frame], shape, shape.pose, OPACITY[shape.role], radius)
-        for shape in recording.shapes
-        if shape.role in roles
+        for shape in shapes
     ]
 
 
@@ -54,14 +54,8 @@ def marks(recording: Recording) -> list[Any]:
     colour, across = _colour(TARGET, 1.0), 0.02 * recording.view.radius
     for target in recording.targets:
         place = pin.SE3(np.eye(3), target.point)
-        text = {
-            "pose": _pose(place),
-            "billboard": True,
-            "font_size": 14.0,
-            "scale_invariant": True,
-            "color": colour,
-            "text": f" {target.name}",
-        }
+        text: Fields = {"pose": _pose(place), "color": colour, "text": f" {target.name}"}
+        text |= {"billboard": True, "font_size": 14.0, "scale_invariant": True}
         ball = _solid(place, (across,) * 3, colour)
         entities.append(_entity(f"target {target.name}", WORLD, spheres=[ball], texts=[text]))
     return entities
@@ -75,19 +69,10 @@ def frame_names(recording: Recording) -> list[str]:
 def _body(
     name: str, frame: str, shape: Shape, pose: FloatArray, opacity: float, radius: float
 ) -> Any:
-    """Return a body as one entity.
-
-    Args:
-        frame: Name of the frame that moves it.
-        pose: (7,) in that frame.
-        opacity: From 0 to 1.
-        radius: Radius of the view, for half-spaces [length unit].
-    """
+    """Return a body at a pose (7,) in a frame as one entity, in a view of a radius."""
     colours = {"arm": arm_colour(shape.arm), "object": OBJECT, "obstacle": OBSTACLE}
-    colour = _colour(colours[shape.role], opacity)
-    return _entity(
-        name, frame, **_primitives(shape.outline, pin.XYZQUATToSE3(pose), colour, radius)
-    )
+    colour, place = _colour(colours[shape.role], opacity), pin.XYZQUATToSE3(pose)
+    return _entity(name, frame, **_primitives(shape.outline, place, colour, radius))
 
 
 def _entity(name: str, frame: str, **primitives: Any) -> Any:

@@ -7,7 +7,7 @@ aside.
 
 import math
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import yaml
@@ -42,9 +42,6 @@ def joint_limits(
         speeds: (nq,) greatest |dq/dt| where nothing else limits it [rad/s or length unit/s].
         robot: (nq,) the robot's own velocity limits; inf where it has none.
         ramp: Time from rest to the greatest speed [s], where the file limits no acceleration.
-
-    Raises:
-        LimitsFileError: If the file cannot be read, is no such file, or names none of the joints.
     """
     limits = _read(path, names) if path is not None else {}
     rows = [[limits.get(name, {}).get(kind, math.nan) for kind in KINDS] for name in names]
@@ -66,9 +63,7 @@ def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
         must = "be YAML"
         was += f" ({printable(str(error).splitlines()[0])})"
     joints = data.get("joint_limits") if isinstance(data, dict) else None
-    if not isinstance(joints, dict) or not all(
-        isinstance(joint, dict) for joint in joints.values()
-    ):
+    if not isinstance(joints, dict) or not all(isinstance(own, dict) for own in joints.values()):
         raise LimitsFileError(f"--limits: must {must}, was {was}")
     known = [str(name) for name in joints]
     if not set(known) & set(names):
@@ -77,22 +72,18 @@ def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
             f"--limits: must name joints of the robot ({', '.join(names)}), "
             f"was {printable(', '.join(known[:8])) or 'none'}{hint}"
         )
-    return {
-        str(name): {
-            kind: _limit(joint, kind, str(name))
-            for kind in KINDS
+    limits: dict[str, dict[str, float]] = {}
+    for name, joint in zip(known, joints.values(), strict=True):
+        limits[name] = {}
+        for kind in KINDS if name in names else ():
             # a value without its flag counts, too
-            if joint.get(f"has_{kind}_limits", f"max_{kind}" in joint)
-        }
-        for name, joint in joints.items()
-        if str(name) in names
-    }
-
-
-def _limit(joint: dict[str, Any], kind: str, name: str) -> float:
-    value = joint.get(f"max_{kind}")
-    number = float(value) if isinstance(value, int | float) and abs(value) < 1e300 else math.nan
-    if not number > 0.0:
-        field = f"--limits: joint_limits.{printable(name)}.max_{kind}"
-        raise LimitsFileError(f"{field} must be a number above 0, was {printable(str(value))}")
-    return number
+            if not joint.get(f"has_{kind}_limits", f"max_{kind}" in joint):
+                continue
+            value = joint.get(f"max_{kind}")
+            is_number = isinstance(value, int | float) and 0.0 < value < 1e300
+            if not is_number:
+                field = f"--limits: joint_limits.{printable(name)}.max_{kind}"
+                was = printable(str(value))
+                raise LimitsFileError(f"{field} must be a number above 0, was {was}")
+            limits[name][kind] = float(value)
+    return limits

@@ -44,25 +44,54 @@ IMPROVEMENTS = {
 def playable_log(recording: Recording) -> bytes:
     """Return a motion as an MCAP; the same motion gives the same bytes."""
     out = _Playable()
-    out.writer.add_metadata(MOTION, _metadata(recording))
+    clearance = recording.clearance
+    metadata = {
+        "condition": recording.condition_id,
+        "replicate": str(recording.heading.replicate),
+        "title": recording.heading.title,
+        "length_unit": recording.length_unit,
+        "seconds_per_instant": repr(recording.seconds),
+        "fixed_frame": WORLD,
+    }
+    out.writer.add_metadata(MOTION, metadata)
     for name, data in (("config.json", recording.config_json), (LAYOUT, layout())):
         out.writer.add_attachment(0, 0, name, "application/json", data)
-    out.scene("/scene/robot", bodies(recording, ("arm", "object")))
-    out.scene("/scene/obstacles", bodies(recording, ("obstacle",)))
-    out.scene("/scene/ghosts", ghosts(recording))
-    out.scene("/scene/ways", marks(recording))
+    entities = {
+        "robot": bodies(recording, ("arm", "object")),
+        "obstacles": bodies(recording, ("obstacle",)),
+        "ghosts": ghosts(recording),
+        "ways": marks(recording),
+    }
+    for topic, drawn in entities.items():  # they stay as they are
+        if drawn:
+            out.message(f"/scene/{topic}", 0, SceneUpdate(entities=drawn))
     rows = [row for row in recording.heading.improvements if np.isfinite(row[1])]
     if rows:
         columns = dict(zip(("generation", "best_cost"), zip(*rows, strict=True), strict=True))
         out.json("/improvements", IMPROVEMENTS, 0, columns)
     waiting = _log_messages(recording)
-    for k, instant in enumerate(recording.times):
+    for k, instant in enumerate(recording.times.tolist()):
         now = nanoseconds(recording, instant)
         while waiting and waiting[0][0] <= now:
             out.message("/log", *waiting.pop(0))
         out.message("/tf", now, _transforms(recording, k, now))
-        out.message("/joint_states", now, _joints(recording, k, now))
-        out.json("/clearance", CLEARANCE, now, _clearance(recording, k))
+        joints = zip(
+            recording.joints, recording.q[k].tolist(), recording.dq[k].tolist(), strict=True
+        )
+        states: list[Any] = [
+            {"name": joint.name, "position": q, "velocity": dq} for joint, q, dq in joints
+        ]
+        out.message("/joint_states", now, JointStates(timestamp=_stamp(now), joints=states))
+        least = float(clearance.least[k])
+        touching = any(contact.begin <= instant <= contact.end for contact in clearance.contacts)
+        values = {
+            "instant": instant,
+            "required": recording.margin,
+            "contact": float(touching),
+            "pair": clearance.pairs[k],
+        }
+        values |= {"clearance": least} if np.isfinite(least) else {}
+        out.json("/clearance", CLEARANCE, now, values)
     for moment, message in waiting:
         out.message("/log", moment, message)
     return out.finish()
@@ -103,11 +132,6 @@ class _Playable:
             self._schemas[name] = self.writer.register_schema(name, "jsonschema", data)
         self._add(topic, "json", name, moment, json.dumps(values, allow_nan=False).encode())
 
-    def scene(self, topic: str, entities: list[Any]) -> None:
-        """Append the entities of a scene, which stay as they are."""
-        if entities:
-            self.message(topic, 0, SceneUpdate(entities=entities))
-
     def finish(self) -> bytes:
         """Return the file."""
         self.writer.finish()
@@ -142,35 +166,11 @@ def _transforms(recording: Recording, k: int, now: int) -> Any:
     return FrameTransforms(transforms=transforms)
 
 
-def _joints(recording: Recording, k: int, now: int) -> Any:
-    rows = zip(recording.joints, recording.q[k].tolist(), recording.dq[k].tolist(), strict=True)
-    states: list[Any] = [
-        {"name": joint.name, "position": q, "velocity": dq} for joint, q, dq in rows
-    ]
-    return JointStates(timestamp=_stamp(now), joints=states)
-
-
-def _clearance(recording: Recording, k: int) -> dict[str, Any]:
-    clearance, instant = recording.clearance, float(recording.times[k])
-    touching = any(contact.begin <= instant <= contact.end for contact in clearance.contacts)
-    values: dict[str, Any] = {
-        "instant": instant,
-        "required": recording.margin,
-        "contact": float(touching),
-        "pair": clearance.pairs[k],
-    }
-    least = float(clearance.least[k])
-    return values | ({"clearance": least} if np.isfinite(least) else {})
-
-
 def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
     """Return verdict, least clearance and contacts as messages, in the order of time."""
     verdict, unit = recording.verdict, recording.length_unit
-    answer = {
-        True: "certified: no two bodies ever touch",
-        False: "refuted: bodies touch",
-        None: "undecided",
-    }
+    proof, refutation = "certified: no two bodies ever touch", "refuted: bodies touch"
+    answer = {True: proof, False: refutation, None: "undecided"}
     rows = [(0.0, Log.INFO, f"{recording.heading.title}: {answer[verdict.certified]}")]
     if verdict.certified is not False and verdict.clearance_at is not None:
         is_kept = verdict.certified_margin is not False
@@ -183,20 +183,8 @@ def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
     for begin, end, pair in recording.clearance.contacts:
         rows.append((begin, Log.ERROR, f"refuted at instant {begin:.9g}: {pair} touch"))
         rows.append((end, Log.INFO, f"free again at instant {end:.6g}"))
-    messages = []
-    for instant, level, text in sorted(rows, key=lambda row: row[0]):
-        now = nanoseconds(recording, instant)
-        log = Log(timestamp=_stamp(now), level=level, message=text, name="certifier")
-        messages.append((now, log))
-    return messages
-
-
-def _metadata(recording: Recording) -> dict[str, str]:
-    return {
-        "condition": recording.condition_id,
-        "replicate": str(recording.heading.replicate),
-        "title": recording.heading.title,
-        "length_unit": recording.length_unit,
-        "seconds_per_instant": repr(recording.seconds),
-        "fixed_frame": WORLD,
-    }
+    return [
+        (now, Log(timestamp=_stamp(now), level=level, message=text, name="certifier"))
+        for instant, level, text in sorted(rows, key=lambda row: row[0])
+        for now in [nanoseconds(recording, instant)]
+    ]

@@ -46,11 +46,19 @@ def _motion(recording: Recording) -> dict[str, Any]:
     """Return the data of a motion for the script of the page."""
     clearance, verdict = recording.clearance, recording.verdict
     pairs = list(dict.fromkeys(clearance.pairs))
+    margin = {}  # the second badge, where a margin is required and no bodies touch
+    if recording.margin > 0.0 and verdict.certified is not False:
+        answer = verdict.certified_margin
+        kind = {True: "kept", False: "broken", None: "unsure"}[answer]
+        margin = {"margin_kind": kind, "margin_text": f"required margin {MARGIN[answer]}"}
+    # joints of links without thickness: no body marks these joints
+    shapes = [shape for shape in recording.shapes if shape.role == "arm" and shape.frame >= 0]
+    lines = {shape.frame: arm_colour(shape.arm) for shape in shapes if shape.outline.is_line}
     return {
         "title": recording.heading.title,
         "status": {True: "certified", False: "refuted", None: "undecided"}[verdict.certified],
         "verdict": _verdict(recording),
-        **_margin(recording),
+        **margin,
         "facts": _facts(recording),
         "legend": _legend(recording),
         "unit": recording.length_unit,
@@ -63,7 +71,7 @@ def _motion(recording: Recording) -> dict[str, Any]:
         "times": _packed(recording.times),
         "poses": _packed(recording.poses.world),
         "shapes": [_shape(shape) for shape in recording.shapes],
-        "dots": _dots(recording),
+        "dots": [{"frame": frame, "colour": colour} for frame, colour in lines.items()],
         "ways": [
             {"colour": arm_colour(k), "points": _packed(way)}
             for k, way in enumerate(recording.traces)
@@ -98,18 +106,6 @@ def _shape(shape: Shape) -> dict[str, Any]:
     return row
 
 
-def _dots(recording: Recording) -> list[dict[str, Any]]:
-    """Return the joints of links without thickness: no body marks these joints."""
-    lines = {
-        shape.frame: shape.arm
-        for shape in recording.shapes
-        if shape.role == "arm" and shape.outline.is_line
-    }
-    return [
-        {"frame": frame, "colour": arm_colour(arm)} for frame, arm in lines.items() if frame >= 0
-    ]
-
-
 def _legend(recording: Recording) -> list[tuple[str, str]]:
     arms = sorted({shape.arm for shape in recording.shapes if shape.role == "arm"})
     names = [(f"arm {arm + 1}" if len(arms) > 1 else "robot", arm_colour(arm)) for arm in arms]
@@ -126,18 +122,6 @@ def _verdict(recording: Recording) -> str:
     if verdict.clearance_at is None:
         return "nothing that could touch"
     return f"least clearance {verdict.clearance:.4g} {unit} at instant {verdict.clearance_at:.4g}"
-
-
-def _margin(recording: Recording) -> dict[str, str]:
-    """Return kind and text of the second badge: whether the required margin is kept.
-
-    Nothing is returned where no margin is required, or the bodies touch.
-    """
-    if recording.margin <= 0.0 or recording.verdict.certified is False:
-        return {}
-    answer = recording.verdict.certified_margin
-    kind = {True: "kept", False: "broken", None: "unsure"}[answer]
-    return {"margin_kind": kind, "margin_text": f"required margin {MARGIN[answer]}"}
 
 
 def _facts(recording: Recording) -> list[tuple[str, str]]:

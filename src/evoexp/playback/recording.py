@@ -104,12 +104,7 @@ def record(
 def record_motion(
     condition: Condition, motion: Motion | None, heading: Heading, limits: SpeedLimits | None = None
 ) -> Recording:
-    """Return the recording of a motion among the bodies of a condition.
-
-    Args:
-        motion: Of its robot; None: there is none.
-        heading: Title and origin.
-        limits: Speed limits of the joints, for the timing.
+    """Return the recording of a motion among the bodies of a condition, timed by speed limits.
 
     Raises:
         NoMotion: If there is no motion, or there are no bodies.
@@ -135,6 +130,8 @@ def record_motion(
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
     places = _targets(condition.scenario, robot)
+    velocity_limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
+    is_limited = (velocity_limits > 0.0) & (velocity_limits < 1e6)  # Pinocchio's default is none
     return Recording(
         heading=heading,
         condition_id=condition.id,
@@ -159,34 +156,20 @@ def record_motion(
         verdict=certificate(parts, motion, margin),
         view=_view(shapes, where.world, places),
         parts=tuple(parts),
-        velocity_limits=_velocity_limits(assembly),
+        velocity_limits=np.where(is_limited, velocity_limits, np.inf),
     )
 
 
 def _targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
-    """Return the places that a scenario names for a robot; none if it names configurations.
-
-    Args:
-        scenario: One that names places has a method `named_places(robot)`, which returns names and
-            points, in the plane or in space.
-    """
-    if not hasattr(scenario, "named_places"):
-        return ()
-    return tuple(
-        Target(name.replace("_", " "), np.array([*point, 0.0][:3]))
-        for name, point in scenario.named_places(robot)
-    )
+    """Return the places that a scenario names for a robot, by points in the plane or in space."""
+    named = scenario.named_places(robot) if hasattr(scenario, "named_places") else ()
+    places = ((name.replace("_", " "), np.array([*point, 0.0][:3])) for name, point in named)
+    return tuple(Target(*place) for place in places)
 
 
 def joints_of(assembly: Assembly) -> tuple[Joint, ...]:
     """Return the joints in the order of their coordinates."""
     return tuple(map(Joint, assembly.joint_names, assembly.table.slides.tolist()))
-
-
-def _velocity_limits(assembly: Assembly) -> FloatArray:
-    """Return the limits that the robot's model has; Pinocchio's default is no limit."""
-    limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
-    return np.where((limits > 0.0) & (limits < 1e6), limits, np.inf)
 
 
 def _carried(parts: list[Part]) -> list[str]:

@@ -56,10 +56,7 @@ class Shape(NamedTuple):
 
 
 def outline(shape: Any) -> tuple[Outline, Any]:
-    """Return the outline of a coal shape, and the placement of the outline's frame in the shape's.
-
-    Returns:
-        The outline and a `pin.SE3`.
+    """Return the outline of a coal shape, and the `pin.SE3` of the outline's frame in the shape's.
 
     Raises:
         UnsupportedShape: If there is no way to draw it.

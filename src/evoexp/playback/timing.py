@@ -5,7 +5,6 @@ rest to rest; it stops where the direction of the motion jumps, as where two str
 """
 
 import warnings
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -33,12 +32,7 @@ class SpeedLimits(NamedTuple):
     slide: float | None = None
 
     def of(self, prismatic: np.ndarray, size: float) -> FloatArray:
-        """Return the limit of every coordinate (nq,).
-
-        Args:
-            prismatic: (nq,) true for coordinates that are lengths.
-            size: Size of the scene [length unit].
-        """
+        """Return the limit of every coordinate (nq,), in a scene of a size [length unit]."""
         slide = 0.25 * size if self.slide is None else self.slide
         return np.where(prismatic, slide, self.turn)
 
@@ -56,9 +50,6 @@ def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
 
     Args:
         limits: (nq,) greatest |dq/dt| [rad/s or length unit/s].
-
-    Returns:
-        1 for a motion that stands still.
     """
     if motion.num_segments == 0:
         return 1.0
@@ -66,13 +57,9 @@ def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
 
 
 def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
-    """Return dq/dt at instants, (ticks, nq) [rad/s or length unit/s].
+    """Return dq/dt at times (ticks,) [instants] that are seconds apart, (ticks, nq) [per s].
 
     Where two straight lines meet, the velocity on the later one is taken.
-
-    Args:
-        times: (ticks,) [instants].
-        seconds: Time from instant to instant [s].
     """
     if motion.num_segments == 0:
         return np.zeros((len(times), motion.q.shape[1]))
@@ -104,35 +91,25 @@ def fastest(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Ti
     polynomials = motion.polynomials[motion.polynomials[:, 1:].any(axis=(1, 2))]
     if not len(polynomials):  # it stands still
         return TimedPoints(np.array([0.0, 1.0]), motion.q[[0, 0]], 0.0 * motion.q[[0, 0]])
-    sections = [
-        _section(toppra, polynomials[first:last], speeds, accelerations)
-        for first, last in pairwise([0, *_stops(polynomials), len(polynomials)])
-    ]
-    begins = np.concatenate([[0.0], np.cumsum([section.times[-1] for section in sections])])
-    # every section but the first begins at the last point of the one before
-    kept = [slice(None), *[slice(1, None)] * (len(sections) - 1)]
-    parts = [
-        (begin + section.times[own], section.positions[own], section.velocities[own])
-        for begin, section, own in zip(begins, sections, kept, strict=False)
-    ]
-    return TimedPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def _stops(polynomials: FloatArray) -> Sequence[int]:
-    """Return the segments, but for the first one, at whose beginning the direction jumps."""
+    # it stops where the direction jumps
     _, c1, c2, c3 = polynomials.transpose(1, 0, 2)
     jumps = np.abs((c1 + 2.0 * c2 + 3.0 * c3)[:-1] - c1[1:]).max(axis=1)
-    return [int(k) + 1 for k in np.flatnonzero(jumps > SMOOTH * np.abs(c1).max())]
+    stops = 1 + np.flatnonzero(jumps > SMOOTH * np.abs(c1).max())
+    parts: list[TimedPoints] = []
+    for first, last in pairwise([0, *stops.tolist(), len(polynomials)]):
+        section = _section(toppra, polynomials[first:last], speeds, accelerations)
+        if parts:  # it begins at the last point of the one before
+            begin = parts[-1].times[-1]
+            section = TimedPoints(*(column[1:] for column in section))
+            section = section._replace(times=begin + section.times)
+        parts.append(section)
+    return TimedPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _section(
     toppra: Any, polynomials: FloatArray, speeds: FloatArray, accelerations: FloatArray
 ) -> TimedPoints:
-    """Time cubics without a stop between them from rest to rest.
-
-    Args:
-        polynomials: (segments, 4, nq), lowest power first.
-    """
+    """Time cubics (segments, 4, nq) without a stop between them from rest to rest."""
     count, constraint = len(polynomials), toppra.constraint
     limits = [
         constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
@@ -167,13 +144,7 @@ def _section(
 
 
 def hermite_motion(times: FloatArray, positions: FloatArray, velocities: FloatArray) -> Motion:
-    """Return the cubics that a controller puts between points with velocities.
-
-    Args:
-        times: (points,) [s].
-        positions: (points, nq).
-        velocities: (points, nq) per second.
-    """
+    """Return the cubics that a controller puts between points, see `TimedPoints`."""
     widths = np.diff(times)[:, None]
     before, after = widths * velocities[:-1], widths * velocities[1:]
     way = positions[1:] - positions[:-1]
@@ -185,8 +156,7 @@ def greatest_rates(motion: Motion, widths: FloatArray) -> tuple[FloatArray, Floa
     """Return the greatest speed and acceleration of every joint, each (nq,).
 
     Args:
-        motion: Cubic segments.
-        widths: (segments,) their durations [s].
+        widths: (segments,) durations of the motion's segments [s].
     """
     _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
     w = widths[:, None]

@@ -6,6 +6,7 @@ executed is certified again where it is another curve than the stored one.
 """
 
 import json
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from evoexp.playback.joint_limits import JointLimits
 from evoexp.playback.recording import Recording
 from evoexp.playback.timing import (
     BadTiming,
-    TimedPoints,
     fastest,
     greatest_rates,
     hermite_motion,
@@ -78,22 +78,14 @@ def trajectory(recording: Recording, timing: Timing, limits: JointLimits) -> Tra
         rates = None if straight else velocities(motion, instants, seconds)
         return Trajectory(names, units, seconds * instants, motion.q, rates, verdict)
     timed = fastest(motion, limits.velocity, limits.acceleration)
-    if not straight:  # cubics between points of a line stay on it
-        verdict = _executed_verdict(timed, recording)
+    if not straight:  # the cubics between points of a line stay on it; those on a curve are judged
+        executed, parts = hermite_motion(*timed), recording.parts
+        borders = [motion.q[part.last] for part in parts[:-1]]
+        places = [int(np.argmin(((timed.positions - q) ** 2).sum(axis=1))) for q in borders]
+        pieces = zip(parts, pairwise([0, *places, executed.num_segments]), strict=True)
+        moved = [part._replace(first=first, last=last) for part, (first, last) in pieces]
+        verdict = certificate(moved, executed, recording.margin)
     return Trajectory(names, units, *timed, verdict)
-
-
-def _executed_verdict(timed: TimedPoints, recording: Recording) -> Certificate:
-    """Certify the cubics that a controller puts between points on a curve."""
-    executed, parts = hermite_motion(*timed), recording.parts
-    borders = [recording.motion.q[part.last] for part in parts[:-1]]
-    places = [int(np.argmin(((timed.positions - q) ** 2).sum(axis=1))) for q in borders]
-    instants = [0, *places, executed.num_segments]
-    moved = [
-        part._replace(first=first, last=last)
-        for part, first, last in zip(parts, instants[:-1], instants[1:], strict=True)
-    ]
-    return certificate(moved, executed, recording.margin)
 
 
 def as_ros(found: Trajectory) -> bytes:
@@ -105,19 +97,18 @@ def as_ros(found: Trajectory) -> bytes:
     others = sorted(set(found.units) - {"rad", "m"})
     if others:
         raise BadTiming(f"--format ros: joints that slide must do so in m, was {others[0]}")
-    points = []
     nanoseconds = np.rint(found.times * 1e9).astype(np.int64)
-    for k, time in enumerate(nanoseconds.tolist()):
-        rates = [] if found.velocities is None else found.velocities[k].tolist()
-        points.append(
-            {
-                "positions": found.positions[k].tolist(),
-                "velocities": rates,
-                "accelerations": [],
-                "effort": [],
-                "time_from_start": {"sec": time // 10**9, "nanosec": time % 10**9},
-            }
-        )
+    rates = [[]] * len(found.times) if found.velocities is None else found.velocities.tolist()
+    points = [
+        {
+            "positions": q,
+            "velocities": dq,
+            "accelerations": [],
+            "effort": [],
+            "time_from_start": {"sec": time // 10**9, "nanosec": time % 10**9},
+        }
+        for time, q, dq in zip(nanoseconds.tolist(), found.positions.tolist(), rates, strict=True)
+    ]
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     data = {"header": header, "joint_names": list(found.joints), "points": points}
     return json.dumps(data, indent=1, allow_nan=False).encode() + b"\n"

@@ -50,16 +50,10 @@ class JointTrajectory(NamedTuple):
     velocities: dict[str, Values]  # by joint; none if the file has none
     times: FloatArray | None  # (points,) [s]; None: the file has none
     unread: tuple[str, ...] = ()  # names of what is not read
+    is_table: bool = False  # whether positions are named by heads of columns, not yet by joints
 
 
-class Columns(NamedTuple):
-    """The columns of a table, which a robot's joints turn into a trajectory."""
-
-    numbers: dict[str, FloatArray]  # (points,) by head
-    times: FloatArray | None  # (points,) [s]; None: the file has none
-
-
-def read_columns(content: bytes) -> Columns:
+def read_columns(content: bytes) -> JointTrajectory:
     """Read a CSV file with a head.
 
     Raises:
@@ -81,7 +75,8 @@ def read_columns(content: bytes) -> Columns:
             if (unit := (found[1] or "").lower()) not in SECONDS:
                 raise TableError(rows[0].line, "a time in s, ms, us or ns", name)
             times = SECONDS[unit] * numbers.pop(name)
-    return Columns(numbers, times)
+    columns = {name: Values(column) for name, column in numbers.items()}
+    return JointTrajectory(columns, {}, times, is_table=True)
 
 
 def read_message(data: dict[str, Any]) -> JointTrajectory:
@@ -103,7 +98,15 @@ def read_message(data: dict[str, Any]) -> JointTrajectory:
         raise ValueError(f"units must be {len(names)}, one per joint")
     rows: dict[str, list[list[float]]] = {}
     for key in ("positions", "velocities", "accelerations"):
-        rows[key] = [_numbers(point, f"points[{k}].{key}") for k, point in enumerate(points)]
+        rows[key] = []
+        for k, point in enumerate(points):
+            row, where = (
+                point.get(key, []) if isinstance(point, dict) else None,
+                f"points[{k}].{key}",
+            )
+            if not isinstance(row, list):
+                raise ValueError(f"{where} must be a list of numbers")
+            rows[key].append([_number(value, where) for value in row])
         for k, row in enumerate(rows[key]):
             if len(row) != len(names) and (row or key == "positions" or any(rows[key])):
                 must = f"points[{k}].{key} must be {len(names)} numbers, one per joint"
@@ -118,14 +121,6 @@ def read_message(data: dict[str, Any]) -> JointTrajectory:
     )
     unread = ("accelerations",) if np.any(rows["accelerations"]) else ()
     return JointTrajectory(positions, velocities, _times(points), unread)
-
-
-def _numbers(point: Any, where: str) -> list[float]:
-    """Return the list of numbers at the end of a place such as `points[0].positions`."""
-    row = point.get(where.rpartition(".")[2], []) if isinstance(point, dict) else None
-    if not isinstance(row, list):
-        raise ValueError(f"{where} must be a list of numbers")
-    return [_number(value, where) for value in row]
 
 
 def _number(value: Any, where: str, most: float = LARGEST) -> float:
@@ -144,24 +139,22 @@ def _times(points: Sequence[dict[str, Any]]) -> FloatArray | None:
         if time is None:
             return None
         if isinstance(time, dict):  # of ROS 2, of ROS 1
-            seconds, nanoseconds = (
-                _number(time.get(key, time.get(old, 0)), where, LATEST)
-                for key, old in (("sec", "secs"), ("nanosec", "nsecs"))
-            )
-            time = seconds + 1e-9 * nanoseconds
+            keys = ("sec", "secs"), ("nanosec", "nsecs")
+            parts = (_number(time.get(a, time.get(b, 0)), where, LATEST) for a, b in keys)
+            time = next(parts) + 1e-9 * next(parts)
         times.append(_number(time, where, LATEST))
     return np.array(times)
 
 
 def fitted(
-    given: Columns | JointTrajectory, joints: Sequence[Joint], length_unit: str
+    given: JointTrajectory, joints: Sequence[Joint], length_unit: str
 ) -> tuple[Motion, tuple[str, ...]]:
     """Return a trajectory as a motion of a robot's joints, and remarks on how it was read.
 
     Raises:
         ValueError: If a joint is missing, or a unit, a time or a number cannot be.
     """
-    if isinstance(given, Columns):
+    if given.is_table:
         given = _by_joint(given, joints, length_unit)
     if missing := [joint for joint in joints if joint.name not in given.positions]:
         has = ", ".join((*given.positions, *given.unread)) or "nothing"
@@ -194,13 +187,13 @@ def fitted(
     return motion, tuple(remarks)
 
 
-def _by_joint(table: Columns, joints: Sequence[Joint], length_unit: str) -> JointTrajectory:
+def _by_joint(table: JointTrajectory, joints: Sequence[Joint], length_unit: str) -> JointTrajectory:
     """Match columns with joints by their heads: `elbow`, `elbow_rad`, `elbow_rad_per_s`."""
     positions: dict[str, Values] = {}
     velocities: dict[str, Values] = {}
     unread = []
     names = {joint.name for joint in joints}
-    for head, numbers in table.numbers.items():
+    for head, column in table.positions.items():
         matches = [(head, ("", False))] if head in names else []
         matches += [
             (joint.name, meaning)
@@ -216,7 +209,7 @@ def _by_joint(table: Columns, joints: Sequence[Joint], length_unit: str) -> Join
         kind = velocities if is_rate else positions
         if name in kind:
             raise ValueError(f"{head}: a second column of joint {name}")
-        kind[name] = Values(numbers, unit)
+        kind[name] = column._replace(unit=unit)
     return JointTrajectory(positions, velocities, table.times, tuple(unread))
 
 

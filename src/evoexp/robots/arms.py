@@ -6,7 +6,7 @@ from pydantic import Field
 
 from evoexp.attachments import File
 from evoexp.errors import SettingError
-from evoexp.robots.assembly import Arm, Assembly, Chain, Robot
+from evoexp.robots.assembly import AppendArm, Assembly, Chain, Robot
 from evoexp.validation import TARGET
 
 
@@ -24,10 +24,9 @@ class Arms(Robot):
     def wants_pairs(cls, settings: dict[str, Any]) -> bool:
         """Whether pairs are still to be derived: where an arm comes out of a URDF."""
         arms = settings.get("arms")
-        found = isinstance(arms, list) and any(
-            isinstance(arm, dict) and arm.get(TARGET) == "urdf" for arm in arms
-        )
-        return found and settings.get("pairs") is None
+        if settings.get("pairs") is not None or not isinstance(arms, list):
+            return False
+        return any(isinstance(arm, dict) and arm.get(TARGET) == "urdf" for arm in arms)
 
     def build(self) -> Assembly:
         """Return the robot with its derived pairs.
@@ -45,19 +44,18 @@ class Arms(Robot):
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
         """Return settings in which the files that are given count for all arms out of a URDF."""
         settings = dict(settings)
-        files = ("path", "srdf", "packages")
-        given = {name: settings.pop(name) for name in files if name in settings}
-        shared = {name: path for name, path in given.items() if path is not None}
-        if shared and isinstance(settings.get("arms"), list):
-            settings["arms"] = [
-                {**shared, **arm} if arm.get(TARGET) == "urdf" else arm for arm in settings["arms"]
-            ]
+        files = {name: settings.pop(name, None) for name in ("path", "srdf", "packages")}
+        shared = {name: path for name, path in files.items() if path is not None}
+        if shared and isinstance(arms := settings.get("arms"), list):
+            is_urdf = [arm.get(TARGET) == "urdf" for arm in arms]
+            arms = [shared | arm if own else arm for arm, own in zip(arms, is_urdf, strict=True)]
+            settings["arms"] = arms
         return settings
 
     def notes(self) -> list[str]:
         """Join the remarks of the arms."""
         return list(dict.fromkeys(note for chain in self.arms for note in chain.notes()))
 
-    def chains(self) -> tuple[Arm, ...]:
+    def chains(self) -> tuple[AppendArm, ...]:
         """Return the arms; a URDF may bring several."""
         return tuple(arm for chain in self.arms for arm in chain.chains())

@@ -1,6 +1,6 @@
 """The product of a robot description: one Pinocchio model, with the arms as slices of q."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import coal
@@ -48,6 +48,26 @@ class LinkFrames(NamedTuple):
     ground: str = ""  # the frame to which the SRDF's virtual joint ties the root; empty: none
 
 
+class ArmStates(NamedTuple):
+    """The named states of an arm."""
+
+    joints: tuple[str, ...]  # names of the joints that move, in the order of q
+    units: tuple[float, ...]  # of each: degrees, or 1 for lengths [rad, m]
+    # values of joints by their names [rad, m], by the states' names
+    states: dict[str, dict[str, float]]
+
+    def values_of(self, name: str, field: str) -> list[float]:
+        """Return the configuration of a state [deg, m]."""
+        if name not in self.states:
+            names = sorted(self.states)
+            must = f"a state that the robot's SRDF names ({', '.join(names) or 'none'}), or numbers"
+            raise SettingError(field, must, name, nearest(name, names))
+        state = self.states[name]
+        if missing := [joint for joint in self.joints if joint not in state]:
+            raise SettingError(field, f"a state that tells {', '.join(missing)}", name)
+        return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
+
+
 class Assembly(NamedTuple):
     """A robot, built. Shared and read-only: whoever needs `pin.Data` makes its own."""
 
@@ -60,6 +80,7 @@ class Assembly(NamedTuple):
     tools: tuple[Tool, ...]  # the tool's frame of each arm
     # pairs of bodies' names that are never judged (an SRDF's)
     disabled: frozenset[frozenset[str]]
+    states: tuple[ArmStates, ...]  # the named states of each arm
     # data of `collision.derived_pairs`, attached to the condition; None: there is none
     pairs: bytes | None = None
     # spheres that are given as the covers of bodies, by name: (spheres, 4) middles in the body's
@@ -89,33 +110,6 @@ class Follower(NamedTuple):
     offset: float  # [rad], a length for a prismatic joint
 
 
-class ArmStates(NamedTuple):
-    """The named states of an arm."""
-
-    joints: tuple[str, ...]  # names of the joints that move, in the order of q
-    units: tuple[float, ...]  # of each: degrees, or 1 for lengths [rad, m]
-    # values of joints by their names [rad, m], by the states' names
-    states: dict[str, dict[str, float]]
-
-    def values_of(self, name: str, field: str) -> list[float]:
-        """Return the configuration of a state [deg, m].
-
-        Args:
-            field: That names it, for errors.
-
-        Raises:
-            SettingError: If there is none, or it leaves out a joint.
-        """
-        if name not in self.states:
-            names = sorted(self.states)
-            must = f"a state that the robot's SRDF names ({', '.join(names) or 'none'}), or numbers"
-            raise SettingError(field, must, name, nearest(name, names))
-        state = self.states[name]
-        if missing := [joint for joint in self.joints if joint not in state]:
-            raise SettingError(field, f"a state that tells {', '.join(missing)}", name)
-        return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
-
-
 class ArmParts(NamedTuple):
     """The links, bodies and rules that an arm adds to a robot."""
 
@@ -124,28 +118,18 @@ class ArmParts(NamedTuple):
     tool: Tool | None = None  # its frame; None: at the end of the last link, turned as its joint
     disabled: frozenset[frozenset[str]] = frozenset()  # pairs of bodies that are never judged
     followers: tuple[Follower, ...] = ()  # the joints that follow others
+    states: ArmStates = ArmStates((), (), {})  # those that a file names
+    has_names: bool = False  # whether a file names joints and bodies, which keep these names
 
 
-class Arm:
-    """Base of a part of a robot: joints, bodies, a tool and what a file tells of them."""
-
-    def append_to(self, model: Any, arm: int) -> ArmParts:
-        """Add the joints of the arm of a number to a `pin.Model`; return what comes with them."""
-        raise NotImplementedError
-
-    def own_names(self) -> tuple[set[str], set[str]]:
-        """Return the names of joints and of bodies that a file gives, which are kept; or none."""
-        return set(), set()
-
-    def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states: none, unless a file names some."""
-        return (ArmStates((), (), {}),)
+AppendArm = Callable[[Any, int], ArmParts]
+"""Adds the joints of the arm of a number to a `pin.Model`; returns what comes with them."""
 
 
 class Robot(Component):
     """Base of every robot description: names its arms, which are built together."""
 
-    def chains(self) -> tuple[Arm, ...]:
+    def chains(self) -> tuple[AppendArm, ...]:
         """Return the arms, in the order of their slices of q."""
         raise NotImplementedError
 
@@ -153,10 +137,6 @@ class Robot(Component):
     def wants_pairs(cls, settings: dict[str, Any]) -> bool:
         """Whether plain settings are to be given derived pairs of bodies, as data."""
         return False
-
-    def states(self) -> tuple[ArmStates, ...]:
-        """Return the named states of each arm."""
-        return tuple(own for chain in self.chains() for own in chain.states())
 
     def notes(self) -> list[str]:
         """Remark on what the description leaves open."""
@@ -167,31 +147,49 @@ class Robot(Component):
         return assembled(self.chains())
 
 
-def assembled(arms: tuple[Arm, ...]) -> Assembly:
+class Chain(Robot):
+    """Base of a single arm, which can stand as a robot of its own."""
+
+    def append_to(self, model: Any, arm: int) -> ArmParts:
+        """Add the joints of the arm of a number to a `pin.Model`; return what comes with them."""
+        raise NotImplementedError
+
+    def chains(self) -> tuple[AppendArm, ...]:
+        """Return the arm itself."""
+        return (self.append_to,)
+
+
+def assembled(arms: tuple[AppendArm, ...]) -> Assembly:
     """Append arms to one model, with q = (arm 0, arm 1, …)."""
     model, geometry = pin.Model(), pin.GeometryModel()
-    links: list[Link] = []
-    disabled: set[frozenset[str]] = set()
-    followers: list[Follower] = []
-    slices, body_arms, tools = [], [], []
-    for k, (arm, is_prefixed) in enumerate(zip(arms, _needs_prefix(arms), strict=True)):
-        first, prefix = model.njoints, f"arm_{k + 1}_" if is_prefixed else ""
-        parts = arm.append_to(model, k)
+    parts: list[ArmParts] = []
+    slices, bodies, names = [], [], list[str]()
+    for k, append in enumerate(arms):
+        first = model.njoints
+        parts.append(append(model, k))
         check_size(model)  # before bodies are added, which takes ever longer
-        if any(arm.own_names()):
-            for joint in range(first, model.njoints):
-                model.names[joint] = prefix + str(model.names[joint]).removeprefix(f"arm_{k}_")
-        bodies = parts.bodies
-        for body in [link_capsule(link, "") for link in parts.links] if bodies is None else bodies:
+        slices.append((first, model.njoints))
+        own, links = parts[k].bodies, parts[k].links
+        bodies.append([link_capsule(link, "") for link in links] if own is None else own)
+        if parts[k].has_names:
+            joints = [model.names[joint] for joint in range(*slices[k])]
+            names += [f"joint {str(name).removeprefix(f'arm_{k}_')}" for name in joints]
+            names += [f"body {body.name}" for body in bodies[k]]
+    # of several arms, all have a prefix where names would be the same, else those without names
+    is_double = len(set(names)) < len(names)
+    tools, disabled, body_arms = [], set[frozenset[str]](), []
+    for k, part in enumerate(parts):
+        is_prefixed = len(arms) > 1 and (is_double or not part.has_names)
+        prefix = f"arm_{k + 1}_" if is_prefixed else ""
+        for joint in range(*slices[k]) if part.has_names else ():
+            model.names[joint] = prefix + str(model.names[joint]).removeprefix(f"arm_{k}_")
+        for body in bodies[k]:
             body.name = prefix + body.name if body.name else f"link_{geometry.ngeoms}"
             geometry.addGeometryObject(body)
             body_arms.append(k)
-        links += parts.links
-        tools.append(parts.tool or Tool(links[-1].joint, np.eye(3), links[-1].end))
-        disabled |= {frozenset(prefix + name for name in pair) for pair in parts.disabled}
-        followers += parts.followers
-        slices.append((first, model.njoints))
-    for follower in followers:
+        tools.append(part.tool or Tool(part.links[-1].joint, np.eye(3), part.links[-1].end))
+        disabled |= {frozenset(prefix + name for name in pair) for pair in part.disabled}
+    for follower in (follower for part in parts for follower in part.followers):
         model = pin.transformJointIntoMimic(
             model, follower.source, follower.joint, follower.multiplier, follower.offset
         )
@@ -200,31 +198,14 @@ def assembled(arms: tuple[Arm, ...]) -> Assembly:
     return Assembly(
         model,
         geometry,
-        tuple(links),
+        tuple(link for part in parts for link in part.links),
         np.stack([ends[:-1], ends[1:]], axis=1).astype(np.int64),
         kinematic_table(model),
         tuple(body_arms),
         tuple(tools),
         frozenset(disabled),
+        tuple(part.states for part in parts),
     )
-
-
-def _needs_prefix(arms: tuple[Arm, ...]) -> list[bool]:
-    """Return which arms' names get the arm's number before them: where names would be the same."""
-    names = [arm.own_names() for arm in arms]
-    several = [
-        sum(len(each[kind]) for each in names) > len(set[str]().union(*(n[kind] for n in names)))
-        for kind in range(2)
-    ]
-    return [len(arms) > 1 and (any(several) or not any(own)) for own in names]
-
-
-class Chain(Arm, Robot):
-    """Base of a single arm, which can stand as a robot of its own."""
-
-    def chains(self) -> tuple[Arm, ...]:
-        """Return the arm itself."""
-        return (self,)
 
 
 def link_capsule(link: Link, name: str) -> Any:

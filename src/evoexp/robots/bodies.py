@@ -62,18 +62,10 @@ AnyBody = Annotated[SphereBody | BoxBody | CapsuleBody | CylinderBody, Field(dis
 
 
 def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
-    """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`.
-
-    Args:
-        field: Its name in the configuration, for errors.
-
-    Raises:
-        SettingError: If the ends of a capsule or cylinder coincide.
-    """
-    if isinstance(body, SphereBody):
-        return coal.Sphere(body.radius), pin.SE3(np.eye(3), np.array(body.center))
-    if isinstance(body, BoxBody):
-        return coal.Box(*body.size), pin.SE3(np.eye(3), np.array(body.center))
+    """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`."""
+    if isinstance(body, SphereBody | BoxBody):
+        shape = coal.Sphere(body.radius) if isinstance(body, SphereBody) else coal.Box(*body.size)
+        return shape, pin.SE3(np.eye(3), np.array(body.center))
     assert isinstance(body, CapsuleBody | CylinderBody)
     start, end = np.array(body.start), np.array(body.end)
     reach = length(end - start)

@@ -1,11 +1,15 @@
-"""Which joints of a URDF move, in which arm, and where the others stand."""
+"""Which joints of a URDF move, in which arm, where the others stand, and what is left open."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.srdf import Srdf
+from evoexp.robots.mesh_checks import unit_of
 from evoexp.robots.urdf_model import BASE, coordinate_names
 from evoexp.robots.urdf_reading import Mimic, UrdfJoint
+from evoexp.robots.urdf_settings import PATH, UrdfSettings
+
+LIMIT_SETTINGS = {"revolute": ("turn_limit", "deg"), "prismatic": ("slide_limit", "m")}
 
 
 class JointRoles(NamedTuple):
@@ -15,33 +19,18 @@ class JointRoles(NamedTuple):
     # of joints that follow others, by their names; the source is one that moves of its own, or that
     # stands
     rules: dict[str, Mimic]
-    tips: tuple[str, ...]  # the link at the end of each arm, empty where nothing names one
+    # the frame of each arm's tool, empty where nothing names one, and the field that chose it
+    tips: tuple[tuple[str, str], ...]
+
+    @property
+    def moving(self) -> frozenset[str]:
+        """Names of the coordinates that move of their own."""
+        return frozenset[str]().union(*self.arms)
 
 
-def joint_roles(
-    joints: dict[str, UrdfJoint],
-    srdf: Srdf | None,
-    names: tuple[str, ...],
-    groups: tuple[str, ...],
-    base: str,
-    *,
-    several: bool,
-) -> JointRoles:
-    """Choose the joints that move: those named, those of groups, or all.
-
-    Args:
-        joints: Of the URDF.
-        srdf: Its groups; None: there are none.
-        names: Joints that are named.
-        groups: Groups that are named, an arm each.
-        base: Whether planar and floating joints move, and whether the root does: see `JointRules`.
-        several: Whether `robot.groups` named them, for errors.
-
-    Raises:
-        SettingError: If a joint or group is not there, cannot move of its own, or belongs to two
-            arms.
-    """
-    rules = {name: _to_the_end(joint, joints) for name, joint in joints.items() if joint.mimic}
+def joint_roles(robot: UrdfSettings) -> JointRoles:
+    """Choose the joints that move: those named, those of groups, or all."""
+    joints, srdf, base = robot.file.joints, robot.semantics, robot.base
     free = {
         name: coordinate_names(name, joint.kind)
         for name, joint in joints.items()
@@ -49,60 +38,53 @@ def joint_roles(
         and joint.kind != "fixed"
         and (base != "fixed" or joint.kind not in ("planar", "floating"))
     }
-    if names:
-        given = "robot.group" if not several else "robot.groups"
+    groups = {f"robot.groups[{k}]": group for k, group in enumerate(robot.groups)}
+    if robot.group and not groups:
+        groups = {"robot.group": robot.group}
+    if robot.joints:
         if groups:
-            raise SettingError("robot.joints", f"left out beside {given}", list(names))
-        arms = [{part for name in names for part in free[_free(name, joints, free)]}]
+            must = f"left out beside {'robot.groups' if robot.groups else 'robot.group'}"
+            raise SettingError("robot.joints", must, list(robot.joints))
+        arms = [{part for name in robot.joints for part in free[_free(name, joints, free)]}]
     elif groups:
         if srdf is None:
             raise SettingError("robot.srdf", "given: it tells the joints of a group", None)
         arms = []
-        for k, group in enumerate(groups):
-            field = f"robot.groups[{k}]" if several else "robot.group"
-            members = srdf.group_joints(group, field)
-            own = {part for name in members & free.keys() for part in free[name]}
-            if not own:
+        for field, group in groups.items():
+            members = srdf.group_joints(group, field) & free.keys()
+            if not members:
                 raise SettingError(field, "a group with a joint that moves", group)
-            arms.append(own)
+            arms.append({part for name in members for part in free[name]})
     else:
         arms = [{part for parts in free.values() for part in parts}]
     if base in ("planar", "floating"):
         arms[0] |= set(coordinate_names(BASE, base))
     if not all(arms):
-        raise SettingError("robot.path", "a URDF with a joint that moves", None)
+        raise SettingError(PATH, "a URDF with a joint that moves", None)
     for k, arm in enumerate(arms):
         for other in arms[:k]:
             if shared := sorted(arm & other):
                 must = "groups that have no joint in common"
                 raise SettingError("robot.groups", must, ", ".join(shared))
-    tips = tuple(srdf.tip(group) for group in groups) if srdf is not None and groups else ("",)
-    return JointRoles(tuple(frozenset(arm) for arm in arms), rules, tips)
+    tips = [srdf.tip(group) for group in groups.values()] if srdf is not None and groups else [""]
+    rules = {
+        name: _whole_rule(joint.mimic, joints) for name, joint in joints.items() if joint.mimic
+    }
+    return JointRoles(tuple(map(frozenset, arms)), rules, _tool_frames(robot, tips))
 
 
-def standing_values(
-    fixed: tuple[tuple[str, float], ...], joints: dict[str, UrdfJoint], roles: JointRoles
-) -> dict[str, float]:
-    """Check the values that are given to joints that stand still.
-
-    Raises:
-        SettingError: If a joint is not there, moves, follows another or has no coordinate.
-    """
-    moving = frozenset[str]().union(*roles.arms)
-    for name, value in fixed:
-        if name not in joints:
-            names = sorted(set(joints) - moving)
-            must = "the names of joints that stand still"
-            raise SettingError("robot.fixed", must, name, nearest(name, names))
-        if name in moving:
-            raise SettingError(f"robot.fixed.{name}", "left out: this joint moves", value)
-        if (rule := roles.rules.get(name)) is not None:
-            must = f"left out: this joint follows '{rule.source}'"
-            raise SettingError(f"robot.fixed.{name}", must, value)
-        if joints[name].kind in ("fixed", "planar", "floating"):
-            must = f"left out: a {joints[name].kind} joint has no value"
-            raise SettingError(f"robot.fixed.{name}", must, value)
-    return dict(fixed)
+def _tool_frames(robot: UrdfSettings, tips: list[str]) -> tuple[tuple[str, str], ...]:
+    """Return the frame of each arm's tool, the tip of its group if none is named, and the field."""
+    if robot.tool_frame and robot.groups:
+        raise SettingError("robot.tool_frame", "left out beside robot.groups", robot.tool_frame)
+    if robot.tool_frame:
+        return ((robot.tool_frame, "robot.tool_frame"),)
+    if not robot.tool_frames:
+        return tuple((name, "robot.srdf") for name in tips)
+    if len(robot.tool_frames) != len(robot.groups):
+        must = f"a frame per group ({len(robot.groups)})"
+        raise SettingError("robot.tool_frames", must, list(robot.tool_frames))
+    return tuple((name, f"robot.tool_frames[{k}]") for k, name in enumerate(robot.tool_frames))
 
 
 def _free(name: str, joints: dict[str, UrdfJoint], free: dict[str, tuple[str, ...]]) -> str:
@@ -118,14 +100,70 @@ def _free(name: str, joints: dict[str, UrdfJoint], free: dict[str, tuple[str, ..
     raise SettingError("robot.joints", must, f"'{name}', which is {joint.kind}")
 
 
-def _to_the_end(joint: UrdfJoint, joints: dict[str, UrdfJoint]) -> Mimic:
+def _whole_rule(rule: Mimic, joints: dict[str, UrdfJoint]) -> Mimic:
     """Join the rules of joints that follow followers, to one of the joint that leads them all."""
-    assert joint.mimic is not None
-    rule = joint.mimic
     while (before := joints[rule.source].mimic) is not None:
-        rule = Mimic(
-            before.source,
-            rule.multiplier * before.multiplier,
-            rule.multiplier * before.offset + rule.offset,
-        )
+        offset = rule.multiplier * before.offset + rule.offset
+        rule = Mimic(before.source, rule.multiplier * before.multiplier, offset)
     return rule
+
+
+def standing_values(robot: UrdfSettings, roles: JointRoles) -> dict[str, float]:
+    """Return the values [deg, m] that are given to joints that stand still."""
+    for joint, setting, _ in _limited_joints(robot, roles):
+        if joint.limits != (None, None) and not any(joint.limits):
+            must = "a URDF whose moving joints have room between their limits"
+            hint = f"; without limits robot.{setting} holds, and robot.joints leaves it standing"
+            raise SettingError(PATH, must, f"joint '{joint.name}': 0 to 0", hint)
+    joints = robot.file.joints
+    for name, value in robot.fixed:
+        if name not in joints:
+            names = sorted(set(joints) - roles.moving)
+            must = "the names of joints that stand still"
+            raise SettingError("robot.fixed", must, name, nearest(name, names))
+        must = ""
+        if name in roles.moving:
+            must = "left out: this joint moves"
+        elif name in roles.rules:
+            must = f"left out: this joint follows '{roles.rules[name].source}'"
+        elif joints[name].kind in ("fixed", "planar", "floating"):
+            must = f"left out: a {joints[name].kind} joint has no value"
+        if must:
+            raise SettingError(f"robot.fixed.{name}", must, value)
+    return dict(robot.fixed)
+
+
+def urdf_notes(robot: UrdfSettings) -> Iterator[str]:
+    """Yield a remark on each of the things that a URDF leaves open: bodies, limits, units."""
+    file, roles = robot.file, joint_roles(robot)
+    above, bare = {joint.child: joint for joint in file.joints.values()}, []
+    for link in (link for link, bodies in file.links.items() if not bodies):
+        carried, name = robot.base in ("planar", "floating"), link
+        while not carried and (joint := above.get(name)) is not None:
+            source = roles.rules[joint.name].source if joint.name in roles.rules else joint.name
+            names = {source, *coordinate_names(source, joint.kind)}
+            carried, name = not roles.moving.isdisjoint(names), joint.parent
+        bare += [link] if carried else []
+    if bare:
+        yield f"links that move and have no body: {', '.join(bare)}"
+    for joint, setting, unit in _limited_joints(robot, roles):
+        sides = zip(("lower", "upper"), joint.limits, strict=True)
+        absent = [side for side, limit in sides if limit is None]
+        if len(absent) == 2:
+            most = f"robot.{setting} holds, {getattr(robot, setting):g} {unit} to either side"
+            yield f"joint '{joint.name}': the URDF gives no limits; {most}"
+        elif absent:
+            yield f"joint '{joint.name}': the URDF gives no {absent[0]} limit, which counts as 0"
+    for mesh in robot.meshes:
+        if (metres := unit_of(mesh.file.content, mesh.name)) != 1.0:
+            yield (
+                f"mesh '{mesh.name}': its unit is {metres:g} m, its numbers are taken in metres, "
+                f'as by Pinocchio; scale="{metres:g} {metres:g} {metres:g}" turns them'
+            )
+
+
+def _limited_joints(robot: UrdfSettings, roles: JointRoles) -> Iterator[tuple[UrdfJoint, str, str]]:
+    """Yield the joints between limits that move of their own, with the setting without them."""
+    for joint in robot.file.joints.values():
+        if joint.kind in LIMIT_SETTINGS and joint.name in roles.moving:
+            yield joint, *LIMIT_SETTINGS[joint.kind]

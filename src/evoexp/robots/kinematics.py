@@ -57,7 +57,11 @@ class KinematicTable(NamedTuple):
     # not if a joint follows another
     planar: bool
     free: BoolArray  # (joints,) whether a joint has a coordinate of its own, and follows no other
-    num_coordinates: int  # number of values of a configuration
+
+    @property
+    def num_coordinates(self) -> int:
+        """Number of values of a configuration."""
+        return int(self.free.sum())
 
     @property
     def chain(self) -> KinematicChain:
@@ -67,17 +71,12 @@ class KinematicTable(NamedTuple):
     @property
     def slides(self) -> BoolArray:
         """(nq,) whether a coordinate is a length, that of a joint that slides."""
-        found = np.zeros(self.num_coordinates, dtype=np.bool_)
-        found[self.index_q[self.free]] = self.prismatic[self.free]
-        return found
+        slides = np.zeros(self.num_coordinates, dtype=np.bool_)
+        slides[self.index_q[self.free]] = self.prismatic[self.free]
+        return slides
 
     def local(self, joint: int, point: FloatArray) -> FloatArray:
-        """Express a point, given in Pinocchio's frame of a joint, in the table's frame of it.
-
-        Args:
-            joint: Pinocchio's index of the joint, at least 1.
-            point: (3,) [length unit].
-        """
+        """Express a point (3,), given in Pinocchio's frame of a joint (1, …), in the table's."""
         return matrix_product(self.alignment[joint - 1].T, point)
 
 
@@ -92,81 +91,52 @@ def kinematic_table(model: Any) -> KinematicTable:
     data = model.createData()
     neutral = pin.neutral(model)
     pin.computeJointJacobians(model, data, neutral)
-    num_joints = model.njoints - 1
-    alignment = np.empty((num_joints, 3, 3))
-    prismatic = np.zeros(num_joints, dtype=np.bool_)
-    rotation, translation = np.empty((num_joints, 9)), np.empty((num_joints, 3))
-    parent = np.array([model.parents[j] - 1 for j in range(1, model.njoints)], dtype=np.int64)
-    for k in range(num_joints):
-        axis, prismatic[k] = _axis(model, data, neutral, k + 1)
+    count = model.njoints - 1
+    parent = np.array(list(model.parents)[1:], dtype=np.int64) - 1
+    index_q = np.array(list(model.idx_qs)[1:], dtype=np.int64)
+    rules = [_followed_rule(model, joint) for joint in range(1, model.njoints)]
+    free = np.array([own is None for own in rules], dtype=np.bool_)
+    rule = np.array([own or (1.0, 0.0) for own in rules]).reshape(-1, 2)
+    alignment, prismatic = np.empty((count, 3, 3)), np.zeros(count, dtype=np.bool_)
+    rotation, translation = np.empty((count, 9)), np.empty((count, 3))
+    for k in range(count):
+        if free[k]:
+            axis, prismatic[k] = _free_axis(model, data, k + 1)
+        else:  # Pinocchio's motion subspace of such a joint is its own times the multiplier
+            axis, prismatic[k] = own_axis(model, k + 1)
+            axis = axis / rule[k, 0]
         alignment[k] = _frame_with_z(axis)
-        before = alignment[parent[k]] if parent[k] >= 0 else np.eye(3)
+        before = alignment[parent[k]].T if parent[k] >= 0 else np.eye(3)
         placement = model.jointPlacements[k + 1]
-        rotation[k] = matrix_product(
-            matrix_product(before.T, placement.rotation), alignment[k]
-        ).ravel()
-        translation[k] = matrix_product(before.T, placement.translation)
-    joints = range(1, model.njoints)
-    rule = np.array([_rule(model, joint) for joint in joints]).reshape(-1, 2)
-    free = np.array([not _follows(model, joint) for joint in joints], dtype=np.bool_)
-    turned = np.array(
-        [not np.array_equal(matrix, np.eye(3).ravel()) for matrix in rotation], dtype=np.bool_
-    )
-    index_q = np.array([model.idx_qs[j] for j in range(1, model.njoints)], dtype=np.int64)
-    planar = (
-        bool(free.all())
-        and not prismatic.any()
-        and all(_keeps_plane(matrix) for matrix in rotation)
-    )
+        turn = matrix_product(matrix_product(before, placement.rotation), alignment[k])
+        rotation[k], translation[k] = turn.ravel(), matrix_product(before, placement.translation)
+    turned = (rotation != np.eye(3).ravel()).any(axis=1)
+    # placements map z to z exactly
+    rows, z = rotation.reshape(-1, 3, 3), np.array([0.0, 0.0, 1.0])
+    is_flat = (rows[:, 2] == z).all() and (rows[:, :, 2] == z).all()
+    planar = bool(free.all() and not prismatic.any() and is_flat)
     return KinematicTable(
-        parent,
-        index_q,
-        prismatic,
-        turned,
-        rotation,
-        translation,
-        rule,
-        alignment,
-        planar,
-        free,
-        int(free.sum()),
+        parent, index_q, prismatic, turned, rotation, translation, rule, alignment, planar, free
     )
-
-
-def _follows(model: Any, joint: int) -> bool:
-    """Whether a joint follows another, and has no coordinate of its own."""
-    return bool(model.joints[joint].shortname() == "JointModelMimic")
-
-
-def _rule(model: Any, joint: int) -> tuple[float, float]:
-    """Return multiplier and offset of a joint's value, of its coordinate or that of its source."""
-    if not _follows(model, joint):
-        return 1.0, 0.0
-    mimic = model.joints[joint].extract()
-    return float(mimic.scaling), float(mimic.offset)
 
 
 def check_size(model: Any) -> None:
-    """Refuse a model of more joints than `MAX_JOINTS`.
-
-    Raises:
-        SettingError: If there are more.
-    """
+    """Refuse a model of more joints than `MAX_JOINTS`."""
     if model.njoints - 1 > MAX_JOINTS:
         raise SettingError("robot", f"of at most {MAX_JOINTS} joints", model.njoints - 1)
 
 
-def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[FloatArray, bool]:
-    """Return a joint's axis in its own frame, and whether it slides.
+def _followed_rule(model: Any, joint: int) -> tuple[float, float] | None:
+    """Return multiplier and offset by which a joint follows another; None: it moves of its own."""
+    if model.joints[joint].shortname() != "JointModelMimic":
+        return None
+    mimic = model.joints[joint].extract()
+    return float(mimic.scaling), float(mimic.offset)
 
-    Raises:
-        UnsupportedJoint: If it has not exactly one coordinate, or turns and slides at once.
-    """
+
+def _free_axis(model: Any, data: Any, joint: int) -> tuple[FloatArray, bool]:
+    """Return the axis (3,) of a joint in its own frame, and whether it slides."""
     name = model.names[joint]
-    if _follows(model, joint):
-        # Pinocchio's motion subspace of such a joint is its own times the multiplier
-        axis, slides = own_axis(model, joint)
-        return axis / _rule(model, joint)[0], slides
     if model.nqs[joint] != 1 or model.nvs[joint] != 1:
         kind = model.joints[joint].shortname()
         raise UnsupportedJoint(
@@ -183,12 +153,7 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
 
 
 def own_axis(model: Any, joint: int) -> tuple[FloatArray, bool]:
-    """Return the axis (3,) of a joint of one coordinate by its motion subspace; whether it slides.
-
-    Args:
-        model: The joint's.
-        joint: Its index.
-    """
+    """Return the axis (3,) of a joint by its motion subspace, and whether it slides."""
     data = model.joints[joint].createData()
     model.joints[joint].calc(data, pin.neutral(model))
     motion = np.reshape(data.S, 6)
@@ -205,9 +170,3 @@ def _frame_with_z(axis: FloatArray) -> FloatArray:
     x = np.cross(np.eye(3)[np.argmin(np.abs(unit))], unit)
     x /= length(x)
     return np.column_stack([x, np.cross(unit, x), unit])
-
-
-def _keeps_plane(matrix: FloatArray) -> bool:
-    """Whether a placement's rotation maps z to z exactly."""
-    rows = matrix.reshape(3, 3)
-    return bool(rows[2, 2] == 1.0 and not rows[:2, 2].any() and not rows[2, :2].any())

@@ -44,28 +44,18 @@ def whole_mesh(content: bytes, name: str, field: str) -> bytes:
 
     Args:
         name: By which the URDF names it.
-        field: That names the URDF, for errors.
-
-    Raises:
-        SettingError: If it is another file than its name says, is damaged, has no triangles, or has
-            parts that coal does not read rightly.
     """
     ending = Path(name).suffix.lower()
     reason = stand_in(content) or _damage(content, ending)
     if not reason and ending == ".obj" and PECULIAR.search(content):
         plain = _one_part(content)
         content = content if _same(content, plain, name, field) else plain
-    if not reason and ending == ".dae" and _is_joined_wrongly(content, name, field):
+    several = ending == ".dae" and len(DAE_PARTS.findall(content)) > 2
+    if not reason and several and unused_vertices(load(content, name, field)):
         reason = "parts whose triangles coal joins to other vertices (save it as one mesh, an STL)"
     if reason:
         raise SettingError(field, "a URDF whose meshes can be read", f"'{name}': {reason}")
     return content
-
-
-def _is_joined_wrongly(content: bytes, name: str, field: str) -> bool:
-    """Whether a DAE has several parts, and coal reads them wrongly."""
-    several = len(DAE_PARTS.findall(content)) > 2
-    return several and unused_vertices(load(content, name, field)) > 0
 
 
 def _same(content: bytes, plain: bytes, name: str, field: str) -> bool:
@@ -80,12 +70,7 @@ def _same(content: bytes, plain: bytes, name: str, field: str) -> bool:
 def mesh_shape(
     content: bytes, name: str, scale: tuple[float, ...], field: str, *, hull: bool
 ) -> Any:
-    """Return a mesh as a coal shape of triangles, or as its convex hull.
-
-    Raises:
-        SettingError: If it cannot be read, or has vertices that are no numbers or, as a shape of
-            triangles, vertices that no triangle ends in.
-    """
+    """Return a mesh as a coal shape of triangles, or as its convex hull."""
     mesh, reason = load(content, name, field, scale), ""
     if not np.isfinite(mesh.vertices()).all():
         reason = "a vertex that is no finite number"
@@ -104,9 +89,6 @@ def load(content: bytes, name: str, field: str, scale: tuple[float, ...] = (1.0,
 
     Args:
         name: By which the URDF names it; its ending tells the format.
-
-    Raises:
-        SettingError: If it cannot be read.
     """
     ending = Path(name).suffix.lower()
     if ending not in MESHES:

@@ -38,15 +38,14 @@ def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> 
         content: Of the mesh's file.
         ending: Of its name, such as `.stl`.
         how: "hulls": its convex hull is the only piece.
-        field: The setting, for errors.
-
-    Raises:
-        SettingError: If CoACD is not installed, or the mesh cannot be read or has no inside.
     """
     if how == "hulls":
-        corners, _ = loaded_mesh(content, ending, field)
-        return _written([corners], field)
-    coacd = _coacd(field)
+        return _written([loaded_mesh(content, ending, field)[0]], field)
+    try:
+        import coacd  # an extra: only those who cut meshes need it
+    except ImportError:
+        must = "hulls, or coacd with it installed (pip install 'evoexp[meshes]')"
+        raise SettingError(field, must, "coacd") from None
     key = hashlib.sha256(content)
     key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, version("coacd"))).encode())
     kept = cache_root() / "pieces" / f"{key.hexdigest()}.obj"
@@ -64,11 +63,7 @@ def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> 
 
 
 def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, IntArray]:
-    """Return the corners (corners, 3) and triangles (triangles, 3) of a mesh's file.
-
-    Raises:
-        SettingError: If it cannot be read.
-    """
+    """Return the corners (corners, 3) and triangles (triangles, 3) of a mesh's file."""
     mesh = load(content, f"mesh{ending}", field)
     corners = np.asarray(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
     return corners, triangles_of(mesh)
@@ -79,10 +74,6 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
 
     Args:
         scale: (3,) by which the URDF scales the mesh.
-        field: The setting, for errors.
-
-    Raises:
-        SettingError: If it is none of these files.
     """
     pieces: list[tuple[list[list[float]], list[list[int]]]] = []
     try:
@@ -107,11 +98,7 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
 
 
 def convex_shape(corners: FloatArray, faces: Sequence[Sequence[int]] | IntArray) -> Any:
-    """Return a convex coal shape.
-
-    Args:
-        corners: (corners, 3).
-        faces: (triangles, 3) indices of corners, turned outward.
+    """Return a convex coal shape of corners (corners, 3) and triangles (3), turned outward.
 
     Raises:
         ValueError: If they are no body.
@@ -128,32 +115,16 @@ def convex_shape(corners: FloatArray, faces: Sequence[Sequence[int]] | IntArray)
     return coal.Convex(points, triangles)
 
 
-def _coacd(field: str) -> Any:
-    try:
-        import coacd  # an extra: only those who cut meshes need it
-    except ImportError:
-        must = "hulls, or coacd with it installed (pip install 'evoexp[meshes]')"
-        raise SettingError(field, must, "coacd") from None
-    return coacd
-
-
 def _written(pieces: list[FloatArray], field: str) -> bytes:
-    """Return the convex hulls of pieces as an OBJ file.
-
-    Raises:
-        SettingError: If none has an inside.
-    """
+    """Return the convex hulls of pieces as an OBJ file; those without an inside are left out."""
     lines: list[str] = []
-    before = 0
-    for points in pieces:
-        hull = hull_of(points)
-        if hull is None:
-            continue
+    before = number = 0
+    for hull in filter(None, map(hull_of, pieces)):
         corners, triangles = hull
-        lines.append(f"o piece_{sum(line[0] == 'o' for line in lines)}")
+        lines.append(f"o piece_{number}")
         lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (triangles + (1 + before)).tolist()]
-        before += len(corners)
+        before, number = before + len(corners), number + 1
     if not lines:
         raise SettingError(field, "left out for meshes without an inside", "coacd or hulls")
     return ("\n".join(lines) + "\n").encode()

@@ -44,9 +44,8 @@ class MobileArm(Chain):
                 check_range(f"{name}[{k}]", limits)
         length, height = self.platform_size
         if length <= height:
-            raise SettingError(
-                "platform_size", "[length, height] with length > height", [length, height]
-            )
+            must = "[length, height] with length > height"
+            raise SettingError("platform_size", must, [length, height])
         return self
 
     @property

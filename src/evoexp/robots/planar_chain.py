@@ -30,15 +30,11 @@ class PlanarChain(Chain):
 
     @model_validator(mode="after")
     def _limits_fit(self) -> Self:
-        if self.joint_limits is None:
-            return self
-        if len(self.joint_limits) != len(self.link_lengths):
-            raise SettingError(
-                "joint_limits",
-                f"one pair per link ({len(self.link_lengths)})",
-                len(self.joint_limits),
-            )
-        for k, limits in enumerate(self.joint_limits):
+        limits_of = self.joint_limits or ()
+        if self.joint_limits is not None and len(limits_of) != len(self.link_lengths):
+            must = f"one pair per link ({len(self.link_lengths)})"
+            raise SettingError("joint_limits", must, len(limits_of))
+        for k, limits in enumerate(limits_of):
             check_range(f"joint_limits[{k}]", limits)
         return self
 
@@ -52,14 +48,14 @@ class PlanarChain(Chain):
         for k, length in enumerate(self.link_lengths):
             parent = model.addJoint(parent, pin.JointModelRZ(), placement, f"arm_{arm}_joint_{k}")
             if self.joint_limits is not None:
+                low, high = self.joint_limits[k]
                 model.lowerPositionLimit[parent - 1], model.upperPositionLimit[parent - 1] = (
-                    self.joint_limits[k]
+                    low,
+                    high,
                 )
-            links.append(
-                Link(arm, parent, np.zeros(3), np.array([length, 0.0, 0.0]), self.link_radius)
-            )
-            placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+            tip = np.array([length, 0.0, 0.0])
+            links.append(Link(arm, parent, np.zeros(3), tip, self.link_radius))
+            placement = pin.SE3(np.eye(3), tip)
         if self.tool_radius > 0.0:
-            tip = links[-1].end
             links.append(Link(arm, parent, tip, tip, self.tool_radius))
         return ArmParts(links)

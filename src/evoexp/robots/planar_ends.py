@@ -1,4 +1,4 @@
-"""Link ends of a planar arm along straight joint-space paths, eight individuals at a time.
+"""Link ends of a planar arm along joint-space paths, and postures whose tip is at a place.
 
 Eq. 3 below is that of Lavoie & Boudreau 2001: position j of M is `start + j/M (end − start)`.
 """
@@ -16,6 +16,9 @@ from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import U
 
 VECTOR = U(LANES)
+DAMPING = 1e-3  # [-] of a step, in units of the squared length of the arm
+CLOSE = 1e-9  # [-] of the arm's length: the tip is there
+MOST_STEPS = 200
 
 
 class PlanarArm(NamedTuple):
@@ -28,27 +31,15 @@ class PlanarArm(NamedTuple):
 
 
 def planar_arm(assembly: Assembly) -> PlanarArm:
-    """Return the lengths and the base of a built robot that is one planar arm.
-
-    Raises:
-        SettingError: If it is another robot.
-    """
+    """Return the lengths and the base of a built robot that is one planar arm."""
     table, links = assembly.table, assembly.links
     straight = all(not link.start.any() and not link.end[1:].any() for link in links)
     chained = table.planar and np.array_equal(table.parent, np.arange(len(table.parent)) - 1)
     bent = bool(table.turned[1:].any()) or bool(table.translation[:, 2].any())
-    if (
-        assembly.num_arms != 1
-        or not straight
-        or not chained
-        or bent
-        or len(links) != len(table.parent)
-    ):
-        raise SettingError(
-            "robot",
-            "one planar arm in the plane z = 0",
-            ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices),
-        )
+    is_complete = assembly.num_arms == 1 and len(links) == len(table.parent)
+    if not (straight and chained and is_complete) or bent:
+        was = ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices)
+        raise SettingError("robot", "one planar arm in the plane z = 0", was)
     x, y, _ = table.translation[0]
     angle = float(atan2(table.rotation[0][3], table.rotation[0][0]))
     return PlanarArm(np.array([link.end[0] for link in links]), float(x), float(y), angle)
@@ -104,3 +95,62 @@ def load_lanes(q: FloatArray, lanes: IntArray, first: int, count: int, block: Fl
         source = q[k]
         for n in range(LANES):
             block[U(k) * U(LANES) + U(n)] = source[U(lanes[U(first) + U(n)])]
+
+
+@kernel
+def tip(q: FloatArray, arm: PlanarArm) -> tuple[float, float]:
+    """Return x and y of the tip at q (N,) [rad]."""
+    angle, x, y = arm.base_angle, arm.base_x, arm.base_y
+    for k in range(len(q)):
+        angle += q[k]
+        s, c = sincos(angle)
+        x += arm.lengths[k] * c
+        y += arm.lengths[k] * s
+    return x, y
+
+
+@kernel
+def bring_tip_to(q: FloatArray, target: FloatArray, limits: FloatArray, arm: PlanarArm) -> bool:
+    """Turn the joints until the tip is at a place: damped least squares (Nakamura & Hanafusa 1986).
+
+    A step is Jᵀ (J Jᵀ + λ)⁻¹ e, put back within the limits of the joints.
+
+    Args:
+        q: (N,) posture to begin with [rad], within its limits; changed.
+        target: (2,) where the tip shall be.
+        limits: (N, 2) of the joints [rad].
+
+    Returns:
+        Whether it is there; if not, q is where the last step ended.
+    """
+    count, reach = len(q), 0.0
+    for k in range(count):
+        reach += arm.lengths[k]
+    damping, close = DAMPING * reach * reach, CLOSE * reach
+    x, y = np.empty(count + 1), np.empty(count + 1)
+    for _ in range(MOST_STEPS):
+        # joints and tip
+        angle = arm.base_angle
+        x[0], y[0] = arm.base_x, arm.base_y
+        for k in range(count):
+            angle += q[k]
+            s, c = sincos(angle)
+            x[k + 1] = x[k] + arm.lengths[k] * c
+            y[k + 1] = y[k] + arm.lengths[k] * s
+        off_x, off_y = target[0] - x[count], target[1] - y[count]
+        if off_x * off_x + off_y * off_y <= close * close:
+            return True
+        # J Jᵀ + λ; joint k moves the tip by (−(y − y_k), x − x_k)
+        a, b, d = damping, 0.0, damping
+        for k in range(count):
+            u, v = y[k] - y[count], x[count] - x[k]
+            a += u * u
+            b += u * v
+            d += v * v
+        determinant = a * d - b * b
+        first = (d * off_x - b * off_y) / determinant
+        second = (a * off_y - b * off_x) / determinant
+        for k in range(count):
+            turned = q[k] + (y[k] - y[count]) * first + (x[count] - x[k]) * second
+            q[k] = min(max(turned, limits[k, 0]), limits[k, 1])
+    return False

@@ -29,27 +29,14 @@ def pose_of(rotation: Any, position: Any) -> FloatArray:
 
 
 def local_pose(table: KinematicTable, joint: int, rotation: Any, position: Any) -> FloatArray:
-    """Express a pose, given in Pinocchio's frame of a joint, in the table's frame of it, (12,).
-
-    Args:
-        table: The robot's kinematic table.
-        joint: Pinocchio's index of the joint, at least 1.
-        rotation: (3, 3).
-        position: (3,) [length unit].
-    """
-    return np.asarray(
-        compose(pose_of(table.alignment[joint - 1].T, np.zeros(3)), pose_of(rotation, position))
-    )
+    """Express a pose, given in Pinocchio's frame of a joint (1, …), in the table's frame of it."""
+    turn = pose_of(table.alignment[joint - 1].T, np.zeros(3))
+    return np.asarray(compose(turn, pose_of(rotation, position)))
 
 
 @kernel
 def compose(one: FloatArray, two: FloatArray) -> FloatArray:
-    """Return the pose `two`, given in the frame `one`, in the frame that `one` is given in.
-
-    Args:
-        one: (12,).
-        two: (12,).
-    """
+    """Return the pose `two`, given in the frame `one`, in the frame that `one` is given in."""
     out = np.empty(12)
     for e in range(3):
         a, b, c = one[3 * e], one[3 * e + 1], one[3 * e + 2]
@@ -77,7 +64,6 @@ def frame_poses(
     """Write the pose of one frame in the world for a batch of configurations.
 
     Args:
-        chain: The robot's joints.
         joint: Index into the table of the joint that moves the frame.
         local: (12,) pose of the frame in the table's frame of the joint.
         q: (nq, configurations) [rad], lengths for prismatic joints.
@@ -112,7 +98,6 @@ def frame_pose(table: KinematicTable, joint: int, local: FloatArray, q: FloatArr
     """Return the pose (12,) of one frame in the world at one configuration.
 
     Args:
-        table: The robot's kinematic table.
         joint: Index into the table of the joint that moves the frame; −1: it stands still.
         local: (12,) pose in the table's frame of the joint.
         q: (nq,) [rad], lengths for prismatic joints.

@@ -14,10 +14,6 @@ def robot_file(path: Any, field: str) -> Any:
 
     Args:
         path: As it was given: `example-robot-data:ur_description/urdf/ur5_robot.urdf`, or any path.
-        field: That names it, for errors.
-
-    Raises:
-        SettingError: If the package is not installed, or has no such file.
     """
     if not isinstance(path, str) or not path.startswith(f"{ROBOT_DATA}:"):
         return path

@@ -33,13 +33,9 @@ class SerialJoint(Settings):
 
     def model(self) -> Any:
         """Return Pinocchio's joint model."""
-        axis = np.array(self.axis)
-        unit = axis / np.sqrt(np.sum(axis * axis))
-        return (
-            pin.JointModelPrismaticUnaligned
-            if self.kind == "prismatic"
-            else pin.JointModelRevoluteUnaligned
-        )(unit)
+        slides, axis = self.kind == "prismatic", np.array(self.axis)
+        kind = pin.JointModelPrismaticUnaligned if slides else pin.JointModelRevoluteUnaligned
+        return kind(axis / np.sqrt(np.sum(axis * axis)))
 
 
 class SerialChain(Chain):

@@ -1,7 +1,5 @@
 """An SRDF: groups of joints, named states, end effectors, pairs that are never judged."""
 
-from typing import NamedTuple
-
 from evoexp.errors import SettingError, nearest
 from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint
 from evoexp.robots.xml_files import parsed_xml
@@ -9,41 +7,26 @@ from evoexp.robots.xml_files import parsed_xml
 MOST_GROUPS = 300  # nested in one another
 
 
-class NamedState(NamedTuple):
-    """A configuration that the SRDF names."""
-
-    name: str  # its name
-    group: str  # the group that it is of
-    values: dict[str, float]  # of joints by their names [rad, m]
-
-
 class Srdf:
     """Groups, states and disabled pairs of the robot of a URDF."""
 
     def __init__(self, content: bytes, joints: dict[str, UrdfJoint]) -> None:
-        """Read the text.
-
-        Args:
-            joints: Of the URDF, by their names.
-        """
-        self._root = parsed_xml(content, "robot.srdf", "robot")
+        """Read the text, of the robot that has some joints, by their names."""
+        self._root = root = parsed_xml(content, "robot.srdf", "robot")
         self._joints = joints
         self._above = {joint.child: joint for joint in joints.values()}
-        self._groups = {str(group.get("name")): group for group in self._root.iterfind("group")}
+        self._groups = {str(group.get("name")): group for group in root.iterfind("group")}
         # joints of the groups that were looked up: one may be in many others
         self._joints_of: dict[str, set[str]] = {}
-
-    def group_joints(self, group: str, field: str) -> set[str]:
-        """Find the joints of a group: of its chains, joints, links and groups.
-
-        Args:
-            group: Its name.
-            field: That names it, for errors.
-
-        Raises:
-            SettingError: If there is no such group, or it names something that is not there.
-        """
-        return self._members(group, field, ())
+        # pairs of links that are never judged
+        disabled = root.iterfind("disable_collisions")
+        self.disabled = [(str(pair.get("link1")), str(pair.get("link2"))) for pair in disabled]
+        # the frame to which a virtual joint ties the root, empty where none does: MoveIt's planning
+        # frame is that of a virtual joint that is not fixed (`buildRecursive` in moveit_core's
+        # `robot_model.cpp`)
+        self._virtual = [joint.get("name") for joint in root.iterfind("virtual_joint")]
+        free = (j for j in root.iterfind("virtual_joint") if j.get("type") != "fixed")
+        self.ground = next((str(joint.get("parent_frame")) for joint in free), "")
 
     def tip(self, group: str) -> str:
         """Find the link at the end of a group: of its only chain, or where a hand is mounted.
@@ -63,15 +46,11 @@ class Srdf:
         ]
         return hands[0] if len(hands) == 1 else ""
 
-    def states(self) -> list[NamedState]:
-        """Read the named states.
-
-        Raises:
-            SettingError: If a value is no finite number.
-        """
-        found = []
+    def states(self) -> dict[str, dict[str, float]]:
+        """Return values of joints [rad, m] by the names of states; of several groups, one state."""
+        states: dict[str, dict[str, float]] = {}
         for state in self._root.iterfind("group_state"):
-            values = {}
+            values = states.setdefault(str(state.get("name")), {})
             for joint in state.iterfind("joint"):
                 name, words = str(joint.get("name")), str(joint.get("value")).split()
                 if len(words) != 1:
@@ -80,26 +59,15 @@ class Srdf:
                     must = f"an SRDF whose states are finite numbers, at most {LARGEST:g}"
                     raise SettingError("robot.srdf", must, f"'{words[0]}' of '{name}'")
                 values[name] = float(words[0])
-            found.append(NamedState(str(state.get("name")), str(state.get("group")), values))
-        return found
+        return states
 
-    def ground(self) -> str:
-        """Find the frame to which a virtual joint ties the root; empty where none does.
+    def group_joints(self, group: str, field: str, above: tuple[str, ...] = ()) -> set[str]:
+        """Find the joints of a group: of its chains, joints, links and groups.
 
-        MoveIt's planning frame is that of a virtual joint that is not fixed (`buildRecursive` in
-        moveit_core's `robot_model.cpp`).
+        Args:
+            group: Its name.
+            above: The groups that contain it.
         """
-        free = (j for j in self._root.iterfind("virtual_joint") if j.get("type") != "fixed")
-        return next((str(joint.get("parent_frame")) for joint in free), "")
-
-    def disabled_links(self) -> list[tuple[str, str]]:
-        """List the pairs of links that are never judged."""
-        return [
-            (str(pair.get("link1")), str(pair.get("link2")))
-            for pair in self._root.iterfind("disable_collisions")
-        ]
-
-    def _members(self, group: str, field: str, above: tuple[str, ...]) -> set[str]:
         if group not in self._groups:
             names = list(self._groups)
             must = f"a group of the SRDF ({', '.join(names) or 'it has none'})"
@@ -108,36 +76,30 @@ class Srdf:
             raise SettingError(field, "a group that does not contain itself", group)
         if group in self._joints_of:
             return self._joints_of[group]
-        found: set[str] = set()
+        joints: set[str] = set()
         for part in self._groups[group]:
             match part.tag:
                 case "chain":
-                    found |= self._chain(str(part.get("base_link")), str(part.get("tip_link")))
-                case "joint":
-                    found |= self._joint(str(part.get("name")), group)
+                    joints |= self._chain(str(part.get("base_link")), str(part.get("tip_link")))
+                case "joint" if (name := str(part.get("name"))) in self._joints:
+                    joints.add(name)
+                case "joint" if name not in self._virtual:  # those tie the robot to the world
+                    must = f"an SRDF whose group '{group}' names joints of the URDF"
+                    raise SettingError("robot.srdf", must, name, nearest(name, list(self._joints)))
                 case "link" if (above_it := self._above.get(str(part.get("name")))) is not None:
-                    found.add(above_it.name)
+                    joints.add(above_it.name)
                 case "group":
-                    found |= self._members(str(part.get("name")), field, (*above, group))
-        self._joints_of[group] = found
-        return found
-
-    def _joint(self, name: str, group: str) -> set[str]:
-        """Check that a joint is there; joints that tie the robot to the world are left out."""
-        if name in self._joints:
-            return {name}
-        if name in {joint.get("name") for joint in self._root.iterfind("virtual_joint")}:
-            return set()
-        must = f"an SRDF whose group '{group}' names joints of the URDF"
-        raise SettingError("robot.srdf", must, name, nearest(name, list(self._joints)))
+                    joints |= self.group_joints(str(part.get("name")), field, (*above, group))
+        self._joints_of[group] = joints
+        return joints
 
     def _chain(self, base: str, tip: str) -> set[str]:
-        found, link = set(), tip
+        joints, link = set[str](), tip
         while link != base:
             joint = self._above.get(link)
-            if joint is None or joint.name in found:
+            if joint is None or joint.name in joints:
                 must = "an SRDF whose chains lead from a tip down to a base"
                 raise SettingError("robot.srdf", must, f"'{tip}' does not hang on '{base}'")
-            found.add(joint.name)
+            joints.add(joint.name)
             link = joint.parent
-        return found
+        return joints

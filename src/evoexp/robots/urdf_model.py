@@ -4,18 +4,21 @@ Joints and frames stand in the order in which Pinocchio's own reader puts them: 
 joints on a link by their names.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
-from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfFile, UrdfJoint, repeated
+from evoexp.robots.mesh_checks import mesh_shape
+from evoexp.robots.mesh_pieces import read_pieces
+from evoexp.robots.urdf_reading import LARGEST, UrdfBody, UrdfJoint, read_urdf, repeated
+from evoexp.robots.urdf_settings import PATH, UrdfSettings
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 # the coordinates of planar and floating joints, and their axes in the joint's frame
@@ -36,17 +39,6 @@ UNALIGNED = {
 }
 
 
-class JointRules(NamedTuple):
-    """How joints are taken that have no limits, or several coordinates."""
-
-    continuous_turns: float  # turns of a continuous joint to either side
-    turn_limit: float  # limit to either side of a turning joint that has none [deg]
-    slide_limit: float  # the same of a sliding joint [m]
-    # whether planar and floating joints stand still (fixed) or move (free), or the root moves
-    # besides (planar, floating)
-    base: str
-
-
 class PlacedBody(NamedTuple):
     """A collision body in the frame of a joint."""
 
@@ -61,24 +53,19 @@ def coordinate_names(name: str, kind: str) -> tuple[str, ...]:
     return tuple(f"{name}_{part}" for part in COORDINATES[kind]) if kind in COORDINATES else (name,)
 
 
-def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
-    """Build the `pin.Model` of all joints of a URDF, one coordinate each, or none.
-
-    Raises:
-        SettingError: If the names of two joints or links are the same once joints are parted, or a
-            joint without one limit has no room on that side.
-    """
-    joints = [part for joint in file.joints.values() for part in _parts(joint, rules)]
-    root = file.root
-    if rules.base in COORDINATES:
+def urdf_model(robot: UrdfSettings) -> Any:
+    """Build the `pin.Model` of all joints of a URDF, one coordinate each, or none."""
+    file = robot.file
+    joints, root = list(file.joints.values()), file.root
+    if robot.base in COORDINATES:
         root = f"{BASE}_ground"
-        base = UrdfJoint(BASE, rules.base, root, file.root, axis=Z)
-        joints += _parts(base, rules)
+        joints.append(UrdfJoint(BASE, robot.base, root, file.root, axis=Z))
+    joints = [part for joint in joints for part in _parts(joint, robot)]
     links = [root, *(joint.child for joint in joints)]
     for what, names in {"joint": [joint.name for joint in joints], "link": links}.items():
         if double := repeated(names):
             must = f"a URDF whose {what}s have other names than those that robot.base adds"
-            raise SettingError("robot.path", must, double[0])
+            raise SettingError(PATH, must, double[0])
     on_link: dict[str, list[UrdfJoint]] = {}
     for joint in sorted(joints, key=lambda joint: joint.name, reverse=True):
         on_link.setdefault(joint.parent, []).append(joint)
@@ -102,32 +89,30 @@ def urdf_model(file: UrdfFile, rules: JointRules) -> Any:
     return model
 
 
-def _parts(joint: UrdfJoint, rules: JointRules) -> list[UrdfJoint]:
+def _parts(joint: UrdfJoint, robot: UrdfSettings) -> list[UrdfJoint]:
     """Return a joint with its limits, or joints of one coordinate each in its place."""
-    name, kind = joint.name, joint.kind
-    if kind == "fixed" or (kind in COORDINATES and rules.base == "fixed"):
+    if joint.kind == "fixed" or (joint.kind in COORDINATES and robot.base == "fixed"):
         return [joint._replace(kind="fixed")]
-    if kind not in COORDINATES:
-        return [_limited(joint, rules)]
-    axes = _across(joint.axis) if kind == "planar" else FLOATING
+    if joint.kind not in COORDINATES:
+        return [_limited(joint, robot)]
+    axes = _across(joint.axis) if joint.kind == "planar" else FLOATING
     parts: list[UrdfJoint] = []
-    parent = joint.parent
+    parent, place = joint.parent, joint.placement
     for part, axis in axes.items():
-        link = joint.child if part == list(axes)[-1] else f"{name}_{part}_link"
-        own = "prismatic" if part in ("x", "y", "z") else "revolute"
-        place = joint.placement if not parts else pin.SE3.Identity()
-        added = UrdfJoint(f"{name}_{part}", own, parent, link, place, axis)
-        parts.append(_limited(added, rules))
-        parent = link
+        link = joint.child if part == list(axes)[-1] else f"{joint.name}_{part}_link"
+        kind = "prismatic" if part in ("x", "y", "z") else "revolute"
+        added = UrdfJoint(f"{joint.name}_{part}", kind, parent, link, place, axis)
+        parts.append(_limited(added, robot))
+        parent, place = link, pin.SE3.Identity()
     return parts
 
 
-def _limited(joint: UrdfJoint, rules: JointRules) -> UrdfJoint:
+def _limited(joint: UrdfJoint, robot: UrdfSettings) -> UrdfJoint:
     """Give a joint limits to either side, if it has none or is continuous."""
     setting, most = {
-        "continuous": ("continuous_turns", 360.0 * DEGREE * rules.continuous_turns),
-        "revolute": ("turn_limit", rules.turn_limit * DEGREE),
-        "prismatic": ("slide_limit", rules.slide_limit),
+        "continuous": ("continuous_turns", 360.0 * DEGREE * robot.continuous_turns),
+        "revolute": ("turn_limit", robot.turn_limit * DEGREE),
+        "prismatic": ("slide_limit", robot.slide_limit),
     }[joint.kind]
     low, high = (0.0 if limit is None else limit for limit in joint.limits)
     if joint.kind == "continuous" or joint.limits == (None, None):
@@ -135,7 +120,7 @@ def _limited(joint: UrdfJoint, rules: JointRules) -> UrdfJoint:
     elif max(abs(low), abs(high)) >= UNLIMITED:
         if low >= most or high <= -most:
             must = f"a URDF whose joints have room within robot.{setting}"
-            raise SettingError("robot.path", must, f"joint '{joint.name}': {low:g} to {high:g}")
+            raise SettingError(PATH, must, f"joint '{joint.name}': {low:g} to {high:g}")
         low, high = max(low, -most), min(high, most)
     kind = "prismatic" if joint.kind == "prismatic" else "revolute"
     return joint._replace(kind=kind, limits=(low, high))
@@ -143,12 +128,11 @@ def _limited(joint: UrdfJoint, rules: JointRules) -> UrdfJoint:
 
 def _across(normal: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
     """Choose the axes of a planar joint's coordinates: two across its normal, and the normal."""
-    z = np.array(normal)
-    z /= np.sqrt(np.sum(z * z))
+    z = np.array(normal) / length(np.array(normal))
     x, y = np.eye(3)[0], np.eye(3)[1]
     if z[2] != 1.0:
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-        x /= np.sqrt(np.sum(x * x))
+        x /= length(x)
         y = np.cross(z, x)
     return dict(zip(PLANAR, (tuple(axis.tolist()) for axis in (x, y, z)), strict=True))
 
@@ -163,27 +147,14 @@ def _joint_model(joint: UrdfJoint) -> Any:
 
 
 def placed_bodies(
-    model: Any,
-    links: dict[str, tuple[UrdfBody, ...]],
-    shapes: Callable[[UrdfBody], list[Any]],
-    field: str,
+    robot: UrdfSettings, model: Any, links: dict[str, tuple[UrdfBody, ...]], field: str
 ) -> Iterator[PlacedBody]:
-    """Yield the collision bodies in the order of the model's links.
-
-    Args:
-        model: Of `urdf_model`.
-        links: The bodies of each link.
-        shapes: Returns the coal shapes of a body, several where a mesh is cut into pieces.
-        field: That names the file, for errors.
-
-    Raises:
-        SettingError: If a body reaches too far.
-    """
+    """Yield the collision bodies of links in the order of the model's links."""
     for frame in model.frames:
         if frame.type != pin.FrameType.BODY:
             continue
         for body in links.get(frame.name, ()):
-            for shape in shapes(body):
+            for shape in _shapes(robot, body):
                 shape.computeLocalAABB()
                 reach = np.abs(body.placement.translation).max() + shape.aabb_radius
                 if not 0.0 <= reach <= LARGEST:
@@ -193,28 +164,49 @@ def placed_bodies(
                 yield PlacedBody(str(frame.name), int(frame.parentJoint), place, shape)
 
 
-def primitive_shape(body: UrdfBody) -> Any:
-    """Return a body that is no mesh as a coal shape."""
-    shapes = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
-    return shapes.get(body.kind, coal.Capsule)(*body.sizes)
+def _shapes(robot: UrdfSettings, body: UrdfBody) -> list[Any]:
+    """Return the coal shapes of a body, several where a mesh is cut into pieces."""
+    if body.mesh is None:
+        shapes = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
+        return [shapes.get(body.kind, coal.Capsule)(*body.sizes)]
+    names = [mesh.name for mesh in robot.meshes]
+    if body.mesh not in names:
+        must = "those that the URDF names"
+        raise SettingError("robot.meshes", must, f"without '{body.mesh}'")
+    k, is_hull = names.index(body.mesh), body.kind == "convex"
+    content, pieces = robot.meshes[k].file.content, robot.meshes[k].pieces
+    if robot.decomposition is None:
+        return [mesh_shape(content, names[k], body.sizes, f"robot.meshes[{k}]", hull=is_hull)]
+    if pieces is None:
+        raise SettingError("robot.meshes", "given with their pieces", None)
+    return read_pieces(pieces.content, np.array(body.sizes), "robot.meshes")
 
 
-def spheres_of_bodies(bodies: list[PlacedBody], spheres: list[PlacedBody]) -> list[FloatArray]:
-    """Give the spheres of each link to the bodies of that link.
+def given_spheres(robot: UrdfSettings, model: Any, bodies: list[PlacedBody]) -> list[FloatArray]:
+    """Read the spheres that a file gives the bodies of each link.
 
-    A sphere belongs to the body whose middle is nearest to its own; those of a link without bodies
-    to none.
+    A sphere belongs to the body whose middle is nearest to its own.
 
     Returns:
         (spheres, 4) of each body: middles in the body's own frame, and radii.
     """
-    found: list[list[list[float]]] = [[] for _ in bodies]
-    for sphere in spheres:
+    assert robot.spheres is not None
+    field, links = "robot.spheres", robot.file.links
+    given = read_urdf(robot.spheres.content, field).links
+    for link, shapes in given.items():
+        if shapes and link not in links:
+            must = "a URDF whose spheres belong to links of the robot"
+            raise SettingError(field, must, link, nearest(link, list(links)))
+        if any(shape.kind != "sphere" for shape in shapes):
+            raise SettingError(field, "a URDF of spheres", f"another body of '{link}'")
+    if not any(given.values()):
+        raise SettingError(field, "a URDF of spheres", "one without")
+    rows: list[list[list[float]]] = [[] for _ in bodies]
+    for sphere in placed_bodies(robot, model, given, field):
         point = sphere.placement.translation
         own = [k for k, body in enumerate(bodies) if body.link == sphere.link]
         middles = [bodies[k].placement.act(bodies[k].shape.aabb_center) for k in own]
         if own:
-            nearest = own[int(np.argmin([np.sum((middle - point) ** 2) for middle in middles]))]
-            x, y, z = bodies[nearest].placement.actInv(point)
-            found[nearest].append([x, y, z, float(sphere.shape.radius)])
-    return [np.array(each).reshape(-1, 4) for each in found]
+            k = own[int(np.argmin([np.sum((middle - point) ** 2) for middle in middles]))]
+            rows[k].append([*bodies[k].placement.actInv(point), float(sphere.shape.radius)])
+    return [np.array(each).reshape(-1, 4) for each in rows]

@@ -112,29 +112,15 @@ class UrdfFile(NamedTuple):
 
 @functools.lru_cache(maxsize=32)
 def urdf_file(content: bytes, field: str = "robot.path") -> UrdfFile:
-    """Read a URDF whose links form one tree.
-
-    Args:
-        field: That names it, for errors.
-
-    Raises:
-        SettingError: If it cannot be, by link or joint.
-    """
+    """Read a URDF whose links form one tree."""
     file = read_urdf(content, field)
-    check_tree(list(file.links), file.joints, field)
-    check_rules(file.joints, field)
+    _check_tree(list(file.links), file.joints, field)
+    _check_rules(file.joints, field)
     return file
 
 
 def read_urdf(content: bytes, field: str) -> UrdfFile:
-    """Read the links, collision bodies and joints of a URDF.
-
-    Args:
-        field: That names it, for errors.
-
-    Raises:
-        SettingError: For an element, a number or a name that cannot be, by link or joint.
-    """
+    """Read the links, collision bodies and joints of a URDF."""
     root = parsed_xml(content, field, "robot")
     for element in root.iter():
         if element.tag.startswith("xacro:"):
@@ -231,18 +217,8 @@ def _joint(joint: Any, field: str) -> UrdfJoint:
     )  # fmt: skip
 
 
-def check_tree(links: list[str], joints: dict[str, UrdfJoint], field: str) -> None:
-    """Check that joints join the links of a URDF to one tree.
-
-    Args:
-        links: Their names.
-        joints: By their names.
-        field: That names the URDF, for errors.
-
-    Raises:
-        SettingError: If a link is not there, hangs on two joints or in a loop, or if there are
-            several roots.
-    """
+def _check_tree(links: list[str], joints: dict[str, UrdfJoint], field: str) -> None:
+    """Check that joints join the links to one tree: each link on one joint, but for one root."""
     above: dict[str, UrdfJoint] = {}  # link → the joint that carries it
     for joint in joints.values():
         for link in (joint.parent, joint.child):
@@ -270,12 +246,8 @@ def check_tree(links: list[str], joints: dict[str, UrdfJoint], field: str) -> No
         raise SettingError(field, must, was)
 
 
-def check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
-    """Check that each rule leads to a joint that moves of its own or stands.
-
-    Raises:
-        SettingError: If a joint follows one that is not there, or itself.
-    """
+def _check_rules(joints: dict[str, UrdfJoint], field: str) -> None:
+    """Check that each rule leads to a joint that is there, and no joint to itself."""
     for joint in joints.values():
         passed = [joint.name]
         while joint.mimic is not None:

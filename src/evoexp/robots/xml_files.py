@@ -16,18 +16,27 @@ def parsed_xml(content: bytes, field: str, tag: str) -> Any:
     """Read XML as TinyXML does, which knows no namespaces; return its root element, shared by all.
 
     Args:
-        field: That names it in errors.
         tag: The root's.
-
-    Raises:
-        SettingError: If it is no such XML, or one that declares entities or is deep or large.
     """
-    must = f"XML with the root <{tag}>"
+    must, builder, open_tags, count = f"XML with the root <{tag}>", ET.TreeBuilder(), [], 0
+
+    def start(name: str, attributes: Any) -> None:
+        nonlocal count
+        open_tags.append(name)
+        count += 1
+        if len(open_tags) > MOST_NESTED or count > MOST_ELEMENTS:
+            most = f"XML of at most {MOST_ELEMENTS:,} elements, nested {MOST_NESTED} deep"
+            raise SettingError(field, most, f"more, at <{name[:40]}>")
+        builder.start(name, attributes)
+
+    def doctype(name: str, *_: Any) -> None:  # entities unfold to any size, or name other files
+        raise SettingError(field, "XML without a document type", f"<!DOCTYPE {name}>")
+
     if reason := stand_in(content):
         raise SettingError(field, must, reason)
-    builder, parser = _PlainTree(field), expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
-    parser.StartDoctypeDeclHandler = builder.doctype
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.StartDoctypeDeclHandler = start, doctype
+    parser.EndElementHandler = lambda name: builder.end(open_tags.pop())
     try:
         parser.Parse(content, True)
         root = builder.close()
@@ -36,28 +45,3 @@ def parsed_xml(content: bytes, field: str, tag: str) -> Any:
     if root.tag != tag:
         raise SettingError(field, must, f"<{root.tag}>")
     return root
-
-
-class _PlainTree(ET.TreeBuilder):
-    """Builds a tree that is neither deep nor large, of a text that declares no entities."""
-
-    def __init__(self, field: str) -> None:
-        super().__init__()
-        self._field, self._depth, self._count = field, 0, 0
-
-    def doctype(self, name: str, *_: Any) -> None:
-        """Refuse document types: their entities unfold to any size, or name other files."""
-        raise SettingError(self._field, "XML without a document type", f"<!DOCTYPE {name}>")
-
-    def start(self, tag: str, attributes: Any) -> Any:
-        """Open an element."""
-        self._depth, self._count = self._depth + 1, self._count + 1
-        if self._depth > MOST_NESTED or self._count > MOST_ELEMENTS:
-            must = f"XML of at most {MOST_ELEMENTS:,} elements, nested {MOST_NESTED} deep"
-            raise SettingError(self._field, must, f"more, at <{tag[:40]}>")
-        return super().start(tag, attributes)
-
-    def end(self, tag: str) -> Any:
-        """Close an element."""
-        self._depth -= 1
-        return super().end(tag)

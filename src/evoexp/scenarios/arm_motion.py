@@ -27,16 +27,11 @@ class ArmMotion(Component):
     obstacle_margin: NonNegative | None = None
 
     def ends(self, arm_slices: np.ndarray) -> tuple[FloatArray, FloatArray]:
-        """Return start and goal of all arms together, each (nq,) [deg].
-
-        Raises:
-            SettingError: If they do not fit the robot's arms and joints.
-        """
+        """Return start and goal of all arms together, each (nq,) [deg]."""
         sizes = [int(stop - first) for first, stop in arm_slices]
         for name, given in (("q_start", self.q_start), ("q_goal", self.q_goal)):
             if [len(arm) for arm in given] != sizes:
-                must = (
-                    f"one list per arm of the robot, with {', '.join(map(str, sizes))} joint angles"
-                )
+                counts = ", ".join(map(str, sizes))
+                must = f"one list per arm of the robot, with {counts} joint angles"
                 raise SettingError(f"scenario.{name}", must, [list(arm) for arm in given])
         return np.concatenate(self.q_start), np.concatenate(self.q_goal)

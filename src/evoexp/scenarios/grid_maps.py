@@ -22,18 +22,12 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
 
     Args:
         size: How many nodes there are along x, y[, z].
-        field: Name of the setting, for errors.
 
     Returns:
         (nodes along x, along y[, along z]), true for blocked nodes.
-
-    Raises:
-        SettingError: If the map has another size or another alphabet, or is no map.
     """
-    rows = (
-        _read_png(content, size, field) if content.startswith(_PNG) else _read_text(content, field)
-    )
-    layers = rows if rows.ndim == 3 else rows[None]
+    is_png = content.startswith(_PNG)
+    layers = _read_png(content, size, field)[None] if is_png else _read_text(content, field)
     blocked = layers[:, ::-1, :].transpose(2, 1, 0)  # (x, y, z)
     blocked = blocked[:, :, 0] if len(size) == 2 and blocked.shape[2] == 1 else blocked
     _check_size(size, blocked.shape, field)
@@ -43,16 +37,12 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
 def _read_text(content: bytes, field: str) -> np.ndarray:
     """Return layers (z, rows, columns)."""
     try:
-        lines = [
-            line.partition(COMMENT)[0]
-            for line in content.decode().splitlines()
-            if line[:1] != COMMENT
-        ]
+        lines = [line for line in content.decode().splitlines() if line[:1] != COMMENT]
     except UnicodeDecodeError:
         raise SettingError(field, "a text or a PNG", "neither") from None
     blocks: list[list[str]] = [[]]
     for number, line in enumerate(lines, 1):
-        row = "".join(line.split())
+        row = "".join(line.partition(COMMENT)[0].split())
         if wrong := next((letter for letter in row if letter not in BLOCKED + FREE), ""):
             must = f"a map of {' or '.join(BLOCKED)} (blocked) and {' or '.join(FREE)} (free)"
             raise SettingError(field, must, f"{wrong} in row {number}")

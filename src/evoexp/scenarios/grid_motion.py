@@ -114,9 +114,6 @@ def blocks(nodes: np.ndarray) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
 
     Blocks may overlap. Where blocks meet, a slit of one cell may stay open between the bodies that
     span their centres; it leads nowhere, because paths go over free nodes.
-
-    Args:
-        nodes: (nodes along x, along y[, along z]).
     """
     corners = []
     for axis in range(nodes.ndim):  # the longest run along an axis, then as wide as it stays full

@@ -33,9 +33,8 @@ class Posture(Settings):
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.angles is None) == (self.tip is None):
-            raise SettingError(
-                "angles", "given, or else tip with elbow", None if self.angles is None else "both"
-            )
+            was = None if self.angles is None else "both"
+            raise SettingError("angles", "given, or else tip with elbow", was)
         if (self.tip is None) != (self.elbow is None):
             raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
         return self
@@ -44,12 +43,8 @@ class Posture(Settings):
         """Return the link angles (2,) [deg].
 
         Args:
-            field: Name, for errors.
             base: (2,) of the robot.
             lengths: (2,) of its links.
-
-        Raises:
-            SettingError: If the tip is out of reach, or an angle lies outside [0, 180].
         """
         if self.angles is not None:
             angles = np.array(self.angles)
@@ -83,21 +78,14 @@ class LinkMotion(Component):
         Args:
             bases: (robots, 2).
             lengths: (robots, 2) of the links.
-
-        Raises:
-            SettingError: If their number is not the robots', or a posture cannot be.
         """
         ends = []
         for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
             if len(postures) != len(bases):
                 must = f"one posture per robot ({len(bases)})"
                 raise SettingError(f"scenario.{name}", must, len(postures))
-            rows = zip(postures, bases, lengths, strict=True)
-            angles = [
-                posture.link_angles(f"scenario.{name}[{robot}]", base, links)
-                for robot, (posture, base, links) in enumerate(rows)
-            ]
-            ends.append(np.array(angles))
+            fields = [f"scenario.{name}[{robot}]" for robot in range(len(bases))]
+            ends.append(np.array([*map(Posture.link_angles, postures, fields, bases, lengths)]))
         start, goal = ends
         for robot in self.stationary:
             if not 0 <= robot < len(bases):

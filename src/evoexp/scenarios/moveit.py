@@ -6,51 +6,56 @@ of the tool.
 """
 
 import functools
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
 
 from evoexp.attachments import SHA256, File, file_content, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import mesh_content, package_folders
+from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
-from evoexp.scenarios.moveit_files import MessagePart
+from evoexp.scenarios.moveit_files import MessagePart, Pose, primitive_kind, read_document
 from evoexp.scenarios.moveit_frames import Frames, has_other_frames
-from evoexp.scenarios.moveit_meshes import Mesh, resources
 from evoexp.scenarios.moveit_messages import MAX_SCENE, REQUEST, SCENE
-from evoexp.scenarios.moveit_request import (
-    LinkGoal,
-    Request,
-    read_link_goal,
-    read_request,
-    state_of,
-)
 from evoexp.scenarios.moveit_scene import (
     AllowedPairs,
+    LoadMesh,
+    SceneMesh,
     World,
     check_robot_place,
     read_allowed,
     read_state,
     read_world,
 )
-from evoexp.scenarios.moveit_yaml import read_document
-from evoexp.validation import Component, NonNegative, Positive, Settings
+from evoexp.validation import Component, NonNegative, Positive
 
 if TYPE_CHECKING:
     from evoexp.robots.assembly import LinkFrames
 
+HALF_TURN = 180.0  # [deg] an orientation within which is any orientation
 FILES = {"scene": SCENE, "request": REQUEST}  # settings → messages
-LoadMesh = Callable[[bytes, str, str], Mesh]
-"""Reads a mesh out of a file's content, the ending of its name, and a field for errors."""
 
 _paths: dict[str, str] = {}  # SHA-256 of a file → its path as it was given, for messages
 
 
-class SceneMesh(Settings):
-    """A mesh that a scene names by its file."""
+class LinkGoal(NamedTuple):
+    """Where a link shall be."""
 
-    name: str  # as the scene names it
-    file: File  # its content
+    link: str  # its name
+    pose: Pose  # in the root frame; of a goal without orientation only the position counts
+    distance: float  # tolerance [m]
+    angle: float | None  # tolerance [deg]; None: any orientation will do
+
+
+class Request(NamedTuple):
+    """A motion plan request."""
+
+    group: str  # the planning group; empty: not given
+    start: dict[str, float]  # joint names → positions [rad, m]
+    joint_goal: dict[str, float]  # joint names → positions [rad, m]; empty: the goal is a link's
+    link: str  # the link whose pose is the goal; empty: the goal is one of joints
 
 
 class MoveitTask(Component):
@@ -92,27 +97,29 @@ class MoveitTask(Component):
             content = file_content(path, f"{field}.{name}", MAX_SCENE)
             settings[name] = {SHA256: keep(content)}
             _paths[settings[name][SHA256]] = path
-            document = _document(content, f"{field}.{name}: {path}", message)
+            document = read_document(content, f"{field}.{name}: {path}", message)
             if message == SCENE and has_other_frames(document):
                 settings["frame_names"] = "header"
-            if message == SCENE and (names := resources(document)):
-                place, own = Path(located(path)), f"{field}.{name}"
-                contents = [mesh_content(mesh, place, packages, own) for mesh in names]
-                settings["meshes"] = [
-                    {"name": mesh, "file": {SHA256: keep(content)}}
-                    for mesh, content in zip(names, contents, strict=True)
-                ]
+            # files of meshes, as robowflex names them
+            things = document["world"]["collision_objects"] if message == SCENE else ()
+            meshes = [mesh["resource"].text for thing in things for mesh in thing["meshes"]]
+            files = []
+            for mesh in filter(None, dict.fromkeys(meshes)):
+                content = mesh_content(mesh, Path(located(path)), packages, f"{field}.{name}")
+                files.append({"name": mesh, "file": {SHA256: keep(content)}})
+            if files:
+                settings["meshes"] = files
         return settings
 
     @property
     def allowed(self) -> AllowedPairs:
         """The scene's allowed-collision matrix."""
-        return _allowed(self._message("scene"))
+        return read_allowed(self._message("scene"))
 
     @property
     def plan_request(self) -> Request:
         """The request, but for the places in it."""
-        return _request(self._message("request"))
+        return read_request(self._message("request"))
 
     @property
     def state(self) -> dict[str, float]:
@@ -120,30 +127,17 @@ class MoveitTask(Component):
         return read_state(self._message("scene")["robot_state"]) | self.plan_request.start
 
     def world(self, links: "LinkFrames | None", load: LoadMesh) -> World:
-        """Return the scene's objects.
-
-        Args:
-            links: Of the robot; None: they have no names.
-            load: Reads meshes that the scene names.
-
-        Raises:
-            SettingError: If the scene holds what evoexp does not know, or the robot stands
-                elsewhere than its root.
-        """
+        """Return the scene's objects, among a robot's links if these have names."""
         scene = self._message("scene")
         if self.frame_names == "child" and has_other_frames(scene):
             must = "header, as MoveIt names frames: give the scene again and run it again"
             raise SettingError("scenario.frame_names", must, self.frame_names)
-        world = _world(scene, links, self.meshes, load)
+        world = read_world(scene, links, self.meshes, load)
         check_robot_place(self._message("request")["start_state"], world.frames)
         return world
 
     def notes(self, robot: Any) -> tuple[str, ...]:
-        """Name the parts of the messages that are left out and may matter.
-
-        Args:
-            robot: The robot of the condition.
-        """
+        """Name the parts of the messages that are left out and may matter to a robot."""
         name = getattr(robot, "robot_name", "")
         scene, request = (self._message(name).value for name in FILES)
         notes = []
@@ -162,53 +156,93 @@ class MoveitTask(Component):
         file: File = getattr(self, name)
         path = _paths.get(file.sha256)
         field = f"scenario.{name}" if path is None else f"scenario.{name}: {path}"
-        return _document(file.content, field, FILES[name])
+        return read_document(file.content, field, FILES[name])
 
     def start_configuration(self, joints: tuple[str, ...]) -> FloatArray:
-        """Return the start of joints, (nq,) [rad, m].
-
-        Raises:
-            SettingError: If the files are silent about one.
-        """
-        return state_of(joints, self.state)
+        """Return the start of joints, (nq,) [rad, m]."""
+        return _positions(joints, self.state)
 
     def goal_configuration(self, joints: tuple[str, ...]) -> FloatArray | None:
-        """Return the goal of the joints that move, (nq,) [rad, m]; None: it is a pose.
-
-        Raises:
-            SettingError: If it names a joint that does not move, or is silent about one that does
-                and has no start.
-        """
+        """Return the goal of the joints that move, (nq,) [rad, m]; None: it is a pose."""
         goal = self.plan_request.joint_goal
         for name in goal:
             if name not in joints:
                 must = f"a goal for joints that move ({', '.join(joints)})"
                 raise SettingError("scenario.request", must, name, nearest(name, joints))
-        return state_of(joints, goal, self.state) if goal else None
+        return _positions(joints, goal, self.state) if goal else None
 
     def link_goal(self, frames: Frames) -> LinkGoal:
-        """Return the goal, a pose of a link.
-
-        Args:
-            frames: Of the world.
-
-        Raises:
-            SettingError: If it holds what evoexp does not know.
-        """
+        """Return the goal, a pose of a link, given in frames of the world."""
         return read_link_goal(self._message("request"), frames)
 
 
-_document = functools.lru_cache(maxsize=64)(read_document)
-_allowed = functools.lru_cache(maxsize=64)(read_allowed)
-_request = functools.lru_cache(maxsize=64)(read_request)
+def _positions(names: tuple[str, ...], *states: dict[str, float]) -> FloatArray:
+    """Return the positions of joints, (joints,), from the first state that names each."""
+    positions = {name: q for state in reversed(states) for name, q in state.items()}
+    for name in names:
+        if name not in positions:
+            known = ", ".join(dict.fromkeys(joint for state in states for joint in state))
+            must = f"a start or goal for joint '{name}'"
+            raise SettingError("scenario.request", must, f"joints {known or 'none'}")
+    return np.array([positions[name] for name in names], dtype=np.float64)
 
 
 @functools.lru_cache(maxsize=64)
-def _world(
-    scene: MessagePart, links: "LinkFrames | None", meshes: tuple[SceneMesh, ...], load: LoadMesh
-) -> World:
-    loaded = {}
-    for mesh in meshes:
-        field = f"{scene.field}: the mesh '{mesh.name}'"
-        loaded[mesh.name] = load(mesh.file.content, Path(mesh.name).suffix, field)
-    return read_world(scene, links, loaded)
+def read_request(request: MessagePart) -> Request:
+    """Read a motion plan request."""
+    goal, joints = _goal(request), dict[str, float]()
+    for constraint in goal["joint_constraints"]:
+        name = constraint["joint_name"].text
+        request.require(name not in joints, "one goal per joint", name)
+        joints[name] = constraint["position"].called(f"the goal of '{name}'").number()
+    places, turns = list(goal["position_constraints"]), list(goal["orientation_constraints"])
+    request.require(not joints or not (places or turns), "a goal of joints or of a link", "both")
+    must = "a goal of joints, or of one position"
+    request.require(joints or len(places) == 1, must, f"{len(places)} positions")
+    link = places[0]["link_name"].text if places else ""
+    request.require(link or not places, "a goal of a link (link_name)", link)
+    start = read_state(request["start_state"])
+    return Request(request["group_name"].text, start, joints, link)
+
+
+def _goal(request: MessagePart) -> MessagePart:
+    """Return the only goal."""
+    goals = list(request["goal_constraints"])
+    must = "a request with one goal (goal_constraints)"
+    request.require(len(goals) == 1, must, len(goals))
+    return goals[0]
+
+
+def read_link_goal(request: MessagePart, frames: Frames) -> LinkGoal:
+    """Read the goal of a link: a position constraint, and perhaps an orientation constraint."""
+    goal = _goal(request)
+    (place,), turns = goal["position_constraints"], list(goal["orientation_constraints"])
+    link, region = place["link_name"].text, place["constraint_region"]
+    bodies, poses = list(region["primitives"]), list(region["primitive_poses"])
+    must = f"one sphere or box around the goal of '{link}'"
+    request.require(len(bodies) == len(poses) == 1, must, len(bodies))
+    sizes, kind = bodies[0]["dimensions"].numbers(), primitive_kind(bodies[0]["type"].value)
+    is_known = (kind, len(sizes)) in (("box", 3), ("sphere", 1)) and sizes.min() > 0.0
+    must = f"a sphere or box around the goal of '{link}'"
+    request.require(is_known, must, f"{kind} {sizes.tolist()}")
+    # the greatest ball in the box: a goal that is met by it is met by the box
+    distance = float(sizes.min()) * (0.5 if kind == "box" else 1.0)
+    frame = frames.of_header(place.called(f"the goal of '{link}'"))
+    pose, angle = frame.times(poses[0].pose), None
+    shift = place["target_point_offset"]
+    offset = shift.point if shift else np.zeros(3)
+    request.require(len(turns) <= 1, f"one orientation of '{link}'", len(turns))
+    must = f"a goal of '{link}' without target_point_offset, or with an orientation"
+    request.require(turns or not offset.any(), must, offset.tolist())
+    for turn in turns:
+        must, name = (
+            f"an orientation of '{link}', whose position is the goal",
+            turn["link_name"].text,
+        )
+        turn.require(name == link, must, name)
+        turned = frames.of_header(turn.called(f"the orientation of '{link}'")).times(turn.pose)
+        least = min(turn[f"absolute_{axis}_axis_tolerance"].number(0.0) for axis in "xyz")
+        turn.require(least > 0.0, f"tolerances above 0 of '{link}'", least)
+        pose = Pose(turned.rotation, pose.position)
+        angle = least / DEGREE if least / DEGREE < HALF_TURN else None
+    return LinkGoal(link, pose._replace(position=pose.of_point(-offset)), distance, angle)

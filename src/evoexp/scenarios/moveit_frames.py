@@ -28,11 +28,7 @@ class Frames(NamedTuple):
     moving: frozenset[str]  # links that move
 
     def of_header(self, part: MessagePart) -> Pose:
-        """Return the pose of the frame that the header of a part names, or the planning frame's.
-
-        Raises:
-            SettingError: If the frame is not known, or moves.
-        """
+        """Return the pose of the frame that the header of a part names, or the planning frame's."""
         name = frame_name(part["header"]["frame_id"])
         must = f"given in a frame that stands still ({', '.join(self.poses)}) at {part.where}"
         if name in self.moving:
@@ -52,10 +48,6 @@ def read_frames(scene: MessagePart, links: "LinkFrames | None") -> Frames:
 
     Args:
         links: Of the robot; None: they have no names.
-
-    Raises:
-        SettingError: If transforms do not lead to one planning frame, or contradict each other or
-            the robot.
     """
     root, standing, moving, ground = links or ("", (), frozenset[str](), "")
     named, planning, is_certain = _fixed_transforms(scene)
@@ -80,11 +72,7 @@ def read_frames(scene: MessagePart, links: "LinkFrames | None") -> Frames:
 
 
 def has_other_frames(scene: MessagePart) -> bool:
-    """Whether a scene has fixed transforms of frames other than the planning frame.
-
-    Raises:
-        SettingError: If they contradict each other.
-    """
+    """Whether a scene has fixed transforms of frames other than the planning frame."""
     poses = _fixed_transforms(scene)[0].values()
     return not all(pose.is_near(IDENTITY, SAME) for pose in poses)
 

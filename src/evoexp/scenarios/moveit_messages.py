@@ -127,11 +127,7 @@ def check_fields(value: Any, message: str, field: str, where: str = "") -> None:
 
     Args:
         value: The message, or a list of such messages.
-        field: The setting that names the file, for errors.
         where: The value's place in the file.
-
-    Raises:
-        SettingError: Naming the field and its place.
     """
     if isinstance(value, list):
         for k, item in enumerate(value):
@@ -152,11 +148,7 @@ def check_fields(value: Any, message: str, field: str, where: str = "") -> None:
 
 
 def check_message(root: dict[str, Any], message: str, field: str) -> None:
-    """Refuse a file that holds another message, or one that stands below another key.
-
-    Raises:
-        SettingError: Naming the message or the key.
-    """
+    """Refuse a file that holds another message, or one that stands below another key."""
     own = FIELDS[message].keys()
     if root and not own & root.keys():
         must = f"a {message} of moveit_msgs by itself"

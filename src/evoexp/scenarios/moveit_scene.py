@@ -1,21 +1,31 @@
-"""The world of a MoveIt planning scene: objects, and which pairs may touch."""
+"""The world of a MoveIt planning scene: objects, and which pairs may touch.
 
-from collections.abc import Mapping
+Meshes and cones become convex hulls that contain them.
+"""
+
+import functools
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from evoexp.attachments import File
 from evoexp.errors import nearest
+from evoexp.numeric.convex_hull import hull_of
+from evoexp.numeric.elementary import sincos
+from evoexp.records import FloatArray, IntArray
 from evoexp.scenarios.moveit_files import IDENTITY, MessagePart, Pose, primitive_kind
 from evoexp.scenarios.moveit_frames import Frames, read_frames
-from evoexp.scenarios.moveit_meshes import Mesh, cone_hull, mesh_hulls
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CylinderObstacle,
     HalfSpaceObstacle,
+    HullObstacle,
     Obstacle,
     SphereObstacle,
 )
+from evoexp.validation import Settings
 
 if TYPE_CHECKING:
     from evoexp.robots.assembly import LinkFrames
@@ -29,6 +39,23 @@ OPERATIONS = {
     for k, name in enumerate(("ADD", "REMOVE", "APPEND", "MOVE"))
     for form in (str(k), chr(k), str(bytes([k])), name.lower())
 }
+
+
+Mesh = tuple[FloatArray, IntArray]
+"""Corners (corners, 3) [m] and triangles (triangles, 3) of corners' numbers."""
+
+AROUND = 32  # corners of a cone's base; they stand out of it by half a hundredth of its radius
+
+
+class SceneMesh(Settings):
+    """A mesh that a scene names by its file."""
+
+    name: str  # as the scene names it
+    file: File  # its content
+
+
+LoadMesh = Callable[[bytes, str, str], Mesh]
+"""Reads a mesh out of a file's content, the ending of its name, and a field for errors."""
 
 
 class AllowedPairs(NamedTuple):
@@ -54,17 +81,19 @@ class World(NamedTuple):
     frames: Frames  # in which places are given
 
 
-def read_world(scene: MessagePart, links: "LinkFrames | None", meshes: Mapping[str, Mesh]) -> World:
-    """Read the objects of a planning scene.
-
-    Args:
-        scene: The message.
-        links: Of the robot; None: they have no names.
-        meshes: Corners and triangles of meshes that the scene names, by these names.
-
-    Raises:
-        SettingError: If it holds what evoexp does not know.
-    """
+@functools.lru_cache(maxsize=64)
+def read_world(
+    scene: MessagePart,
+    links: "LinkFrames | None",
+    meshes: tuple[SceneMesh, ...] = (),
+    load: LoadMesh | None = None,
+) -> World:
+    """Read the objects of a planning scene, among a robot's links if these have names."""
+    loaded = {}
+    for mesh in meshes:
+        assert load is not None
+        field = f"{scene.field}: the mesh '{mesh.name}'"
+        loaded[mesh.name] = load(mesh.file.content, Path(mesh.name).suffix, field)
     for name, size, neutral in (("link_padding", "padding", 0.0), ("link_scale", "scale", 1.0)):
         for link in scene[name]:
             is_neutral = link[size].number(neutral) == neutral
@@ -77,7 +106,7 @@ def read_world(scene: MessagePart, links: "LinkFrames | None", meshes: Mapping[s
     for thing in scene["world"]["collision_objects"]:
         name = thing["id"].text or f"object_{len(set(owners)) + 1}"
         thing.require(name not in owners, "objects whose ids differ", name)
-        bodies = _bodies(thing.called(f"'{name}'"), name, frames, meshes)
+        bodies = _bodies(thing.called(f"'{name}'"), name, frames, loaded)
         obstacles += bodies
         owners += [name] * len(bodies)
     must = f"a scene of at most {MOST_OBJECTS} bodies"
@@ -86,11 +115,7 @@ def read_world(scene: MessagePart, links: "LinkFrames | None", meshes: Mapping[s
 
 
 def read_state(state: MessagePart) -> dict[str, float]:
-    """Read a robot state: joint names → positions.
-
-    Raises:
-        SettingError: If names and positions do not match, or a joint has two positions.
-    """
+    """Read a robot state: joint names → positions."""
     joints = state["joint_state"]
     names = joints["name"].names
     positions: dict[str, float] = {}
@@ -101,11 +126,7 @@ def read_state(state: MessagePart) -> dict[str, float]:
 
 
 def check_robot_place(state: MessagePart, frames: Frames) -> None:
-    """Refuse a state in which joints of several coordinates move the robot.
-
-    Raises:
-        SettingError: If the robot stands elsewhere than its root.
-    """
+    """Refuse a state in which joints of several coordinates move the robot off its root."""
     joints = state["multi_dof_joint_state"]
     names, transforms = joints["joint_names"].names, list(joints["transforms"])
     is_complete = not names or len(transforms) == len(names)
@@ -137,7 +158,7 @@ def _bodies(
             label = f"{name}_{len(obstacles) + 1}" if len(bodies) > 1 else name
             placed = own.times(pose.pose)
             if kind == "meshes":
-                obstacles += mesh_hulls(body, meshes, placed, label)
+                obstacles += _mesh_hulls(body, meshes, placed, label)
             else:
                 make = _primitive if kind == "primitives" else _plane
                 obstacles.append(make(body, placed, label))
@@ -160,7 +181,7 @@ def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
     if kind == "sphere":
         return SphereObstacle(shape="sphere", name=name, center=center, radius=float(sizes[0]))
     if kind == "cone":
-        return cone_hull(float(sizes[0]), float(sizes[1]), pose, name)
+        return _cone_hull(float(sizes[0]), float(sizes[1]), pose, name)
     along = 0.5 * float(sizes[0]) * pose.rotation[:, 2]
     ends = _three(pose.position - along), _three(pose.position + along)
     radius = float(sizes[1])
@@ -183,12 +204,9 @@ def _plane(plane: MessagePart, pose: Pose, name: str) -> Obstacle:
     )
 
 
+@functools.lru_cache(maxsize=64)
 def read_allowed(scene: MessagePart) -> AllowedPairs:
-    """Read the allowed-collision matrix.
-
-    Raises:
-        SettingError: If it is no square of truth values, or says two things of a pair.
-    """
+    """Read the allowed-collision matrix."""
     matrix = scene["allowed_collision_matrix"]
     names, rows = matrix["entry_names"].names, list(matrix["entry_values"])
     must = f"a row per name of {matrix.where} ({len(names)})"
@@ -216,3 +234,75 @@ def _are_truths(values: list[Any], count: int) -> bool:
 def _three(values: Any) -> tuple[float, float, float]:
     x, y, z = (float(value) + 0.0 for value in values)
     return x, y, z
+
+
+def _mesh_hulls(
+    mesh: MessagePart, loaded: Mapping[str, Mesh], pose: Pose, name: str
+) -> list[HullObstacle]:
+    """Return the convex hulls of the parts of a mesh that hang together, numbered if several.
+
+    The mesh is a `shape_msgs/Mesh`, or one of the files that the scene names.
+    """
+    if resource := mesh["resource"].text:
+        has_own = mesh["vertices"].value or mesh["triangles"].value
+        mesh.require(not has_own, f"a resource or triangles at {mesh.where}, not both", name)
+        corners, triangles = loaded[resource]
+        if mesh["dimensions"]:
+            corners = corners * mesh["dimensions"].numbers(3)
+    else:
+        corners, triangles = _own_triangles(mesh, name)
+    hulls, parts = [], _parts(corners, triangles)
+    for k, part in enumerate(parts):
+        hull = hull_of(part)
+        if hull is None:
+            must = f"meshes with an inside ('{name}')"
+            raise mesh.refusal(must, f"a part of {len(part)} vertices in one plane")
+        hulls.append(_hull(hull[0], pose, f"{name}_{k + 1}" if len(parts) > 1 else name))
+    return hulls
+
+
+def _own_triangles(mesh: MessagePart, name: str) -> Mesh:
+    """Read the corners and triangles that a message holds."""
+    must = f"a mesh whose dimensions scale a resource at {mesh.where}"
+    mesh.require(not mesh["dimensions"].value, must, name)
+    corners = np.array([vertex.point for vertex in mesh["vertices"]])
+    faces = [
+        # robowflex writes the list alone
+        (face if isinstance(face.value, list) else face["vertex_indices"]).numbers(3)
+        for face in mesh["triangles"]
+    ]
+    triangles, count = np.array(faces).reshape(-1, 3), len(corners)
+    is_corner = (triangles == np.floor(triangles)) & (triangles >= 0.0) & (triangles < count)
+    wrong = triangles[~is_corner.all(axis=1)]
+    must = f"triangles of three of the {count} vertices of '{name}', counted from 0"
+    was = ", ".join(f"{k:g}" for k in wrong[0]) if len(wrong) else "none"
+    mesh.require(len(triangles) and not len(wrong), must, was)
+    return corners, triangles.astype(np.int64)
+
+
+def _cone_hull(height: float, radius: float, pose: Pose, name: str) -> HullObstacle:
+    """Return a pyramid around a cone, its axis z, its middle half way up."""
+    turns = [sincos(2.0 * np.pi * k / AROUND) for k in range(AROUND)]
+    wide = radius / sincos(np.pi / AROUND)[1]
+    base = [[wide * cos, wide * sin, -0.5 * height] for sin, cos in turns]
+    return _hull(np.array([*base, [0.0, 0.0, 0.5 * height]]), pose, name)
+
+
+def _hull(points: FloatArray, pose: Pose, name: str) -> HullObstacle:
+    corners, center = tuple(map(_three, points)), _three(pose.position)
+    return HullObstacle(
+        shape="hull", name=name, points=corners, center=center, rotation=pose.angles
+    )
+
+
+def _parts(corners: FloatArray, triangles: IntArray) -> list[FloatArray]:
+    """Return the corners of the parts of a mesh; corners at one place are one."""
+    from scipy.sparse import coo_array, csgraph  # few scenes have meshes
+
+    places, same = np.unique(corners, axis=0, return_inverse=True)
+    linked = same.reshape(-1)[triangles]
+    ends = np.repeat(linked[:, 0], 2), linked[:, 1:].ravel()
+    graph = coo_array((np.ones(len(ends[0])), ends), shape=(len(places),) * 2)
+    _, part = csgraph.connected_components(graph, directed=False)
+    used = np.unique(linked)  # parts are numbered by their first corners
+    return [places[used[part[used] == own]] for own in np.unique(part[used])]

@@ -131,11 +131,7 @@ class ObstacleTable(NamedTuple):
     size: FloatArray
 
     def without_ellipses(self) -> "ObstacleTable":
-        """Return the table itself, for collision models that know no ellipses.
-
-        Raises:
-            SettingError: If there is one.
-        """
+        """Return the table itself, for collision models that know no ellipses."""
         if ELLIPSE in self.kind:
             field = f"scenario.obstacles[{int(np.argmax(self.kind == ELLIPSE))}].shape"
             raise SettingError(field, "any but an ellipse with this collision model", "ellipse")

@@ -170,11 +170,7 @@ class PostureTask(Component):
         return {name: one for name, one in named if name in needed or not self.empty_scene}
 
     def index_of(self, name: str, field: str) -> int:
-        """Return the index of one of `objects`.
-
-        Raises:
-            SettingError: If none has this name.
-        """
+        """Return the index of one of `objects`."""
         if name not in self.names:
             must = f"the name of an obstacle ({', '.join(self.names) or 'there is none'})"
             raise SettingError(field, must, name, nearest(name, self.names))

@@ -34,7 +34,7 @@ from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
 from evoexp.records import Block, FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.robots.planar_postures import bring_tip_to, tip
+from evoexp.robots.planar_ends import bring_tip_to, tip
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component
 

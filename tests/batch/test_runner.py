@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.batch import jobs, live_curves
-from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, fan_out
-from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates, fan_out
+from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.workers import Workers
@@ -320,7 +320,7 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
     assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]
 
 
-# Bundles
+# Tasks
 
 
 def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
@@ -336,34 +336,34 @@ def test_every_job_is_run_once_and_in_order(
     num_jobs: int, num_workers: int, tasks: list[tuple[float, int]]
 ) -> None:
     waiting = [Job(str(k % 3) * 64, b"", k) for k in range(num_jobs)]
-    bundles = Bundles(deque(waiting), num_workers)
+    replicates = Replicates(waiting, num_workers, NO_LIMITS)
     seen: list[Job] = []
-    for count, bundle in enumerate(bundles):
+    for count, (bundle,) in enumerate(iter(lambda: replicates.next_task(0), None)):
         assert 1 <= len(bundle) <= MAX_BUNDLE
         assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), (
             "nobody waits for one worker"
         )
         wall, done = tasks[count % len(tasks)]
         seen += bundle[:done]  # the worker stopped there
-        bundles.took(bundle, outcomes_of(bundle[:done], wall))
+        replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
     assert seen == waiting
 
 
 def test_bundles_are_as_long_as_a_task() -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(1000)]
-    bundles = Bundles(deque(waiting), 2)
-    iterator = iter(bundles)
-    first = next(iterator)
+    replicates = Replicates(waiting, 2, NO_LIMITS)
+    bundles = (task[0] for task in iter(lambda: replicates.next_task(0), None))
+    first = next(bundles)
     assert len(first) == MAX_BUNDLE, "nothing is known yet"
-    bundles.took(first, outcomes_of(first[:3], TASK_S / 10))
-    second = next(iterator)
+    replicates.end_task((first,), outcomes_of(first[:3], TASK_S / 10))
+    second = next(bundles)
     assert second == waiting[3:13]
-    bundles.took(second, outcomes_of(second, 1.0))
-    assert len(next(iterator)) == 1
+    replicates.end_task((second,), outcomes_of(second, 1.0))
+    assert len(next(bundles)) == 1
     for _ in range(60):
-        bundle = next(iterator)
-        bundles.took(bundle, outcomes_of(bundle, TASK_S / 10))
-    assert len(next(iterator)) in (9, 10), "slow ones are forgotten"
+        bundle = next(bundles)
+        replicates.end_task((bundle,), outcomes_of(bundle, TASK_S / 10))
+    assert len(next(bundles)) in (9, 10), "slow ones are forgotten"
 
 
 def test_a_task_that_takes_long_begins_no_further_replicate(

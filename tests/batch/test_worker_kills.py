@@ -60,7 +60,7 @@ def test_every_batch_ends_and_nothing_differs(tmp_path: Path) -> None:
         number += PER_BATCH
         retried = Retried(tasks)
         with Workers(2) as workers:
-            ended = sorted(workers.results(work, retried))
+            ended = sorted(workers.results(work, retried.next_task, retried.end_task))
         assert [place for place, _, _ in ended] == [task.number for task in tasks]
         for task, (_, computed, digest) in zip(tasks, ended, strict=True):
             assert computed == content(task.number, task.size)
@@ -77,7 +77,7 @@ def test_half_a_message_keeps_nobody_waiting() -> None:
     tasks = [Struck(0, 1, None, None), Struck(1, 20 * MEGABYTE, None, None)]
     retried = Retried(tasks)
     with Workers(2) as workers:
-        results = workers.results(work, retried)
+        results = workers.results(work, retried.next_task, retried.end_task)
         ended = [next(results)]
         time.sleep(2.0)  # the other one fills its pipe
         for process in children_of_children():

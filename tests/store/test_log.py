@@ -23,7 +23,7 @@ from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.log import Log
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
-FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
+FRONT = FrontRow(4, 0, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
 
 def same(one: object, other: object) -> bool:

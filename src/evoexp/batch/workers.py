@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection, Pipe, wait
 from multiprocessing.reduction import send_handle
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 from evoexp.batch.worker_server import Answer
 from evoexp.errors import EvoexpError
@@ -44,16 +44,6 @@ class Died(NamedTuple):
     seconds: float  # [s] from the beginning of the task to the death
 
 
-class Work(Protocol):
-    """Tasks for workers, and what becomes of their ends."""
-
-    def next_task(self, num_running: int) -> tuple[Any, ...] | None:
-        """Return the arguments of the next call; None if there is none now."""
-
-    def end_task(self, task: tuple[Any, ...], end: Any | Died) -> Any | None:
-        """Take in the result of a task; return one for the caller, or None."""
-
-
 @dataclass(eq=False)
 class _Worker:
     """One worker process."""
@@ -63,20 +53,11 @@ class _Worker:
     task: tuple[Any, ...] | None = None  # the arguments of what it is doing; None: nothing
     begun: float = 0.0  # when it was given that [s]
 
-    def give(self, function: Callable[..., Any], task: tuple[Any, ...]) -> None:
-        """Send a task."""
-        self.task, self.begun = task, time.monotonic()
-        with contextlib.suppress(ConnectionError):  # it has died, which is noticed by its pipe
-            self.pipe.send_bytes(pickle.dumps((function, task), pickle.HIGHEST_PROTOCOL))
-
 
 class Workers:
     """A number of worker processes, which end with the body of a `with` statement.
 
     A worker that dies is replaced, and so is the server.
-
-    Attributes:
-        number: Of workers.
     """
 
     def __init__(self, number: int) -> None:
@@ -109,26 +90,34 @@ class Workers:
         with contextlib.suppress(ConnectionError):
             self._server_pipe.send(partial(function, *arguments))
 
-    def results(self, function: Callable[..., Any], work: Work) -> Iterator[Any]:
-        """Do tasks as workers become free; yield results as they come.
+    def results(
+        self,
+        function: Callable[..., Any],
+        next_task: Callable[[int], tuple[Any, ...] | None],
+        end_task: Callable[[tuple[Any, ...], Any | Died], Any | None],
+    ) -> Iterator[Any]:
+        """Do tasks as workers become free; yield results as they come, until none is left.
+
+        An error that the function raised is raised here, too.
 
         Args:
             function: Called in a worker with the arguments that are a task.
-            work: The tasks. They are done when there is none and none is running.
-
-        Raises:
-            WorkerError: If workers cannot be started.
-            Exception: An error that the function raised.
+            next_task: Returns the next task by the number of running ones, or None.
+            end_task: Takes in the result of a task; returns one for the caller, or None.
         """
         self._fill()
         finished: list[Any] = []
-        task = work.next_task(0)
+        task = next_task(0)
         while task is not None or self._num_running:
             workers = self._workers.values()
             idle = [w for w in workers if w.process is not None and w.task is None]
             while idle and task is not None:
-                idle.pop().give(function, task)
-                task = work.next_task(self._num_running)
+                worker = idle.pop()
+                worker.task, worker.begun = task, time.monotonic()
+                content = pickle.dumps((function, task), pickle.HIGHEST_PROTOCOL)
+                with contextlib.suppress(ConnectionError):  # it has died: its pipe tells
+                    worker.pipe.send_bytes(content)
+                task = next_task(self._num_running)
             yield from finished  # the workers are busy meanwhile
             finished = []
             for done, end in self._wait():
@@ -136,10 +125,10 @@ class Workers:
                     if end.error is not None:
                         raise end.error
                     end = end.result
-                if (result := work.end_task(done, end)) is not None:
+                if (result := end_task(done, end)) is not None:
                     finished.append(result)
             if task is None:
-                task = work.next_task(self._num_running)
+                task = next_task(self._num_running)
         yield from finished
 
     @property
@@ -147,11 +136,7 @@ class Workers:
         return sum(worker.task is not None for worker in self._workers.values())
 
     def _wait(self) -> list[tuple[tuple[Any, ...], Answer | Died]]:
-        """Wait until some workers have said something or died; return the ends of their tasks.
-
-        Raises:
-            WorkerError: If none ever begins.
-        """
+        """Wait until some workers have said something or died; return the ends of their tasks."""
         ends: list[tuple[tuple[Any, ...], Answer | Died]] = []
         ready = wait(list(self._workers))
         for worker in [worker for pipe, worker in self._workers.items() if pipe in ready]:
@@ -215,37 +200,30 @@ class Workers:
             self._server.wait(ENDING_S)
 
 
-class _Numbered:
-    """Calls with their numbers; one whose worker dies is made once more."""
-
-    def __init__(self, calls: Iterable[tuple[Any, ...]]) -> None:
-        self._waiting = deque(enumerate(calls))
-        self._died = set[int]()
-
-    def next_task(self, num_running: int) -> tuple[int, tuple[Any, ...]] | None:
-        return self._waiting.popleft() if self._waiting else None
-
-    def end_task(self, task: tuple[int, tuple[Any, ...]], end: Any) -> tuple[int, Any] | None:
-        number, _ = task
-        if not isinstance(end, Died):
-            return number, end
-        if number in self._died:
-            raise WorkerError(f"a {DIED_TWICE}")
-        self._died.add(number)
-        self._waiting.appendleft(task)
-        return None
-
-
 def in_order(
     workers: Workers, function: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]
-) -> Iterator[Any]:
-    """Call a function in workers with the arguments of each task; give the results in order.
+) -> list[Any]:
+    """Call a function in workers with the arguments of each task; return the results in order.
 
-    Raises:
-        WorkerError: If a task kills its worker twice.
+    A call whose worker dies is made once more; WorkerError is raised where it dies again.
     """
-    results = dict(workers.results(partial(_call, function), _Numbered(tasks)))
-    return (results[number] for number in range(len(results)))
+    waiting, died = deque(enumerate(tasks)), set[int]()
+
+    def end_task(task: tuple[Any, ...], end: Any | Died) -> tuple[int, Any] | None:
+        number = task[0]
+        if not isinstance(end, Died):
+            return number, end
+        if number in died:
+            raise WorkerError(f"a {DIED_TWICE}")
+        died.add(number)
+        waiting.appendleft((number, task[1]))
+        return None
+
+    def next_task(num_running: int) -> tuple[Any, ...] | None:
+        return waiting.popleft() if waiting else None
+
+    results = dict(workers.results(partial(_call, function), next_task, end_task))
+    return [results[number] for number in sorted(results)]
 
 
 def _call(function: Callable[..., Any], number: int, arguments: tuple[Any, ...]) -> Any:

@@ -15,13 +15,12 @@ from typing import Any, NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Attachment, Metadata
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
-from evoexp.errors import CorruptLog
+from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.input_files import MEGABYTE
 
 # Of a log's file, and of all its messages together. The largest log of a shipped experiment holds
@@ -41,18 +40,6 @@ _CHUNK = struct.Struct("<16xQ4xI4sQ")  # size, bytes of the compression's name, 
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
 _TAIL = _FOOTER.size + len(MAGIC)
-_UNREADABLE = (
-    McapError,
-    zstandard.ZstdError,
-    struct.error,
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    MemoryError,
-    RecursionError,
-    TypeError,
-    ValueError,
-)
 
 
 class CheckedLog(NamedTuple):
@@ -68,7 +55,9 @@ def unreadable_is_corrupt(name: str) -> Iterator[None]:
     """Turn any error of decoding damaged or foreign bytes into one line that names the log."""
     try:
         yield
-    except _UNREADABLE as error:
+    except EvoexpError:
+        raise
+    except Exception as error:
         raise CorruptLog(
             f"{name}: unreadable: {type(error).__name__}: {' '.join(str(error).split())}"
         ) from error
@@ -150,7 +139,17 @@ def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
             raise ValueError(f"a record ends at byte {stop}, beyond {data_end}")
         if opcode == Opcode.CHUNK:
             chunks.append(start)
-            size += _chunk_size(view[body:stop])
+            content_size, name_length, compression, num_compressed = _CHUNK.unpack_from(
+                content, body
+            )
+            frame = view[body + _CHUNK.size : stop]
+            if (name_length, compression, num_compressed) != (4, b"zstd", len(frame)):
+                raise ValueError("a chunk is not compressed by zstd")
+            if content_size > MAX_CHUNK:
+                raise ValueError(f"a chunk of {content_size} bytes; at most {MAX_CHUNK} are read")
+            if zstandard.get_frame_parameters(frame).content_size != content_size:
+                raise ValueError("a chunk is not of the size that it tells")
+            size += content_size
             if size > MAX_LOG:
                 raise ValueError(f"too large: {_too_large(size)}")
         elif opcode == Opcode.METADATA:
@@ -167,18 +166,6 @@ def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
             raise ValueError(f"more than {MAX_ATTACHMENTS} attachments and records of metadata")
         start = stop
     return [chunks, metadata, attachments]
-
-
-def _chunk_size(body: memoryview) -> int:
-    """Return the size of a chunk's content, which is what its compressed frame says, too."""
-    size, length, compression, num_compressed = _CHUNK.unpack_from(body)
-    if (length, compression) != (4, b"zstd") or num_compressed != len(body) - _CHUNK.size:
-        raise ValueError("a chunk is not compressed by zstd")
-    if size > MAX_CHUNK:
-        raise ValueError(f"a chunk of {size} bytes; at most {MAX_CHUNK} are read")
-    if zstandard.get_frame_parameters(body[_CHUNK.size :]).content_size != size:
-        raise ValueError("a chunk is not of the size that it tells")
-    return int(size)
 
 
 def _too_large(size: int) -> str:

@@ -163,7 +163,7 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
 ) -> None:
     monkeypatch.setenv("FAULTY", "raise:0,2")
     outcomes = run(tmp_path, (faulty, 4))
-    assert [(o.replicate, o.failed) for o in outcomes] == [
+    assert [(o.replicate, bool(o.reason)) for o in outcomes] == [
         (0, True),
         (1, False),
         (2, True),
@@ -184,14 +184,16 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
     monkeypatch.setenv("FAULTY", "raise:2")
     left = new_batch(tmp_path, (faulty, 4))
     assert (left.jobs, left.num_left_failed) == ([], 2)
-    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4), retry_failed=True)] == [
+    assert [
+        (o.replicate, bool(o.reason)) for o in run(tmp_path, (faulty, 4), retry_failed=True)
+    ] == [
         (0, False),
         (2, True),
     ]
     monkeypatch.delenv("FAULTY")
-    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4), retry_failed=True)] == [
-        (2, False)
-    ]
+    assert [
+        (o.replicate, bool(o.reason)) for o in run(tmp_path, (faulty, 4), retry_failed=True)
+    ] == [(2, False)]
     assert directory.failed() == set()
     assert not list(directory.replicates.glob("*.failed.json"))
     assert (read_summaries(directory)["status"] == "done").all()
@@ -308,7 +310,7 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
     outcomes = run(tmp_path / "outputs", (faulty, 12), num_workers=2)
     assert sorted(outcome.replicate for outcome in outcomes) == list(range(12)), "each ends once"
     assert all(outcome.content == b"" for outcome in outcomes), "logs are written and let go"
-    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.failed}
+    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.reason}
     assert reasons == {
         7: "worker process died twice",
         9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",

@@ -202,18 +202,6 @@ def test_nonfinite_is_there_only_when_needed() -> None:
     )
 
 
-def test_misuse_is_refused() -> None:
-    rng = np.random.default_rng(0)
-    with pytest.raises(ValueError, match="config.json"):
-        Log(CONDITION, CONFIG, 7, rng, {"config.json": b""})
-    with pytest.raises(ValueError, match="no generation"):
-        Log(CONDITION, CONFIG, 7, rng).finish(summary())
-    log = Log(CONDITION, CONFIG, 8, rng)
-    log.write(Block.of(generations(1)[0]))
-    with pytest.raises(ValueError, match="replicate 7"):
-        log.finish(summary(7))
-
-
 def test_links_are_those_of_costs_one_by_one() -> None:
     """Costs are searched for NaN many generations at a time.
 

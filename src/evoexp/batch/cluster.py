@@ -1,7 +1,6 @@
 """Replicates on a cluster of `distributed`: descriptions go out, bytes come back.
 
-Nothing is shared but the network: a worker writes nothing but its own cache of kernels, and the
-parent alone writes results. Each task tells which code asked for it; a worker with other code
+Nothing is shared but the network. Each task tells which code asked for it; a worker with other code
 refuses it, as its results could be others.
 """
 

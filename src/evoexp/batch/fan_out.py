@@ -21,16 +21,11 @@ def fan_out(
     limits: ReplicateLimits = NO_LIMITS,
     curves: Path | None = None,
 ) -> Iterator[list[Outcome]]:
-    """Run jobs in worker processes; yield outcomes as they come.
+    """Run jobs in worker processes, or in this one; yield outcomes as they come.
 
     A worker that dies costs its own task: each job of that runs again in a task of its own. A job
     whose worker died of it alone, or that took too long or too much memory, runs once more at the
-    end, beside no other.
-
-    Args:
-        workers: Worker processes; None: they run in this process.
-        limits: Of each replicate.
-        curves: Folder for the convergence of those that are running; None: it is not told.
+    end, beside no other. See `run_jobs` for the arguments.
     """
     if workers is None:
         for job in jobs:

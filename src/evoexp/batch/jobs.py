@@ -44,11 +44,6 @@ class Outcome(NamedTuple):
     # whether a failed one may be done another time: it took too long, or too much memory
     may_pass: bool = False
 
-    @property
-    def failed(self) -> bool:
-        """Whether it ended without a log."""
-        return bool(self.reason)
-
 
 def run_jobs(
     jobs: Sequence[Job],
@@ -64,7 +59,7 @@ def run_jobs(
         curves: Folder for their convergence while they run; None: it is not told.
 
     Returns:
-        Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
+        Their outcomes, one at least; no further one begins after `LONGEST_TASK_S`.
     """
     from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
 

@@ -42,8 +42,7 @@ def replicate_memory(condition: Condition) -> int:
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates would take more than is allowed [B], or too long a log.
 
-    Raises:
-        SettingError: If they would, or if the condition contradicts itself.
+    One that contradicts itself is refused, too, by a SettingError.
     """
     planner, _ = condition.prepare()
     num_records = planner.num_generations + 1

@@ -29,14 +29,11 @@ def run_replicate(
 ) -> Finished:
     """Run one seeded replicate; return its finished log as bytes and its summary row.
 
-    Args:
-        condition: What to run.
-        config_json: The condition's canonical form, if the caller has it; making it takes as long
-            as a short run.
-        hear: Told every block of generations, after the log was.
+    SettingError is raised where the budget does not suffice for the first generation.
 
-    Raises:
-        SettingError: The budget of collision queries does not suffice for the first generation.
+    Args:
+        config_json: The condition's canonical form, which takes as long as a short run to make.
+        hear: Told every block of generations, after the log was.
     """
     config_json = config_json or condition.to_json()
     planner, problem = condition.prepare()  # kept: no part of a replicate's time

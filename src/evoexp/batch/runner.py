@@ -85,10 +85,8 @@ class Batch:
     def run(self) -> Generator[Outcome, None, None]:
         """Mend the runs, run the missing replicates; yield every outcome once it is stored.
 
-        Closing the iterator keeps the finished replicates.
-
-        Raises:
-            Busy: If another process writes one of the runs.
+        Closing the iterator keeps the finished replicates. `Busy` is raised where another process
+        writes one of the runs.
         """
         with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}

@@ -25,8 +25,7 @@ _UNFIT = (ValueError, ArithmeticError, LookupError, EvoexpError)  # raised by nu
 def contradictions(path: Path, log: LogContents) -> Iterator[str]:
     """Yield the contradictions between a log's solutions and the costs, terms and verdict it tells.
 
-    Raises:
-        EvoexpError: If its solutions cannot be evaluated here: another revision, a missing package.
+    EvoexpError is raised where they cannot be evaluated here: another revision, a missing package.
     """
     condition = stored_condition(path, log)
     refuse_large(condition, machine_memory())

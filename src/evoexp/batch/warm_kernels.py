@@ -1,7 +1,7 @@
 """Compiles the kernels of conditions, or loads them, before their replicates are timed.
 
-Each kind of condition searches for two generations and judges a motion. Where replicates run in
-worker processes, their server does this before it forks them: all of them find the kernels loaded.
+Each kind of condition searches for two generations and judges a motion; the server of worker
+processes does so before it forks them.
 """
 
 import contextlib

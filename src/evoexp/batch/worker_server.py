@@ -1,8 +1,7 @@
 """The process that workers are forked from, and the loop of a worker.
 
 The server loads all libraries once, and the kernels of a batch, and has no threads. Each worker has
-a pipe of its own and shares nothing with the others: whatever it holds when it dies, nobody waits
-for it.
+a pipe of its own: whatever it holds when it dies, nobody waits for it.
 """
 
 import importlib

@@ -83,10 +83,7 @@ class Workers:
         self._workers.clear()
 
     def call_first(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Let the server call a function before it forks workers, which find what that loaded.
-
-        What it returns or raises is lost, and where it ends the server, workers find nothing.
-        """
+        """Let the server call a function before it forks workers; what it raises is lost."""
         with contextlib.suppress(ConnectionError):
             self._server_pipe.send(partial(function, *arguments))
 
@@ -120,7 +117,7 @@ class Workers:
                 task = next_task(self._num_running)
             yield from finished  # the workers are busy meanwhile
             finished = []
-            for done, end in self._wait():
+            for done, end in self._ends():
                 if isinstance(end, Answer):
                     if end.error is not None:
                         raise end.error
@@ -135,29 +132,25 @@ class Workers:
     def _num_running(self) -> int:
         return sum(worker.task is not None for worker in self._workers.values())
 
-    def _wait(self) -> list[tuple[tuple[Any, ...], Answer | Died]]:
-        """Wait until some workers have said something or died; return the ends of their tasks."""
-        ends: list[tuple[tuple[Any, ...], Answer | Died]] = []
+    def _ends(self) -> Iterator[tuple[tuple[Any, ...], Answer | Died]]:
+        """Wait until some workers have said something or died; yield the ends of their tasks."""
         ready = wait(list(self._workers))
         for worker in [worker for pipe, worker in self._workers.items() if pipe in ready]:
+            task, message = worker.task, None
             try:
                 message = worker.pipe.recv()
             except (EOFError, OSError):  # it has died
-                if worker.task is not None:
-                    ends.append((worker.task, Died(time.monotonic() - worker.begun)))
                 del self._workers[worker.pipe]
                 worker.pipe.close()
                 self._num_lost += worker.process is None
                 if self._num_lost > MOST_LOST * self.number:
                     raise WorkerError("worker processes die before they have begun") from None
-                continue
-            if worker.process is None:
+            if message is not None and worker.process is None:
                 worker.process, self._num_lost = message, 0
-            elif worker.task is not None:
-                ends.append((worker.task, message))
+            elif task is not None:
                 worker.task = None
+                yield task, message or Died(time.monotonic() - worker.begun)
         self._fill()
-        return ends
 
     def _fill(self) -> None:
         """Start workers until they are as many as they should be."""

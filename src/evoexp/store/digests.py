@@ -13,10 +13,7 @@ _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 
 
 class Chain:
-    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state).
-
-    The generator is only read, never drawn from.
-    """
+    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state)."""
 
     def __init__(self, rng: "np.random.Generator") -> None:
         """Start a chain, its link being empty."""

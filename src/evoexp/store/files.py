@@ -1,7 +1,4 @@
-"""Files that are either whole or not there, whenever the process or the machine dies.
-
-A damaged file is named and set aside, never deleted.
-"""
+"""Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
 import warnings
@@ -19,12 +16,9 @@ MAX_NAMED = 3  # damaged files in one line
 
 
 def write_files(contents: Mapping[Path, bytes]) -> None:
-    """Write files, each atomically and durably.
+    """Write files, each atomically and durably: a temporary file, fsync, rename.
 
-    Each goes through a temporary file, fsync and rename; then the directory is synced.
-
-    No file is renamed before its bytes are on the disk: a name always means a whole file. Files of
-    a batch are synced at once, which the disk answers together.
+    No file is renamed before the bytes of all are on the disk, which answers their syncs together.
     """
     ending = f".{os.getpid()}{_SUFFIX}"
     files = {path: path.with_name(f".{path.name}{ending}") for path in contents}  # temporary
@@ -93,10 +87,7 @@ def warn(text: str) -> None:
 
 
 def set_aside(path: Path) -> Path:
-    """Rename a damaged file, or whatever stands in its place; return its new path.
-
-    Nothing is overwritten: `0001.mcap.damaged`, then `0001.mcap.damaged.2`, and so on.
-    """
+    """Rename a damaged file to `1.mcap.damaged`, or `1.mcap.damaged.2`, …; return its path."""
     count, aside = 1, path.with_name(path.name + DAMAGED)
     while os.path.lexists(aside):
         count += 1

@@ -1,13 +1,9 @@
-"""The files of a run beside its logs: its configuration, its manifest, its plans.
-
-The configuration is the identity of the run; where it is lost, a log has it.
-"""
+"""The files of a run beside its logs: its configuration, its manifest, its plans."""
 
 import hashlib
 import json
-import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -155,24 +151,3 @@ def restored_manifest(path: Path, condition_id: str) -> dict[str, Any]:
     for name, log in whole_logs(path, condition_id):
         return {"condition": condition_id, **log.environment, "git": None, RESTORED: name}
     return {}
-
-
-def read_plans(path: Path) -> list[Plan]:
-    """Return the plans that a file holds, the first one first; none where there is no file."""
-    if not os.path.lexists(path):
-        return []
-    try:
-        plans = [
-            Plan(each["num_replicates"], each["stored"]) for each in read_object(path)["plans"]
-        ]
-    except (KeyError, TypeError) as error:
-        raise DamagedFile(f"{path}: damaged: no list of plans") from error
-    if not all(type(number) is int and number >= 0 for plan in plans for number in plan):
-        raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
-    return plans
-
-
-def as_json(plans: Iterable[Plan]) -> bytes:
-    """Return plans as the content of their file."""
-    text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
-    return text.encode() + b"\n"

@@ -4,9 +4,8 @@ A log is checked against its place when it is first seen; see `summaries`. `veri
 log as a whole and in its place, and the files beside the logs; it reads only. Mending is for who
 holds the lock; no reading command renames anything.
 
-A link of a log's chain cannot be computed again from the log, which does not hold what entered it:
-`reproduce` does that by running the replicate again. Solutions can be evaluated again: by whoever
-knows planners, see `check_log`.
+A link of a log's chain cannot be computed again from the log: `reproduce` runs the replicate again.
+Solutions can be evaluated again, by whoever knows planners: see `check_log`.
 """
 
 import contextlib
@@ -85,7 +84,11 @@ def check_run(outputs: Path, name: str) -> RunCheck:
         for each in sorted((path / REPLICATES).glob("*")):
             if not RunDirectory.is_own(each.name):
                 names.append(f"{REPLICATES}/{each.name}")
-        leftovers = [f"{each} ({_kind(each)})" for each in names]
+        kinds = {True: "temporary", False: "unknown"}
+        leftovers = [
+            f"{each} ({'set aside earlier' if is_set_aside(each) else kinds[is_temporary(each)]})"
+            for each in names
+        ]
         run = open_run(outputs, name)
         problems = run.damaged_files()
     except StoreError as error:
@@ -184,13 +187,6 @@ def _contradictions(log: LogContents) -> Iterator[str]:
         yield "altered: its last solution does not have the best cost"
 
 
-def _kind(name: str) -> str:
-    """Return what a file is that is no part of a run."""
-    if is_set_aside(name):
-        return "set aside earlier"
-    return "temporary" if is_temporary(name) else "unknown"
-
-
 def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
     """Set aside every damaged file of a run, and say so in a line.
 
@@ -216,10 +212,7 @@ def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
 
 
 def lost_replicates(run: RunDirectory) -> set[int]:
-    """Return the replicates that were asked for once and whose log is damaged.
-
-    Others, which somebody put there, are set aside and not run again.
-    """
+    """Return the replicates that were asked for and whose log is damaged; `mend` is for others."""
     asked = run.num_asked()
     return {k for k in run.completed() - whole_logs(run) if k < asked}
 

@@ -60,8 +60,7 @@ def array_file(array: NDArray[Any]) -> bytes:
 class Log:
     """The log of one replicate: written block by block, finished into bytes.
 
-    The same content gives the same messages, chain and digests; wall and CPU times and the
-    environment are metadata and enter none of them.
+    Times and the environment enter neither messages nor chain nor digests.
     """
 
     def __init__(
@@ -78,12 +77,10 @@ class Log:
         Args:
             condition_id: Full hash of the condition, 64 hex digits.
             config_json: The condition's configuration: the replicate can be run from it alone.
-            replicate: Index of the replicate.
             rng: The replicate's generator, whose state enters the chain; never drawn from here.
             attachments: Further files that the condition needs, by name.
             environment: Versions, CPU features and what else may explain a difference.
         """
-        self._place = (condition_id, replicate)
         self._environment = dict(environment or {})
         self._chain = Chain(rng)
         self._content = ContentDigest()
@@ -115,16 +112,12 @@ class Log:
         self._writer.add_metadata(RUN, run)
         self._attach(CONFIG, config_json)
         for name, data in sorted((attachments or {}).items()):
-            if name == CONFIG:
-                raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
             self._attach(name, data)
 
     def write(self, block: Block, cpu_s: float = 0.0) -> None:
         """Append generations, and every best solution that is better than the last written.
 
-        Args:
-            cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
-                part of any digest.
+        The CPU time of the replicate until then [s] is the publish time of the messages.
         """
         self._cpu_ns = int(cpu_s * 1e9)
         state = self._chain.state() if block.states is None else b""
@@ -162,16 +155,7 @@ class Log:
                 self._add(FRONT_TOPIC, FrontRow, self._last, front)
 
     def finish(self, summary: ReplicateSummary) -> Finished:
-        """Close the log; return its bytes and the completed summary.
-
-        Raises:
-            ValueError: No generation was written, or the summary is of another replicate.
-        """
-        if self._last < 0:
-            raise ValueError("finish: no generation was written")
-        if (summary.condition, summary.replicate) != self._place:
-            theirs = f"{summary.condition[:12]} replicate {summary.replicate}"
-            raise ValueError(f"finish: summary of {theirs}, not of this")
+        """Close the log; return its bytes and the summary, which gets its digest."""
         if self._best != self._written or self._best_cost != self._written_cost:
             self._write_solution(self._last)
         summary = summary._replace(digest=self._chain.finish(self._population))
@@ -187,8 +171,7 @@ class Log:
         self._add(SOLUTION_TOPIC, SolutionRow, index, data)
 
     def _attach(self, name: str, data: bytes) -> None:
-        is_json = name.endswith(".json")
-        kind = "application/json" if is_json else "application/octet-stream"
+        kind = "application/json" if name.endswith(".json") else "application/octet-stream"
         self._writer.add_attachment(0, 0, name, kind, data)
 
     def _add(

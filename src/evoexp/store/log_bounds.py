@@ -1,9 +1,7 @@
 """The bounds of a log: checked as a whole before mcap's reader sees it.
 
 A log may come from anybody, and checksums are no proof of good will. Whatever a file claims, what
-is read of it takes memory in proportion to `MAX_LOG` and `MAX_MESSAGE`: both checksums are
-compared, records must fit into their own bytes, sizes are compared with these limits before
-anything is decompressed, and the index must point to the records that are there and to no others.
+is read of it takes memory in proportion to `MAX_LOG` and `MAX_MESSAGE`.
 """
 
 import struct
@@ -32,8 +30,6 @@ MAX_CHUNK = MAX_MESSAGE + 64 * 1024  # a chunk ends with the message that passes
 MAX_METADATA = MEGABYTE  # [B] of a record of metadata
 MAX_SUMMARY = 8 * MEGABYTE  # [B] of the summary section
 MAX_ATTACHMENTS = 1000  # records of metadata included
-# Reading a log takes at most so many times the memory of `MAX_LOG`, whatever the log holds.
-MEMORY_FACTOR = 10
 
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _CHUNK = struct.Struct("<16xQ4xI4sQ")  # size, bytes of the compression's name, name, bytes of data
@@ -64,12 +60,7 @@ def unreadable_is_corrupt(name: str) -> Iterator[None]:
 
 
 def check(content: bytes, name: str) -> CheckedLog:
-    """Check the bytes of a log: magic, checksums, the sizes of its records, its index.
-
-    Raises:
-        CorruptLog: The bytes are empty, too many, no MCAP, cut, altered, beyond a limit, or an MCAP
-            without checksums.
-    """
+    """Check the bytes of a log: magic, checksums, the sizes of its records, its index."""
     summary_start = check_sums(content, name)
     with unreadable_is_corrupt(name):
         if len(content) - summary_start > MAX_SUMMARY:
@@ -87,11 +78,7 @@ def check(content: bytes, name: str) -> CheckedLog:
 
 
 def check_sums(content: bytes, name: str) -> int:
-    """Check magic, footer and both checksums, which together cover every byte.
-
-    Returns:
-        Where the summary section starts.
-    """
+    """Check magic, footer and both checksums; return where the summary section starts [B]."""
     if not content:
         raise CorruptLog(f"{name}: empty file")
     if len(content) > MAX_LOG:
@@ -125,10 +112,9 @@ def check_sums(content: bytes, name: str) -> int:
 
 
 def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
-    """Check the records of the data section; add metadata and attachments to a log.
+    """Check the data section; return where chunks, metadata and attachments stand.
 
-    Returns:
-        Where chunks, metadata and attachments stand.
+    Metadata and attachments are added to a log.
     """
     chunks, metadata, attachments = list[int](), list[int](), list[int]()
     size, start, view = 0, len(MAGIC), memoryview(content)

@@ -119,12 +119,7 @@ def _opened(source: Source) -> Iterator[_OpenLog]:
 
 
 def read_log(source: Source) -> LogContents:
-    """Return everything that a log holds, verified.
-
-    Raises:
-        CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be
-            opened.
-    """
+    """Return everything that a log holds, verified; CorruptLog is raised where it is damaged."""
     with _opened(source) as log:
         rows: dict[str, list[Any]] = {topic: [] for topic in _RECORDS}
         digest, cpu_ns = ContentDigest(), list[int]()

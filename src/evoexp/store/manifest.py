@@ -88,8 +88,7 @@ def git_state() -> dict[str, Any] | None:
 def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Difference]:
     """Return the entries in which two manifests or environments differ, in alphabetical order.
 
-    Only sections that both have are compared: the environment of a log has no condition and no git
-    state. Of two lists (the features of processors) only entries that the other lacks are named.
+    Only sections that both have are compared; of two lists, entries that the other lacks are named.
     """
     shared = was.keys() & now.keys() - {"condition"}
     before = dict(_leaves({name: was[name] for name in shared}))

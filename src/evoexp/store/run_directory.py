@@ -1,6 +1,5 @@
 """The directory of one condition, `runs/<hash12>/`: its place, its finished parts, its lock."""
 
-import hashlib
 import json
 import os
 import re
@@ -31,13 +30,11 @@ from evoexp.store.identity import (
     TAKEN,
     DamagedFile,
     Plan,
-    as_json,
     checked_manifest,
     config_id,
     lost_files,
     read,
     read_object,
-    read_plans,
     restored_manifest,
     stored_id,
     whole_logs,
@@ -66,8 +63,6 @@ class RunDirectory:
 
     def __init__(self, outputs: Path, condition_id: str) -> None:
         """Name the directory; nothing is created or read."""
-        if not re.fullmatch("[0-9a-f]{64}", condition_id):
-            raise ValueError(f"condition_id: must be 64 hex digits, was {condition_id!r}")
         self.condition_id, self.hash12 = condition_id, condition_id[:HASH_LENGTH]
         self.path = Path(outputs) / "runs" / self.hash12
         self.replicates, self.summary_path = self.path / REPLICATES, self.path / "summary.parquet"
@@ -94,8 +89,6 @@ class RunDirectory:
             manifest: See `manifest.manifest`.
             files: Contents of the files that it refers to, by their names (`attachments.attached`).
         """
-        if hashlib.sha256(config_json).hexdigest() != self.condition_id:
-            raise ValueError(f"config_json: is not of condition {self.hash12}")
         if (self.path / CONFIG).exists():
             self.check()
         text = json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
@@ -208,7 +201,17 @@ class RunDirectory:
 
     def plans(self) -> list[Plan]:
         """Return how many replicates were asked for, in the order in which that was done."""
-        return read_plans(self.path / PLANS)
+        path = self.path / PLANS
+        if not os.path.lexists(path):
+            return []
+        try:
+            rows = read_object(path)["plans"]
+            plans = [Plan(row["num_replicates"], row["stored"]) for row in rows]
+        except (KeyError, TypeError) as error:
+            raise DamagedFile(f"{path}: damaged: no list of plans") from error
+        if not all(type(number) is int and number >= 0 for plan in plans for number in plan):
+            raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
+        return plans
 
     def num_asked(self) -> int:
         """Return how many replicates were ever asked for; 0 where the plans are damaged."""
@@ -226,7 +229,8 @@ class RunDirectory:
         if num_replicates > self.num_asked():
             plans.append(Plan(num_replicates, len(self.completed())))
             self.path.mkdir(parents=True, exist_ok=True)
-            write_file(self.path / PLANS, as_json(plans))
+            text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
+            write_file(self.path / PLANS, text.encode() + b"\n")
 
     @staticmethod
     def is_own(name: str) -> bool:
@@ -286,10 +290,8 @@ class RunDirectory:
             if (self.path / ".lock").exists():
                 with FileLock(self.path / ".lock", timeout=0):
                     return False
-        except Timeout:
-            return True
-        except OSError:  # outputs that may only be read
-            pass
+        except OSError as error:  # others are of outputs that may only be read
+            return isinstance(error, Timeout)
         return False
 
     def _matching(self, pattern: re.Pattern[str]) -> set[int]:

@@ -90,8 +90,7 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
 
     Args:
         runs: One or several.
-        thorough: Whether the checksums of all logs are looked at, not only of those whose size or
-            time changed: for who reads the logs anyway.
+        thorough: Whether the checksums of all logs are compared, not only of changed ones.
 
     Returns:
         Columns as `ReplicateSummary`, `terms` as `term_<name>` in alphabetical order.
@@ -181,9 +180,7 @@ def distinct(runs: Runs) -> list[RunDirectory]:
 def _current(run: RunDirectory, thorough: bool = False, tell: bool = False) -> _Summary:
     """Return the table of a run as its files are, written if it is new and nobody holds the run.
 
-    Args:
-        thorough: See `_up_to_date`.
-        tell: Whether to say which logs are damaged and have no row.
+    Where `tell` is set, damaged logs, which have no row, are named in a line.
     """
     summary = _up_to_date(run, {}, thorough)
     if summary.settings is None and summary.files:
@@ -201,12 +198,8 @@ def _up_to_date(
 ) -> _Summary:
     """Return the table of a run as its files are: the stored one, or a new one without settings.
 
-    Rows of files that did not change are taken from the stored one; damaged files are looked at
-    again.
-
-    Args:
-        written: Summaries of logs that are not read, by the names of their files.
-        thorough: Whether the checksums of logs are compared though they did not change.
+    Rows of unchanged files are taken from the stored one, summaries of `written` files as they are;
+    damaged files are looked at again. `thorough` compares the checksums of unchanged logs, too.
     """
     (stored, _), stamps = _stored(run), _stamps(run)
     unchanged = set[str]()
@@ -278,10 +271,7 @@ def _stamps(run: RunDirectory) -> Stamps:
 
 
 def _stored(run: RunDirectory) -> tuple[_Summary | None, str]:
-    """Return the table as it was written, and what is wrong with it.
-
-    One of another version is None, though nothing is wrong with it.
-    """
+    """Return the table as it was written, None if of another version, and what is wrong with it."""
     path = run.summary_path
     try:
         if not path.is_file():  # a pipe would keep its reader for ever

@@ -12,7 +12,8 @@ from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.errors import AmbiguousHash, NothingStored, SettingError, UnknownHash, UnknownOption
 from evoexp.records import GenerationRow, ReplicateSummary
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
+from store_lookup import find_runs
 
 SMALL = ("ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
 LABELS = ["via-point GA", "random search", "multi-start"]

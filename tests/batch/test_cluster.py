@@ -72,7 +72,7 @@ def test_a_killed_worker_loses_nothing_but_its_own_replicate(
     monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))
     outcomes = run(tmp_path / "outputs", (faulty, 12), **DASK, timeout_s=5.0)
     assert sorted(outcome.replicate for outcome in outcomes) == list(range(12)), "each ends once"
-    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.failed}
+    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.reason}
     died = "worker process died twice"
     assert reasons == {
         5: died,  # ended by its own time limit, which a thread cannot tell

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.batch import jobs, live_curves
-from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, fan_out
-from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates, fan_out
+from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.workers import Workers
@@ -163,7 +163,7 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
 ) -> None:
     monkeypatch.setenv("FAULTY", "raise:0,2")
     outcomes = run(tmp_path, (faulty, 4))
-    assert [(o.replicate, o.failed) for o in outcomes] == [
+    assert [(o.replicate, bool(o.reason)) for o in outcomes] == [
         (0, True),
         (1, False),
         (2, True),
@@ -184,14 +184,16 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
     monkeypatch.setenv("FAULTY", "raise:2")
     left = new_batch(tmp_path, (faulty, 4))
     assert (left.jobs, left.num_left_failed) == ([], 2)
-    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4), retry_failed=True)] == [
+    assert [
+        (o.replicate, bool(o.reason)) for o in run(tmp_path, (faulty, 4), retry_failed=True)
+    ] == [
         (0, False),
         (2, True),
     ]
     monkeypatch.delenv("FAULTY")
-    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4), retry_failed=True)] == [
-        (2, False)
-    ]
+    assert [
+        (o.replicate, bool(o.reason)) for o in run(tmp_path, (faulty, 4), retry_failed=True)
+    ] == [(2, False)]
     assert directory.failed() == set()
     assert not list(directory.replicates.glob("*.failed.json"))
     assert (read_summaries(directory)["status"] == "done").all()
@@ -308,7 +310,7 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
     outcomes = run(tmp_path / "outputs", (faulty, 12), num_workers=2)
     assert sorted(outcome.replicate for outcome in outcomes) == list(range(12)), "each ends once"
     assert all(outcome.content == b"" for outcome in outcomes), "logs are written and let go"
-    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.failed}
+    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.reason}
     assert reasons == {
         7: "worker process died twice",
         9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
@@ -320,7 +322,7 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
     assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]
 
 
-# Bundles
+# Tasks
 
 
 def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
@@ -336,34 +338,34 @@ def test_every_job_is_run_once_and_in_order(
     num_jobs: int, num_workers: int, tasks: list[tuple[float, int]]
 ) -> None:
     waiting = [Job(str(k % 3) * 64, b"", k) for k in range(num_jobs)]
-    bundles = Bundles(deque(waiting), num_workers)
+    replicates = Replicates(waiting, num_workers, NO_LIMITS)
     seen: list[Job] = []
-    for count, bundle in enumerate(bundles):
+    for count, (bundle,) in enumerate(iter(lambda: replicates.next_task(0), None)):
         assert 1 <= len(bundle) <= MAX_BUNDLE
         assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), (
             "nobody waits for one worker"
         )
         wall, done = tasks[count % len(tasks)]
         seen += bundle[:done]  # the worker stopped there
-        bundles.took(bundle, outcomes_of(bundle[:done], wall))
+        replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
     assert seen == waiting
 
 
 def test_bundles_are_as_long_as_a_task() -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(1000)]
-    bundles = Bundles(deque(waiting), 2)
-    iterator = iter(bundles)
-    first = next(iterator)
+    replicates = Replicates(waiting, 2, NO_LIMITS)
+    bundles = (task[0] for task in iter(lambda: replicates.next_task(0), None))
+    first = next(bundles)
     assert len(first) == MAX_BUNDLE, "nothing is known yet"
-    bundles.took(first, outcomes_of(first[:3], TASK_S / 10))
-    second = next(iterator)
+    replicates.end_task((first,), outcomes_of(first[:3], TASK_S / 10))
+    second = next(bundles)
     assert second == waiting[3:13]
-    bundles.took(second, outcomes_of(second, 1.0))
-    assert len(next(iterator)) == 1
+    replicates.end_task((second,), outcomes_of(second, 1.0))
+    assert len(next(bundles)) == 1
     for _ in range(60):
-        bundle = next(iterator)
-        bundles.took(bundle, outcomes_of(bundle, TASK_S / 10))
-    assert len(next(iterator)) in (9, 10), "slow ones are forgotten"
+        bundle = next(bundles)
+        replicates.end_task((bundle,), outcomes_of(bundle, TASK_S / 10))
+    assert len(next(bundles)) in (9, 10), "slow ones are forgotten"
 
 
 def test_a_task_that_takes_long_begins_no_further_replicate(

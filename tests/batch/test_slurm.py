@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from evoexp import shipped
-from evoexp.store.run_directory import find_runs
 from evoexp.store.summaries import summary_table
+from store_lookup import find_runs
 
 pytestmark = pytest.mark.skipif(  # not by importing it: that replaces this process' SIGINT handler
     importlib.util.find_spec("dask_jobqueue") is None,

@@ -6,15 +6,16 @@ random moments, with --exhaustive 300. `EVOEXP_KILLS` names a file for a line ab
 
 import os
 import random
+import signal
+import time
 from collections import deque
-from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from evoexp.batch import workers as workers_module
-from evoexp.batch.workers import Died, Workers, in_order
+from evoexp.batch.workers import Died, Workers
 from matrix import counts
 from worker_tasks import LEAST, MEGABYTE, MOST, Struck, content, work
 
@@ -38,70 +39,58 @@ class Retried:
 
     def __init__(self, tasks: list[Struck]) -> None:
         self._waiting = deque(tasks)
+        self.num_deaths = 0
 
     def next_task(self, num_running: int) -> tuple[Struck] | None:
         return (self._waiting.popleft(),) if self._waiting else None
 
     def end_task(self, task: tuple[Struck], end: Any) -> Any | None:
         if isinstance(end, Died):
+            self.num_deaths += 1
             self._waiting.append(task[0])
             return None
         return end
 
 
-@pytest.fixture
-def deaths(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return the bytes that were received of the result of each worker that died."""
-    found: list[int] = []
-    forget: Callable[[Workers, workers_module._Worker], None] = Workers._forget
-
-    def noted(self: Workers, worker: workers_module._Worker) -> None:
-        found.append(len(worker._received))
-        forget(self, worker)
-
-    monkeypatch.setattr(Workers, "_forget", noted)
-    return found
-
-
 @pytest.mark.matrix
-def test_every_batch_ends_and_nothing_differs(deaths: list[int], tmp_path: Path) -> None:
-    rng, lines, number = random.Random(SEED), list[str](), 0
-    while len(deaths) < NUM_KILLS:
-        before = len(deaths)
+def test_every_batch_ends_and_nothing_differs(tmp_path: Path) -> None:
+    rng, lines, number, num_deaths = random.Random(SEED), list[str](), 0, 0
+    while num_deaths < NUM_KILLS:
         tasks = [struck(rng, number + k, tmp_path) for k in range(PER_BATCH)]
         number += PER_BATCH
+        retried = Retried(tasks)
         with Workers(2) as workers:
-            ended = sorted(workers.results(work, Retried(tasks)))
+            ended = sorted(workers.results(work, retried.next_task, retried.end_task))
         assert [place for place, _, _ in ended] == [task.number for task in tasks]
         for task, (_, computed, digest) in zip(tasks, ended, strict=True):
             assert computed == content(task.number, task.size)
             lines.append(f"task {task.number}: {task.size} B, kill at {task.delay_s} s, {digest}")
-        new = deaths[before:]
-        halves = ", ".join(f"{size} B" for size in new if size) or "none"
-        lines.append(f"batch ended: {len(new)} kills, of half a message: {halves}")
-    halves = sum(1 for size in deaths if size)
-    lines.append(
-        f"{len(deaths)} kills, {halves} after half a message; all batches ended, no result differs"
-    )
+        num_deaths += retried.num_deaths
+        lines.append(f"batch ended: {retried.num_deaths} kills")
+    lines.append(f"{num_deaths} kills; all batches ended, no result differs")
     if NOTES in os.environ:
         Path(os.environ[NOTES]).write_text("\n".join(lines) + "\n")
 
 
-def test_half_a_message_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each worker is killed when the first bytes of its result have arrived."""
-    messages = workers_module._Worker.messages
-    struck = set[int]()
-
-    def receive_and_kill(worker: workers_module._Worker) -> list[Any]:
-        received = list(messages(worker))
-        if worker.task is not None and (number := worker.task[1][0].number) not in struck:
-            struck.add(number)
-            worker.kill()
-        return received
-
-    monkeypatch.setattr(workers_module._Worker, "messages", receive_and_kill)
-    tasks = [(Struck(number, 20 * MEGABYTE, None, None),) for number in range(4)]
+def test_half_a_message_keeps_nobody_waiting() -> None:
+    """A worker is killed while it sends a result that nobody reads yet."""
+    tasks = [Struck(0, 1, None, None), Struck(1, 20 * MEGABYTE, None, None)]
+    retried = Retried(tasks)
     with Workers(2) as workers:
-        ended = [(number, computed) for number, computed, _ in in_order(workers, work, tasks)]
-    assert ended == [(number, content(number, 20 * MEGABYTE)) for number in range(4)]
-    assert struck == {0, 1, 2, 3}
+        results = workers.results(work, retried.next_task, retried.end_task)
+        ended = [next(results)]
+        time.sleep(2.0)  # the other one fills its pipe
+        for process in children_of_children():
+            os.kill(process, signal.SIGKILL)
+        ended += results
+    assert retried.num_deaths >= 1  # the idle one is killed, too, and noticed late
+    assert [computed for _, computed, _ in ended] == [content(k, tasks[k].size) for k in (0, 1)]
+
+
+def children_of_children() -> list[int]:
+    """Return the workers that the servers of this process have forked."""
+    parents = dict[int, int]()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(") ")[2].split()[1])
+    return [number for number, parent in parents.items() if parents.get(parent) == os.getpid()]

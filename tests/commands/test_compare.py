@@ -5,7 +5,7 @@ from pathlib import Path
 
 from command_samples import SERIAL, Evoexp
 
-from evoexp.store.run_directory import find_runs
+from store_lookup import find_runs
 
 KEYS = {"condition", "runs", "proven", "queries", "interval", "lengths", "refuted"}
 

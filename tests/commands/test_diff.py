@@ -14,8 +14,9 @@ from evoexp.commands.diff import changed
 from evoexp.shipped import shipped
 from evoexp.store.archive import pack
 from evoexp.store.log import SUMMARY
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
 from forged_logs import with_metadata
+from store_lookup import find_runs
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers(-3, 3) | st.text("ab", max_size=2),

@@ -14,9 +14,10 @@ from evoexp import shipped
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import description, options
 from evoexp.shipped import Shipped
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
 from shipped_conditions import expanded
+from store_lookup import find_runs
 
 PLANAR = ("experiment=rana_planar", *SMALL)
 

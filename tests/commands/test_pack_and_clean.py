@@ -9,8 +9,9 @@ import pytest
 from command_samples import Evoexp, content
 
 from evoexp.store.archive import pack
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
 from forged_logs import Row, with_message
+from store_lookup import find_runs
 
 
 @pytest.fixture

@@ -10,7 +10,8 @@ from command_samples import SERIAL, Evoexp, content
 
 from evoexp.commands import plan
 from evoexp.commands.plan import OTHER_SETTINGS, Times, bounds
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
+from store_lookup import find_runs
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from evoexp.batch import live_curves
 from evoexp.batch.jobs import Outcome
-from evoexp.batch.live_curves import NUM_POINTS, CurveFile, read_curves, thinned
+from evoexp.batch.live_curves import NUM_POINTS, CurveFile, read_curves
 from evoexp.commands.progress import MOST_ROWS, BatchProgress, drawn
 from evoexp.records import Block, Generation
 
@@ -107,9 +107,16 @@ def test_a_curve_is_drawn_between_its_extremes(costs: list[float], expected: str
     assert drawn(costs) == expected
 
 
-def test_curves_are_thinned_with_both_ends() -> None:
-    values = list(map(float, range(1001)))
-    kept = thinned(values)
-    assert len(kept) == NUM_POINTS
-    assert (kept[0], kept[-1], kept == sorted(set(kept))) == (0.0, 1000.0, True)
-    assert thinned(values[:40]) == values[:40]
+@pytest.mark.parametrize("last", [0, 40, NUM_POINTS - 1, NUM_POINTS, 1000])
+def test_curves_are_thinned_with_both_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: int
+) -> None:
+    monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
+    file, best = CurveFile(tmp_path, "b", 1), np.zeros(1)
+    for k in range(last + 1):
+        numbers = (float(k), float(k), float(k), 0.0, 1, k, k, True)
+        file.hear(Block.of(Generation(k, best, *numbers, {}, np.array([0.0]), best)))
+    (curve,) = read_curves(tmp_path)
+    assert len(curve.costs) == min(last + 1, NUM_POINTS)
+    assert (curve.costs[0], curve.costs[-1]) == (0.0, float(last))
+    assert curve.costs == sorted(set(curve.costs))

@@ -18,7 +18,8 @@ from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.records import Block, generations
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
+from store_lookup import find_runs
 
 Refused = Callable[..., str]
 

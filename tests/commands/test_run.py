@@ -12,7 +12,7 @@ from command_samples import SERIAL, SMALL, Evoexp, exit_code
 
 from evoexp import load
 from evoexp.configuration import compose
-from evoexp.store.run_directory import find_runs
+from store_lookup import find_runs
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 

@@ -18,8 +18,8 @@ from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import find_runs
 from evoexp.store.tables import read_summaries
+from store_lookup import find_runs
 
 Refused = Callable[..., str]
 PLANAR = ("experiment=rana_planar", *SMALL)

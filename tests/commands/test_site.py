@@ -9,8 +9,9 @@ from command_samples import SMALL, Evoexp, content
 
 from evoexp.commands import report
 from evoexp.shipped import shipped
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import RunDirectory
 from html_reader import Page
+from store_lookup import find_runs
 
 WORDS = ("rana_planar", *SMALL, "report.formats=[svg]")
 

@@ -9,7 +9,7 @@ import pytest
 from command_samples import SMALL, Evoexp
 
 from evoexp.store.run_context import origin_of
-from evoexp.store.run_directory import find_runs
+from store_lookup import find_runs
 
 Refused = Callable[..., str]
 STRAIGHT = [[[180.0, 90.0], [0.0, 90.0]]] * 2

@@ -10,7 +10,7 @@ import pytest
 from command_samples import Evoexp
 
 from evoexp.commands.arguments import is_motion, is_override
-from evoexp.store.run_directory import find_runs
+from store_lookup import find_runs
 
 Refused = Callable[..., str]
 PLANAR = ("experiment=rana_planar", "budget=smoke")

@@ -9,7 +9,13 @@ import pytest
 from composed import composed
 from evoexp.batch import replicate
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduction import difference, farthest, fingerprint, same_fingerprint
+from evoexp.batch.reproduction import (
+    difference,
+    farthest,
+    field_differences,
+    fingerprint,
+    same_fingerprint,
+)
 from evoexp.cli import main
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError, SettingError
@@ -167,10 +173,11 @@ def test_arrays_that_are_missing_differ() -> None:
     found = composed(*WORDS)
     other = composed(*WORDS, "+reference.rows=4")
     one, two = (read_log(run_replicate(c, 0).content) for c in (found, other))
-    assert farthest(one, one) == ("", 0.0)
+    assert farthest(field_differences(one, one)) == ("", 0.0)
     taller = one._replace(attachments=two.attachments)
-    assert farthest(one, taller) == ("attachment table.npy: values", np.inf)
-    assert farthest(one, one._replace(attachments={})) == ("attachment counts.npy", np.inf)
+    assert farthest(field_differences(one, taller)) == ("attachment table.npy: values", np.inf)
+    fewer = one._replace(attachments={})
+    assert farthest(field_differences(one, fewer)) == ("attachment counts.npy", np.inf)
     assert fingerprint(found, one.summary) == f"cost {one.summary.best_cost!r}"
 
 

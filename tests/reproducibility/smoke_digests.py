@@ -75,7 +75,7 @@ def run_in_workers(jobs: list[Job], files: tuple[bytes, ...], num_workers: int) 
     with Workers(num_workers) as workers:
         for outcomes in fan_out(tasks, workers):
             for outcome in outcomes:
-                assert not outcome.failed, outcome.traceback
+                assert not outcome.reason, outcome.traceback
                 yield read_log(outcome.content).summary
 
 

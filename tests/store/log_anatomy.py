@@ -21,7 +21,7 @@ from mcap.records import (
     Schema,
 )
 
-from evoexp.store.digests import ContentDigest, channel_identity
+from evoexp.store.digests import ContentDigest
 from evoexp.store.log import CONTENT_DIGEST, SUMMARY
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -167,9 +167,7 @@ def _digest(parts: list[Part]) -> None:
                 elif opcode == Opcode.MESSAGE:
                     number, sequence, log_time, _ = MESSAGE.unpack_from(body)
                     own = channels[number]
-                    identity = channel_identity(
-                        own.topic, schemas[own.schema_id], own.message_encoding
-                    )
+                    identity = (own.topic, schemas[own.schema_id], own.message_encoding)
                     digest.update(identity, log_time, sequence, body[MESSAGE.size :])
         for part in parts:
             if part.opcode == Opcode.METADATA:

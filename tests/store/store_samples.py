@@ -112,7 +112,8 @@ def write(
     by_generation = {front.generation: front for front in fronts}
     for generation in written:
         rng.random()
-        log.write(Block.of(generation), seconds[generation.index] if seconds else 0.0)
         if generation.index in by_generation:
-            log.write_front(by_generation[generation.index])
+            criteria = by_generation[generation.index].criteria.T[None]
+            generation = generation._replace(criteria=criteria)
+        log.write(Block.of(generation), seconds[generation.index] if seconds else 0.0)
     return log.finish(summary(replicate, **changes))

@@ -52,7 +52,7 @@ READERS: tuple[Callable[[Any], object], ...] = (
 )
 NUM_LOGS = counts(10_000, 100_000) if matrices_are_asked_for() else 300
 # [MiB] beyond what the process has: for logs of a few kB, and for those as large as they may be
-LITTLE, MOST = 500, log_bounds.MEMORY_FACTOR * log_bounds.MAX_LOG // 2**20
+LITTLE, MOST = 500, 10 * log_bounds.MAX_LOG // 2**20
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.log import Log
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
-FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
+FRONT = FrontRow(4, 0, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
 
 def same(one: object, other: object) -> bool:
@@ -200,18 +200,6 @@ def test_nonfinite_is_there_only_when_needed() -> None:
         rows[1]["nonfinite"]["best_cost"] == "inf"
         and rows[1]["nonfinite"]["term_clearance"] == "-inf"
     )
-
-
-def test_misuse_is_refused() -> None:
-    rng = np.random.default_rng(0)
-    with pytest.raises(ValueError, match="config.json"):
-        Log(CONDITION, CONFIG, 7, rng, {"config.json": b""})
-    with pytest.raises(ValueError, match="no generation"):
-        Log(CONDITION, CONFIG, 7, rng).finish(summary())
-    log = Log(CONDITION, CONFIG, 8, rng)
-    log.write(Block.of(generations(1)[0]))
-    with pytest.raises(ValueError, match="replicate 7"):
-        log.finish(summary(7))
 
 
 def test_links_are_those_of_costs_one_by_one() -> None:

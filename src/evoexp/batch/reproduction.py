@@ -1,14 +1,13 @@
 """Runs stored replicates again and compares: MATCH, or the first generation that differs.
 
 Two things are compared: the search, link by link of the chain, and everything else that a log
-holds: summary, generations, solutions, fronts, attachments, content digest; all but times. In an
-equal environment both must agree to the bit, elsewhere numbers to `TOLERANCE`; the answer says
-which. Elsewhere a planner whose reproducibility is `environment` is compared by all its numbers
-where bits differ.
+holds but times. In an equal environment both must agree to the bit, elsewhere numbers to
+`TOLERANCE`. Elsewhere a planner whose reproducibility is `environment` is compared by numbers only.
 """
 
+import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,12 +18,12 @@ from evoexp.batch.memory_limit import machine_memory, refuse_large
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, MissingDistribution
-from evoexp.records import TIMES, GenerationRow, ReplicateSummary, flatten
+from evoexp.records import TIMES, ReplicateSummary, flatten
 from evoexp.registry import missing
 from evoexp.store.digests import array_bytes
 from evoexp.store.files import reason
 from evoexp.store.log import ARRAY
-from evoexp.store.log_reader import LogContents, decode_array, read_log
+from evoexp.store.log_reader import LogContents, decode_array, demand_place, read_log
 from evoexp.store.manifest import differences
 
 TOLERANCE = 1e-9  # [-] by which numbers may differ: of their size, or absolutely if it is below 1
@@ -36,8 +35,6 @@ _CONFIG, _CONTENT = "configuration", "content digest"
 # differ, these are named and decide nothing.
 _UNDECIDED = ("clearance_at", "clearance_pair", "penetration_pair", "certificate_queries")
 _COST = "cost "  # begins a fingerprint that is no digest
-
-
 _PLAIN = (str, int, float, type(None))  # values of which a difference is told
 _LONGEST = 60  # characters of one
 
@@ -55,19 +52,15 @@ class FieldDifference(NamedTuple):
         """Whether it is a number that agrees to `TOLERANCE`, or decides nothing."""
         return self.size <= TOLERANCE or self.name in _UNDECIDED
 
-    @property
-    def is_count(self) -> bool:
-        """Whether it counts steps, of which rounding decides how many lead to the same end."""
-        ints = type(self.was) is int and type(self.now) is int
-        return self.name.endswith("evaluations") or (ints and "num_feasible" not in self.name)
-
     def __str__(self) -> str:
         """Return the difference in words."""
         if math.isfinite(self.size):
             return f"{self.name} differs by {self.size:.1e}"
         if not all(isinstance(value, _PLAIN) for value in (self.was, self.now)):
             return f"{self.name} differs"
-        return f"{self.name} was {_short(self.was)}, is {_short(self.now)}"
+        texts = (repr(self.was), repr(self.now))
+        was, now = (t if len(t) <= _LONGEST else f"{t[:_LONGEST]}…" for t in texts)
+        return f"{self.name} was {was}, is {now}"
 
 
 class Comparison(NamedTuple):
@@ -82,9 +75,7 @@ class Comparison(NamedTuple):
     # differences of everything but the chain, in the order of `field_differences`
     fields: tuple[FieldDifference, ...] = ()
     inexact: str = ""  # why these are compared to `TOLERANCE`; empty: to the bit
-    # where numbers are compared instead of chains: the number that differs most, and by how much
-    # [-]; None: chains are compared
-    farthest: tuple[str, float] | None = None
+    by_numbers: bool = False  # whether numbers are compared instead of chains
 
     @property
     def search_matches(self) -> bool:
@@ -94,38 +85,38 @@ class Comparison(NamedTuple):
     @property
     def matches(self) -> bool:
         """Whether every bit agrees, or every number to `TOLERANCE` where numbers are compared."""
-        if self.farthest is not None:
-            return self.farthest[1] <= TOLERANCE
+        if self.by_numbers:
+            return farthest(self.fields)[1] <= TOLERANCE
         return self.search_matches and self._decisive is None
+
+    @property
+    def _decisive(self) -> FieldDifference | None:
+        """The first difference that is none of rounding."""
+        large = (each for each in self.fields if not (self.inexact and each.is_close))
+        return next(large, None)
 
     @property
     def verdict(self) -> str:
         """MATCH, or where it diverges."""
-        if self.farthest is not None:
-            name, difference = self.farthest
+        if self.by_numbers:
+            name, difference = farthest(self.fields)
             if self.matches:
                 most = f"; at most {difference:.1e}, {name}" if difference else ""
                 return f"MATCH to {TOLERANCE:g} ({self.inexact}{most})"
             return f"DIVERGES by {difference:.1e} in {name} ({self.inexact})"
-        if not self.search_matches:
-            at = "the last population" if self.diverged_at is None else None
-            return f"DIVERGES in {at}" if at else f"DIVERGES at generation {self.diverged_at}"
+        if self.diverged_at is not None:
+            return f"DIVERGES at generation {self.diverged_at}"
+        if not self.digest_matches:
+            return "DIVERGES in the last population"
         if not self.fields:
             return "MATCH"
-        shown = self._decisive or self.fields[0]
-        others = len(self.fields) - 1
+        shown, others = self._decisive or self.fields[0], len(self.fields) - 1
         more = f", and {others} more field{'s' * (others > 1)}" if others else ""
         if self._decisive is None:
             rest = f"to {TOLERANCE:g} in the rest: {shown}{more}"
             return f"MATCH in the search, {rest} ({self.inexact})"
         why = f" ({self.inexact})" if self.inexact else ""
         return f"MATCH in the search; DIVERGES in the rest: {shown}{more}{why}"
-
-    @property
-    def _decisive(self) -> FieldDifference | None:
-        """The first difference that is none of rounding."""
-        found = (each for each in self.fields if not (self.inexact and each.is_close))
-        return next(found, None)
 
 
 class DamagedLog(NamedTuple):
@@ -137,33 +128,40 @@ class DamagedLog(NamedTuple):
 
 
 def reproduce_stored(path: Path, condition_id: str, replicate: int) -> Comparison | DamagedLog:
-    """Run a replicate of a stored run again, as `reproduce_log` does.
-
-    A log that is damaged, or of another replicate than its place says, is not compared.
-    """
+    """Run a replicate of a stored run again, as `reproduce_log` does, if its log is whole."""
     try:
-        stored = read_log(path)
-        if (stored.condition_id, stored.replicate) != (condition_id, replicate):
-            theirs = f"replicate {stored.replicate} of {stored.condition_id[:12]}"
-            raise CorruptLog(f"{path}: holds {theirs}, which does not belong here")
-        return _reproduce(path, stored)
+        return reproduce_log(path, (condition_id, replicate))
     except CorruptLog as error:
         return DamagedLog(condition_id, replicate, reason(path, error))
 
 
-def reproduce_log(path: Path) -> Comparison:
+def reproduce_log(path: Path, place: tuple[str, int] | None = None) -> Comparison:
     """Run a log's replicate again, from the configuration attached to the log alone.
 
-    Raises:
-        CorruptLog: If the log cannot be trusted.
-        RevisionMismatch: If a component has another revision in this installation.
-        MissingDistribution: If the package of a component is not installed.
+    Args:
+        place: Condition and replicate that it must be of; None: any.
+
+    CorruptLog is raised where the log cannot be trusted; see `stored_condition`, too.
     """
-    return _reproduce(path, read_log(path))
+    stored = read_log(path)
+    if place is not None:
+        demand_place(str(path), (stored.condition_id, stored.replicate), place)
+    condition = stored_condition(path, stored)
+    refuse_large(condition, machine_memory())
+    again = read_log(run_replicate(condition, stored.replicate).content)
+    comparison = compare(stored, again)
+    is_same = comparison.search_matches and not comparison.fields
+    is_exact = condition.reproducibility == "bits" or not comparison.inexact
+    return comparison._replace(by_numbers=not is_same and not is_exact)
 
 
 def stored_condition(path: Path, log: LogContents) -> Condition:
-    """Return the condition of a log, built from the log alone; see `reproduce_log`."""
+    """Return the condition of a log, built from the log alone.
+
+    Raises:
+        RevisionMismatch: If a component has another revision in this installation.
+        MissingDistribution: If the package of a component is not installed.
+    """
     if packages := missing(log.environment.get("components", {})):
         raise MissingDistribution(str(path), packages)
     keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
@@ -176,25 +174,20 @@ def stored_condition(path: Path, log: LogContents) -> Condition:
     return condition
 
 
-def _reproduce(path: Path, stored: LogContents) -> Comparison:
-    condition = stored_condition(path, stored)
-    refuse_large(condition, machine_memory())
-    again = read_log(run_replicate(condition, stored.replicate).content)
-    found = compare(stored, again)
-    is_same = found.search_matches and not found.fields
-    if condition.reproducibility == "bits" or is_same or not found.inexact:
-        return found
-    return found._replace(farthest=farthest(stored, again))
-
-
 def compare(stored: LogContents, again: LogContents) -> Comparison:
     """Compare two logs of one replicate: link by link, and field by field."""
     environment = tuple(map(str, differences(stored.environment, again.environment)))
     is_older = EXACT_BOXES not in stored.environment
-    found = Comparison(
+    pairs = itertools.zip_longest(stored.generations, again.generations)
+    diverging = (
+        (before or now).index
+        for before, now in pairs
+        if before is None or now is None or before.chain != now.chain
+    )
+    comparison = Comparison(
         stored.condition_id,
         stored.replicate,
-        first_divergence(stored.generations, again.generations),
+        next(diverging, None),
         stored.summary.digest == again.summary.digest,
         len(stored.generations),
         environment,
@@ -202,9 +195,9 @@ def compare(stored: LogContents, again: LogContents) -> Comparison:
         ELSEWHERE if environment else OLDER if is_older else "",
     )
     digests = stored.content_digest, again.content_digest
-    if found.search_matches and not found.fields and digests[0] != digests[1]:
-        return found._replace(fields=(FieldDifference(_CONTENT, *digests, math.inf),))
-    return found
+    if comparison.search_matches and not comparison.fields and digests[0] != digests[1]:
+        return comparison._replace(fields=(FieldDifference(_CONTENT, *digests, math.inf),))
+    return comparison
 
 
 def field_differences(stored: LogContents, again: LogContents) -> Iterator[FieldDifference]:
@@ -255,30 +248,19 @@ def _bits(value: Any) -> Any:
     return repr(value) if isinstance(value, float) else value
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+def farthest(fields: Iterable[FieldDifference]) -> tuple[str, float]:
+    """Return the value that differs most: its name, and by how much [-].
 
-
-def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) -> int | None:
-    """Return the index of the first generation that differs or is missing in one log, or None."""
-    for before, now in zip(stored, again, strict=False):
-        if before.chain != now.chain:
-            return before.index
-    if len(stored) != len(again):
-        longer: Any = max(stored, again, key=len)
-        return int(longer[min(len(stored), len(again))].index)
-    return None
-
-
-def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
-    """Return the value that differs most between two logs: its name, and by how much [-].
-
-    Counts are left out, and what `_UNDECIDED` names. Without a difference the name is empty.
+    Counts of steps are left out, as rounding decides how many lead to the same end, and what
+    `_UNDECIDED` names. Without a difference the name is empty.
     """
-    found = (each for each in field_differences(stored, again) if not each.is_count)
-    sizes = ((each.name, each.size) for each in found if each.name not in _UNDECIDED)
-    return max(sizes, key=lambda item: item[1], default=("", 0.0))
+    sizes = [("", 0.0)]
+    for each in fields:
+        ints = type(each.was) is int and type(each.now) is int
+        is_count = each.name.endswith("evaluations") or (ints and "num_feasible" not in each.name)
+        if not is_count and each.name not in (*_UNDECIDED, _CONTENT):
+            sizes.append((each.name, each.size))
+    return max(sizes, key=lambda item: item[1])
 
 
 def difference(one: Any, two: Any) -> float:
@@ -311,7 +293,6 @@ def fingerprint(condition: Condition, summary: ReplicateSummary) -> str:
 def same_fingerprint(one: str, two: str) -> bool:
     """Return whether two fingerprints agree: digests to the bit, costs to `TOLERANCE`."""
     if one.startswith(_COST) and two.startswith(_COST):
-        return (
-            difference(float(one.removeprefix(_COST)), float(two.removeprefix(_COST))) <= TOLERANCE
-        )
+        costs = [float(text.removeprefix(_COST)) for text in (one, two)]
+        return difference(*costs) <= TOLERANCE
     return one == two

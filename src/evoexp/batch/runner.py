@@ -18,10 +18,10 @@ from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 from evoexp.registry import guests
 from evoexp.store.identity import MANIFEST, restored_manifest
-from evoexp.store.integrity import lost_replicates, mend, needs_mending
+from evoexp.store.integrity import lost_replicates, mend
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
-from evoexp.store.summaries import whole_logs, write_summary
+from evoexp.store.summaries import damaged_logs, whole_logs, write_summary
 
 if TYPE_CHECKING:
     from evoexp.batch.workers import Workers
@@ -54,37 +54,28 @@ class Batch:
                 may occur twice.
             settings: Number of workers, and where they run.
             outputs: Root of all outputs.
-            retry_failed: Whether replicates that failed before run again; else they stay failed.
-            curves: Folder for the convergence of replicates while they run; None: it is not told.
+            retry_failed: Whether replicates that failed before run again.
+            curves: Folder for the convergence of running replicates; None: it is not told.
         """
         self._curves = curves
         self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
-            known = self._wanted.get(condition.id)
-            self._wanted[condition.id] = (
-                condition,
-                max(count, known[1] if known else 0),
-                known[2] if known else notes,
-            )
+            _, before, first_notes = self._wanted.get(condition.id, (condition, 0, notes))
+            self._wanted[condition.id] = (condition, max(count, before), first_notes)
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         for run in self.runs.values():
             whole_logs(run, thorough=True)  # what is damaged is known from here on
         self.jobs = self._missing({key: lost_replicates(run) for key, run in self.runs.items()})
         self.is_damaged = any(
-            needs_mending(run, self._wanted[key][0].to_json()) for key, run in self.runs.items()
+            run.damaged_files(self._wanted[key][0].to_json()) or damaged_logs(run)
+            for key, run in self.runs.items()
         )
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
         self._summarised: set[str] = set()  # conditions whose table is written
 
     def prepare(self) -> None:
-        """Check conditions against robot and scenario, before anything is written.
-
-        Those that nothing is missing of were checked when they were run.
-
-        Raises:
-            SettingError: If one contradicts itself, or takes more memory than there is.
-        """
+        """Check conditions with missing replicates, see `refuse_large`; nothing is written yet."""
         allowed = allowed_memory(self._settings, self.num_workers)
         missing = {job.condition_id for job in self.jobs}
         for key, (condition, _, notes) in self._wanted.items():
@@ -94,10 +85,8 @@ class Batch:
     def run(self) -> Generator[Outcome, None, None]:
         """Mend the runs, run the missing replicates; yield every outcome once it is stored.
 
-        Closing the iterator keeps the finished replicates.
-
-        Raises:
-            Busy: If another process writes one of the runs.
+        Closing the iterator keeps the finished replicates. `Busy` is raised where another process
+        writes one of the runs.
         """
         with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
@@ -108,20 +97,15 @@ class Batch:
             try:
                 with self._workers() as workers:  # they end first of all, however the body ends
                     self._create_runs()
-                    kinds, limits = one_of_each_kind(self.jobs), self._limits()
-                    if workers is not None:
-                        workers.call_first(warm_kernels, kinds, limits)
-                    elif self._settings.address is None:  # else the workers are elsewhere
-                        warm_kernels(kinds, limits)
-                    for outcomes in self._spread(workers):
+                    for outcomes in self._outcomes(workers):
                         yield from self._store(outcomes)
             except OSError:  # a full disk: the table can be built from the logs at any time
                 raise
             except BaseException:
                 with contextlib.suppress(OSError):
-                    self._summarise_all()
+                    self._summarise(self.runs.keys() - self._summarised)
                 raise
-            self._summarise_all()
+            self._summarise(self.runs.keys() - self._summarised)
 
     def _workers(self) -> "contextlib.AbstractContextManager[Workers | None]":
         """Return worker processes; None where there is one, or where a cluster starts them."""
@@ -136,13 +120,24 @@ class Batch:
         for key, run in self.runs.items():
             condition, _, notes = self._wanted[key]
             config_json = condition.to_json()
-            run.create(config_json, _manifest(run, config_json) | notes, condition.files())
+            # of a run that has lost its manifest, a log knows something of it
+            is_lost = run.completed() and not (run.path / MANIFEST).exists()
+            known = restored_manifest(run.path, key) if is_lost else {}
+            known = known or manifest(key, guests(config_json))
+            run.create(config_json, known | notes, condition.files())
         for key in dict.fromkeys(job.condition_id for job in self.jobs):
             self.runs[key].note_plan(self._wanted[key][1])
 
-    def _spread(self, workers: "Workers | None") -> Iterator[list[Outcome]]:
-        """Run the jobs where the settings say."""
-        limits = self._limits()
+    def _outcomes(self, workers: "Workers | None") -> Iterator[list[Outcome]]:
+        """Load the kernels, then run the jobs where the settings say."""
+        allowed = allowed_memory(self._settings, self.num_workers)
+        least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
+        limits = ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
+        kinds = one_of_each_kind(self.jobs)
+        if workers is not None:
+            workers.call_first(warm_kernels, kinds, limits)
+        elif self._settings.address is None:  # else the workers are elsewhere
+            warm_kernels(kinds, limits)
         if self._settings.backend == "dask":
             from evoexp.batch.cluster import cluster_fan_out
 
@@ -167,11 +162,6 @@ class Batch:
             len(self.runs[key].failed() & set(range(count)))
             for key, (_, count, _) in self._wanted.items()
         )
-
-    def _limits(self) -> ReplicateLimits:
-        allowed = allowed_memory(self._settings, self.num_workers)
-        least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
-        return ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
 
     def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
         """Return the jobs of missing replicates; references, which take longest, come first."""
@@ -198,21 +188,10 @@ class Batch:
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
             if len(self._finished[key]) == self._wanted[key][1]:
-                self._summarise(key)  # now, while the workers go on
+                self._summarise([key])  # now, while the workers go on
         return [outcome._replace(content=b"") for outcome in outcomes]
 
-    def _summarise_all(self) -> None:
-        for key in self.runs.keys() - self._summarised:
-            self._summarise(key)
-
-    def _summarise(self, key: str) -> None:
-        write_summary(self.runs[key], self._finished.get(key, {}))
-        self._finished.pop(key, None)
-        self._summarised.add(key)
-
-
-def _manifest(run: RunDirectory, config_json: bytes) -> dict[str, Any]:
-    """Return the manifest of a run; of one that has lost its own, what a log knows of it."""
-    is_lost = run.completed() and not (run.path / MANIFEST).exists()
-    known = restored_manifest(run.path, run.condition_id) if is_lost else {}
-    return known or manifest(run.condition_id, guests(config_json))
+    def _summarise(self, keys: Iterable[str]) -> None:
+        for key in keys:
+            write_summary(self.runs[key], self._finished.pop(key, {}))
+            self._summarised.add(key)

@@ -15,7 +15,7 @@ from evoexp.batch.reproduction import FieldDifference, differing, stored_conditi
 from evoexp.errors import EvoexpError
 from evoexp.planners.planner import Planner
 from evoexp.planners.proofs import judge_motion
-from evoexp.records import SolutionRow, flatten
+from evoexp.records import flatten
 from evoexp.store.log_reader import LogContents
 
 LARGEST = 1e7  # of a solution's numbers, as of those of robots and scenarios, in any unit
@@ -25,14 +25,12 @@ _UNFIT = (ValueError, ArithmeticError, LookupError, EvoexpError)  # raised by nu
 def contradictions(path: Path, log: LogContents) -> Iterator[str]:
     """Yield the contradictions between a log's solutions and the costs, terms and verdict it tells.
 
-    Raises:
-        EvoexpError: If its solutions cannot be evaluated here: another revision, a missing package.
+    EvoexpError is raised where they cannot be evaluated here: another revision, a missing package.
     """
     condition = stored_condition(path, log)
     refuse_large(condition, machine_memory())
-    planner, problem = condition.prepare()
     with np.errstate(all="ignore"):
-        yield from map(str, _contradictions(planner, problem, log))
+        yield from map(str, _contradictions(*condition.prepare(), log))
 
 
 def _contradictions(
@@ -48,7 +46,9 @@ def _contradictions(
             return
         yield from differing({"cost": solution.cost}, {"cost": row.best_cost}, f"{name}: ")
         try:
-            terms = _terms(planner, problem, solution)
+            if not (np.abs(solution.values) <= LARGEST).all():  # NaN, too
+                raise ValueError(f"its numbers must be finite and at most {LARGEST:g}")
+            terms = planner.evaluate(problem, solution.values)
         except _UNFIT as error:
             if not isinstance(error, EvoexpError) or math.isfinite(solution.cost):
                 yield FieldDifference(name, "there", f"none: {error}", math.inf)
@@ -65,19 +65,11 @@ def _contradictions(
     yield from _unlike(flatten(log.summary), verdict, "motion of the last solution: ")
 
 
-def _terms(planner: Planner[Any], problem: Any, solution: SolutionRow) -> dict[str, float]:
-    """Return the terms of a solution."""
-    if not (np.abs(solution.values) <= LARGEST).all():  # NaN, too
-        raise ValueError(f"its numbers must be finite and at most {LARGEST:g}")
-    return planner.evaluate(problem, solution.values)
-
-
 def _unlike(
     stored: Mapping[str, Any], again: Mapping[str, Any], prefix: str
 ) -> Iterator[FieldDifference]:
     """Yield the fields of both that differ by more than rounding."""
-    names = [name for name in again if name in stored]
-    before, now = ({name: row[name] for name in names} for row in (stored, again))
-    for each in differing(before, now):
+    shared = {name: again[name] for name in again if name in stored}
+    for each in differing({name: stored[name] for name in shared}, shared):
         if not each.is_close:
             yield each._replace(name=prefix + each.name)

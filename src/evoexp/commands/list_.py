@@ -12,7 +12,6 @@ from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, printable
 from evoexp.store.files import listed
-from evoexp.store.integrity import damaged_files
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_rows
@@ -98,7 +97,7 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     except OSError as error:
         return row | {"damage": f"{error.filename}: {error.strerror}"}
     done = [each for each in rows if each["status"] == "done"]
-    damaged = damaged_files(run) | damaged
+    damaged = run.damaged_files() | damaged
     return row | {
         "hash": run.condition_id,
         "done": len(done),

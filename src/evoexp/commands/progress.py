@@ -107,7 +107,7 @@ class BatchProgress:
     def advance(self, outcome: Outcome) -> None:
         """Count one replicate."""
         key = outcome.condition_id
-        self._failed[key] += outcome.failed
+        self._failed[key] += bool(outcome.reason)
         if outcome.summary is not None:
             self._best[key] = min(self._best[key], outcome.summary.best_cost)
         best = f"best {self._best[key]:.4g}" if np.isfinite(self._best[key]) else ""

@@ -132,7 +132,7 @@ def _run(
     with progress.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
             progress.advance(outcome)
-            if outcome.failed:
+            if outcome.reason:
                 failures.append(outcome)
                 failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
                 print(f"{failed}: {printable(outcome.reason)}", file=sys.stderr)

@@ -3,7 +3,7 @@
 import argparse
 import contextlib
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -97,7 +97,7 @@ def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
     size = sum(path.lstat().st_size for own in paths for path in own)
     is_small = (size < LARGE and sum(map(len, paths)) < MANY) or len(parts) < 2
     with contextlib.ExitStack() as stack:
-        checks: Iterator[list[LogCheck]] = itertools.starmap(_check, parts)
+        checks: Iterable[list[LogCheck]] = itertools.starmap(_check, parts)
         if not is_small:
             workers = stack.enter_context(Workers(min(num_cores(), len(parts))))
             checks = in_order(workers, _check, parts)

@@ -1,10 +1,9 @@
 """Archives of stored runs: one tar file that another store takes in.
 
 An archive holds `runs/<hash12>/…` as a store does, so `tar` can read it, too. The same runs give
-the same bytes. Nothing of an archive is trusted: it holds plain files only, whose heads are all
-checked before anything is read; names are matched, sizes are limited, and memory is taken for the
-bytes that are there, of one file and of at most `MOST_WAITING` bytes of logs that wait. Every log
-is checked against its place before it is taken in.
+the same bytes. Nothing of an archive is trusted: the heads of all files are checked before anything
+is read, and every log is checked against its place before it is taken in. Memory is taken for one
+file, and for at most `MOST_WAITING` bytes of logs that wait.
 """
 
 import hashlib
@@ -13,7 +12,7 @@ import json
 import os
 import re
 import tarfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -30,7 +29,6 @@ MOST_FILES = 2_000_000  # of an archive
 MOST_WAITING = 64 * MEGABYTE  # [B] of logs that are taken in together
 MAX_TEXT = 8 * MEGABYTE  # [B] of a configuration, a manifest, or plans
 _PIECE = MEGABYTE  # [B] that are read at once
-_BLOCK = tarfile.BLOCKSIZE
 _PLAIN = (tarfile.REGTYPE, tarfile.AREGTYPE)
 _COMPRESSED = {
     b"\x1f\x8b": "gzip",
@@ -59,10 +57,8 @@ class TakenRun(NamedTuple):
 def pack(runs: Sequence[RunDirectory], path: Path) -> int:
     """Write runs to an archive; return the number of its logs.
 
-    Summary tables, failures and whatever is no part of a run stay behind.
-
-    Raises:
-        StoreError: If a run is damaged beyond its logs.
+    Summary tables, failures and whatever is no part of a run stay behind. StoreError is raised
+    where a run is damaged beyond its logs.
     """
     count = 0
     partial = path.with_name(f".{path.name}.tmp")
@@ -100,35 +96,31 @@ def take_in(path: Path, outputs: Path) -> list[TakenRun]:
         ArchiveError: If it is no archive of runs, or damaged; what came before the damage is taken.
         Busy: If another process writes one of the runs.
     """
+    arrivals: dict[str, _Arrival] = {}
+    shown = printable(str(path))
     try:
         with open(path, "rb") as file:
-            return _take_in(path, outputs, file)
+            for entry in list(_entries(file)):
+                place = _BESIDE.fullmatch(entry.name) or _LOG.fullmatch(entry.name)
+                assert place is not None, "its name was matched"
+                hash12, rest = place.groups()
+                content, sha256 = _content(file, entry)
+                if hash12 in arrivals:
+                    arrivals[hash12].add(rest, content, sha256)
+                elif rest == CONFIG:
+                    arrivals[hash12] = _Arrival(path, outputs, hash12, content)
+                else:
+                    raise ArchiveError(f"damaged: {entry.name} comes before {CONFIG}")
+        if not arrivals:
+            raise ArchiveError("no archive of runs: it is empty")
+        return [arrival.finish() for arrival in arrivals.values()]
+    except ArchiveError as error:
+        raise ArchiveError(f"{shown}: {error}") from None
     except OSError as error:
         if error.filename not in (None, str(path)):  # of the store, not of the archive
             raise
         reason = (error.strerror or str(error)).lower()
-        raise ArchiveError(f"{_shown(path)}: cannot be read ({reason})") from None
-
-
-def _take_in(path: Path, outputs: Path, file: BinaryIO) -> list[TakenRun]:
-    arrivals: dict[str, _Arrival] = {}
-    for member in list(_members(path, file)):
-        place = _BESIDE.fullmatch(member.name) or _LOG.fullmatch(member.name)
-        assert place is not None, "its name was matched"
-        hash12, rest = place.groups()
-        arrival = arrivals.get(hash12)
-        content, sha256 = _content(file, member)
-        if arrival is None:
-            if rest != CONFIG:
-                raise ArchiveError(f"{_shown(path)}: damaged: {member.name} comes before {CONFIG}")
-            arrivals[hash12] = _Arrival(path, outputs, hash12, content)
-        elif member.name.endswith(".mcap"):
-            arrival.add(int(rest), content)
-        else:
-            arrival.add_beside(rest, content, sha256)
-    if not arrivals:
-        raise ArchiveError(f"{_shown(path)}: no archive of runs: it is empty")
-    return [arrival.finish() for arrival in arrivals.values()]
+        raise ArchiveError(f"{shown}: cannot be read ({reason})") from None
 
 
 class _Arrival:
@@ -137,23 +129,24 @@ class _Arrival:
     def __init__(self, path: Path, outputs: Path, hash12: str, config_json: bytes) -> None:
         condition_id = hashlib.sha256(config_json).hexdigest()
         if condition_id[:HASH_LENGTH] != hash12:
-            raise ArchiveError(
-                f"{_shown(path)}: damaged: {CONFIG} of run {hash12} has another hash"
-            )
+            raise ArchiveError(f"damaged: {CONFIG} of run {hash12} has another hash")
         self.run = RunDirectory(outputs, condition_id)
-        self._path, self._config = path, config_json
-        self._beside: dict[str, bytes] = {}
+        self._archive, self._beside = path.name, {CONFIG: config_json}
         self._waiting: dict[int, bytes] = {}
         self._size = self._added = self._kept = 0
         self._begun = False
 
-    def add_beside(self, name: str, content: bytes, sha256: str) -> None:
-        """Take a file beside the configuration in: one that it refers to at once."""
-        if not name.startswith(PREFIX):
-            self._beside[name] = content if name != MANIFEST else self._foreign(content)
-        elif name != PREFIX + sha256 or sha256.encode() not in self._config:
+    def add(self, name: str, content: bytes, sha256: str) -> None:
+        """Take a file in: a log later and with others, one that the configuration names at once."""
+        if name.isdecimal():
+            self._add_log(int(name), content)
+        elif name == MANIFEST:
+            self._beside[name] = self._foreign(content)
+        elif name == PLANS:
+            self._beside[name] = content
+        elif name != PREFIX + sha256 or sha256.encode() not in self._beside[CONFIG]:
             what = "does not have the hash that is its name, or its run does not refer to it"
-            raise ArchiveError(f"{_shown(self._path)}: damaged: {name[:30]}… {what}")
+            raise ArchiveError(f"damaged: {name[:30]}… {what}")
         elif not (place := self.run.path / name).exists():
             with self.run.lock():
                 place.parent.mkdir(exist_ok=True)
@@ -166,13 +159,11 @@ class _Arrival:
         except (ValueError, RecursionError):
             notes = None
         if not isinstance(notes, dict):
-            text = f"{MANIFEST} of run {self.run.hash12} is no JSON object"
-            raise ArchiveError(f"{_shown(self._path)}: damaged: {text}")
-        marked = notes | {TAKEN: printable(self._path.name.replace("\n", " "))}
+            raise ArchiveError(f"damaged: {MANIFEST} of run {self.run.hash12} is no JSON object")
+        marked = notes | {TAKEN: printable(self._archive.replace("\n", " "))}
         return json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
 
-    def add(self, replicate: int, content: bytes) -> None:
-        """Take a log in, later and with others."""
+    def _add_log(self, replicate: int, content: bytes) -> None:
         self._begin()
         if replicate in self.run.completed():
             self._kept += 1
@@ -181,7 +172,7 @@ class _Arrival:
             checked_summary(content, self.run.condition_id, replicate)
         except CorruptLog as error:
             name = f"{self.run.hash12}, replicate {replicate}"
-            raise ArchiveError(f"{_shown(self._path)}: damaged: {name}: {error}") from None
+            raise ArchiveError(f"damaged: {name}: {error}") from None
         self._waiting[replicate] = content
         self._size += len(content)
         if self._size >= MOST_WAITING:
@@ -199,7 +190,6 @@ class _Arrival:
             return
         self._begun = True
         files = {self.run.path / name: content for name, content in self._beside.items()}
-        files[self.run.path / CONFIG] = self._config
         with self.run.lock():
             self.run.replicates.mkdir(parents=True, exist_ok=True)
             write_files({place: each for place, each in files.items() if not place.exists()})
@@ -207,22 +197,14 @@ class _Arrival:
 
     def _write(self) -> None:
         """Write the logs that wait."""
-        logs, self._waiting, self._size = self._waiting, {}, 0
-        if logs:
+        if self._waiting:
             with self.run.lock():
-                self.run.write_logs(logs)
-        self._added += len(logs)
+                self.run.write_logs(self._waiting)
+        self._added += len(self._waiting)
+        self._waiting, self._size = {}, 0
 
 
-class _Member(NamedTuple):
-    """A file of an archive."""
-
-    name: str  # `runs/<hash12>/…`
-    start: int  # offset of its content [B]
-    size: int  # [B] of its content
-
-
-def _members(path: Path, file: BinaryIO) -> Iterator[_Member]:
+def _entries(file: BinaryIO) -> Iterator[tarfile.TarInfo]:
     """Yield the files of an archive by their heads alone; each is plain, and wholly there.
 
     `tarfile` itself follows links, extended heads and sparse files of any size.
@@ -231,56 +213,50 @@ def _members(path: Path, file: BinaryIO) -> Iterator[_Member]:
     file.seek(0)
     begin = file.read(max(map(len, _COMPRESSED)))
     if kind := next((kind for sign, kind in _COMPRESSED.items() if begin.startswith(sign)), ""):
-        raise ArchiveError(f"{_shown(path)}: no archive of runs: compressed ({kind}); unpack it")
+        raise ArchiveError(f"no archive of runs: compressed ({kind}); unpack it")
     start = 0
-    while start + 2 * _BLOCK <= end:
+    while start + 2 * tarfile.BLOCKSIZE <= end:
         file.seek(start)
-        head = file.read(_BLOCK)
+        head = file.read(tarfile.BLOCKSIZE)
         if not any(head):
-            if any(file.read(_BLOCK)):
+            if any(file.read(tarfile.BLOCKSIZE)):
                 break
             return
-        entry = _entry(path, head)
-        if not _BESIDE.fullmatch(entry.name) and not _LOG.fullmatch(entry.name):
-            text = printable(entry.name.replace("\n", "\\n"))
-            raise ArchiveError(f"{_shown(path)}: no archive of runs: holds '{text}'")
-        if entry.name in names or len(names) >= MOST_FILES:
-            what = f"holds {entry.name} twice" if entry.name in names else "too many files"
-            raise ArchiveError(f"{_shown(path)}: no archive of runs: {what}")
+        try:
+            entry = tarfile.TarInfo.frombuf(head, "utf-8", "backslashreplace")
+        except tarfile.TarError as error:
+            raise ArchiveError(f"no archive of runs ({error})") from None
+        if fault := _fault(entry, names):
+            raise ArchiveError(f"no archive of runs: {fault}")
         names.add(entry.name)
-        yield _Member(entry.name, start + _BLOCK, entry.size)
-        start += _BLOCK + -(-entry.size // _BLOCK) * _BLOCK
-    raise ArchiveError(f"{_shown(path)}: no archive of runs, or a damaged one: it is cut off")
+        entry.offset_data = start + tarfile.BLOCKSIZE
+        yield entry
+        start = entry.offset_data + -(-entry.size // tarfile.BLOCKSIZE) * tarfile.BLOCKSIZE
+    raise ArchiveError("no archive of runs, or a damaged one: it is cut off")
 
 
-def _entry(path: Path, head: bytes) -> tarfile.TarInfo:
-    """Return the head of a plain file of a size that is read."""
-    try:
-        entry = tarfile.TarInfo.frombuf(head, "utf-8", "backslashreplace")
-    except tarfile.TarError as error:
-        raise ArchiveError(f"{_shown(path)}: no archive of runs ({error})") from None
+def _fault(entry: tarfile.TarInfo, names: Collection[str]) -> str:
+    """Return why the head of a file, behind others of these names, is not taken; empty: it is."""
     if entry.type not in _PLAIN:
-        raise ArchiveError(
-            f"{_shown(path)}: no archive of runs: no regular file, "
-            f"'{printable(entry.name)}' is of kind {entry.type!r}"
-        )
+        return f"no regular file, '{printable(entry.name)}' is of kind {entry.type!r}"
     is_text = entry.name.endswith((CONFIG, MANIFEST, PLANS))
     limit = MAX_LOG if entry.name.endswith(".mcap") else MAX_TEXT if is_text else MAX_INPUT
     if not 0 <= entry.size <= limit:
-        raise ArchiveError(f"{_shown(path)}: no archive of runs: a file is too large")
-    return entry
+        return "a file is too large"
+    if not _BESIDE.fullmatch(entry.name) and not _LOG.fullmatch(entry.name):
+        text = printable(entry.name.replace("\n", "\\n"))
+        return f"holds '{text}'"
+    if entry.name in names:
+        return f"holds {entry.name} twice"
+    return "too many files" if len(names) >= MOST_FILES else ""
 
 
-def _content(file: BinaryIO, member: _Member) -> tuple[bytes, str]:
+def _content(file: BinaryIO, entry: tarfile.TarInfo) -> tuple[bytes, str]:
     """Return the content of a file of an archive, and its SHA-256, computed as it arrives."""
-    pieces, digest, rest = [], hashlib.sha256(), member.size
-    file.seek(member.start)
+    pieces, digest, rest = [], hashlib.sha256(), entry.size
+    file.seek(entry.offset_data)
     while rest and (piece := file.read(min(rest, _PIECE))):
         digest.update(piece)
         pieces.append(piece)
         rest -= len(piece)
     return b"".join(pieces), digest.hexdigest()
-
-
-def _shown(path: Path) -> str:
-    return printable(str(path))

@@ -13,10 +13,7 @@ _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 
 
 class Chain:
-    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state).
-
-    The generator is only read, never drawn from.
-    """
+    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state)."""
 
     def __init__(self, rng: "np.random.Generator") -> None:
         """Start a chain, its link being empty."""
@@ -28,11 +25,7 @@ class Chain:
         return state_bytes(self._rng.bit_generator)
 
     def extend(self, costs: bytes, best: bytes, state: bytes) -> str:
-        """Append a generation and return its link in hex.
-
-        Costs and the best solution so far come from `array_bytes`; the state is the generator's
-        behind the generation.
-        """
+        """Append a generation, costs and best by `array_bytes`; return its link in hex."""
         self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
         return self.link.hex()
 
@@ -64,15 +57,13 @@ class ContentDigest:
         """Start with no message."""
         self._hash = xxhash.xxh3_128()
 
-    def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
-        """Append one message; `channel` comes from `channel_identity`."""
-        self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
+    def update(
+        self, channel: tuple[str, str, str], log_time: int, sequence: int, data: bytes
+    ) -> None:
+        """Append one message of a channel: its topic, schema's name, and message encoding."""
+        self._hash.update("\0".join((*channel, "")).encode())
+        self._hash.update(_MESSAGE.pack(log_time, sequence, len(data)) + data)
 
     def hexdigest(self) -> str:
         """Return the digest so far as 32 hex digits."""
         return self._hash.hexdigest()
-
-
-def channel_identity(topic: str, schema_name: str, message_encoding: str) -> bytes:
-    """Return the channel's part in the digest of each of its messages."""
-    return "\0".join((topic, schema_name, message_encoding, "")).encode()

@@ -1,38 +1,30 @@
-"""Files that are either whole or not there, whenever the process or the machine dies.
-
-A damaged file is named and set aside, never deleted.
-"""
+"""Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
-import threading
-import time
 import warnings
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from evoexp.errors import DamagedStore
 
 NUM_THREADS = 8  # that write files at the same time
-ENDING_S = 2.0  # [s] that files of an interrupted process may take
 _SUFFIX = ".tmp"
 DAMAGED = ".damaged"  # ends the name of a file that was set aside
 MAX_NAMED = 3  # damaged files in one line
 
 
 def write_files(contents: Mapping[Path, bytes]) -> None:
-    """Write files, each atomically and durably.
+    """Write files, each atomically and durably: a temporary file, fsync, rename.
 
-    Each goes through a temporary file, fsync and rename; then the directory is synced.
-
-    No file is renamed before its bytes are on the disk: a name always means a whole file. Files of
-    a batch are synced at once, which the disk answers together.
+    No file is renamed before the bytes of all are on the disk, which answers their syncs together.
     """
     ending = f".{os.getpid()}{_SUFFIX}"
     files = {path: path.with_name(f".{path.name}{ending}") for path in contents}  # temporary
     try:
-        _write_all(deque((path, files[path], content) for path, content in contents.items()))
+        with ThreadPoolExecutor(NUM_THREADS) as threads:  # none begins a file after an error
+            list(threads.map(_write, files, files.values(), contents.values()))
         for path, temporary in files.items():
             temporary.replace(path)
     finally:
@@ -45,39 +37,6 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
 def write_file(path: Path, content: bytes) -> None:
     """Write one file atomically and durably."""
     write_files({path: content})
-
-
-def _write_all(waiting: deque[tuple[Path, Path, bytes]]) -> None:
-    """Write files, each under its temporary name; raise the first error of the system.
-
-    Where this is interrupted, no further file begins, and those that are being written get
-    `ENDING_S`: a thread that the disk holds longer keeps no process alive.
-    """
-    errors: list[Exception] = []
-
-    def work() -> None:
-        try:
-            while not errors:
-                _write(*waiting.popleft())
-        except IndexError:  # nothing is left
-            pass
-        except Exception as error:
-            errors.append(error)
-
-    threads = [threading.Thread(target=work, daemon=True) for _ in range(NUM_THREADS)]
-    threads = threads[: len(waiting)]
-    try:
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    finally:
-        waiting.clear()
-        end = time.monotonic() + ENDING_S
-        for thread in filter(threading.Thread.is_alive, threads):
-            thread.join(max(0.0, end - time.monotonic()))
-    for error in errors[:1]:
-        raise error
 
 
 def _write(path: Path, temporary: Path, content: bytes) -> None:
@@ -99,10 +58,7 @@ def _named(path: Path) -> Iterator[None]:
 
 
 def sync_directory(path: Path) -> None:
-    """Make renames and new names in a directory durable.
-
-    Nothing is done where the system cannot open directories.
-    """
+    """Make renames and new names in a directory durable, where the system can open one."""
     with suppress(PermissionError):  # Windows
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -131,10 +87,7 @@ def warn(text: str) -> None:
 
 
 def set_aside(path: Path) -> Path:
-    """Rename a damaged file, or whatever stands in its place; return its new path.
-
-    Nothing is overwritten: `0001.mcap.damaged`, then `0001.mcap.damaged.2`, and so on.
-    """
+    """Rename a damaged file to `1.mcap.damaged`, or `1.mcap.damaged.2`, …; return its path."""
     count, aside = 1, path.with_name(path.name + DAMAGED)
     while os.path.lexists(aside):
         count += 1

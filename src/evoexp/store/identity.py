@@ -1,13 +1,10 @@
-"""The files of a run beside its logs: its configuration, its manifest, its plans.
-
-The configuration is the identity of the run; where it is lost, a log has it.
-"""
+"""The files of a run beside its logs: its configuration, its manifest, its plans."""
 
 import hashlib
 import json
-import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,13 +28,6 @@ class DamagedFile(StoreError):
     """A file of a run directory that is missing, damaged or foreign, and could be written again."""
 
 
-class FoundLog(NamedTuple):
-    """A log that holds the truth about its run."""
-
-    name: str  # of its file
-    contents: LogContents  # what it holds; its configuration has the hash of the condition
-
-
 class Plan(NamedTuple):
     """A number of replicates that was asked for."""
 
@@ -48,27 +38,24 @@ class Plan(NamedTuple):
 def stored_id(path: Path) -> str:
     """Return the full hash of the condition whose run a directory holds.
 
-    Where the configuration is lost, a log knows it, or else the manifest.
-
-    Raises:
-        StoreError: Nothing in the directory knows it.
+    Where the configuration is lost, a log knows it, or else the manifest, or StoreError is raised.
     """
     try:
         return config_id(path)
     except DamagedFile as error:
-        found = whole_log(path, path.name)
-        known = found.contents.condition_id if found else _manifest_id(path)
-        if known is None:
-            raise StoreError(f"{error}; neither a log nor the manifest has it, either") from None
-        return known
+        for _, log in whole_logs(path, path.name):
+            return log.condition_id
+        with suppress(DamagedFile):
+            noted = str(read_object(path / MANIFEST).get("condition"))
+            if _ID.fullmatch(noted) and noted.startswith(path.name):
+                return noted
+        raise StoreError(f"{error}; neither a log nor the manifest has it, either") from None
 
 
 def config_id(path: Path) -> str:
     """Return the full hash of the configuration that a run directory holds.
 
-    Raises:
-        DamagedFile: The configuration is missing, or its hash does not begin as the directory's
-            name.
+    DamagedFile is raised where there is none, or its hash does not begin as the directory's name.
     """
     config = path / CONFIG
     stored = hashlib.sha256(read(config)).hexdigest()
@@ -77,17 +64,17 @@ def config_id(path: Path) -> str:
     return stored
 
 
-def whole_log(path: Path, prefix: str) -> FoundLog | None:
-    """Return the first log in a run directory that is whole and of a condition, if there is one."""
+def whole_logs(path: Path, prefix: str) -> Iterator[tuple[str, LogContents]]:
+    """Yield file name and contents of the logs in a run directory that are whole.
+
+    The configuration of each has the hash of its condition, which begins with `prefix`.
+    """
     for log in sorted((path / REPLICATES).glob("*.mcap")):
-        try:
+        with suppress(CorruptLog):
             contents = read_log(log)
-        except CorruptLog:
-            continue
-        known = hashlib.sha256(contents.config_json).hexdigest()
-        if known == contents.condition_id and known.startswith(prefix):
-            return FoundLog(log.name, contents)
-    return None
+            known = hashlib.sha256(contents.config_json).hexdigest()
+            if known == contents.condition_id and known.startswith(prefix):
+                yield log.name, contents
 
 
 def read(path: Path) -> bytes:
@@ -129,18 +116,16 @@ def lost_files(path: Path, config_json: bytes) -> Iterator[tuple[Path, str]]:
 def checked_manifest(path: Path, condition_id: str) -> dict[str, Any]:
     """Return the content of a run directory's `manifest.json`.
 
-    It may come from anybody: its texts are one line each, without control characters.
-
-    Raises:
-        DamagedFile: It is missing, damaged, or of another condition than the one given.
+    It may come from anybody: its texts are one line each, without control characters. DamagedFile
+    is raised where it is missing, damaged, or of another condition.
     """
-    found = read_object(path / MANIFEST)
-    if found.get("condition", condition_id) != condition_id:
-        theirs = str(found["condition"])[:12]
+    manifest = read_object(path / MANIFEST)
+    if manifest.get("condition", condition_id) != condition_id:
+        theirs = str(manifest["condition"])[:12]
         raise DamagedFile(f"{path / MANIFEST}: is of run {theirs}, which does not belong here")
-    if wrong := next(_misshapen(found), ""):
+    if wrong := next(_misshapen(manifest), ""):
         raise DamagedFile(f"{path / MANIFEST}: damaged: {wrong}")
-    return found
+    return manifest
 
 
 def _misshapen(manifest: Mapping[str, Any]) -> Iterator[str]:
@@ -163,36 +148,6 @@ def _misshapen(manifest: Mapping[str, Any]) -> Iterator[str]:
 
 def restored_manifest(path: Path, condition_id: str) -> dict[str, Any]:
     """Return the part of the manifest that a log knows, marked as restored; empty without a log."""
-    found = whole_log(path, condition_id)
-    if found is None:
-        return {}
-    known = {"condition": condition_id, **found.contents.environment}
-    return known | {"git": None, RESTORED: found.name}
-
-
-def _manifest_id(path: Path) -> str | None:
-    try:
-        known = read_object(path / MANIFEST).get("condition")
-    except DamagedFile:
-        return None
-    is_id = isinstance(known, str) and _ID.fullmatch(known) and known.startswith(path.name)
-    return str(known) if is_id else None
-
-
-def read_plans(path: Path) -> list[Plan]:
-    """Return the plans that a file holds, the first one first; none where there is no file."""
-    if not os.path.lexists(path):
-        return []
-    try:
-        found = [(each["num_replicates"], each["stored"]) for each in read_object(path)["plans"]]
-    except (KeyError, TypeError) as error:
-        raise DamagedFile(f"{path}: damaged: no list of plans") from error
-    if not all(type(number) is int and number >= 0 for plan in found for number in plan):
-        raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
-    return [Plan(*each) for each in found]
-
-
-def as_json(plans: Iterable[Plan]) -> bytes:
-    """Return plans as the content of their file."""
-    text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
-    return text.encode() + b"\n"
+    for name, log in whole_logs(path, condition_id):
+        return {"condition": condition_id, **log.environment, "git": None, RESTORED: name}
+    return {}

@@ -1,6 +1,7 @@
 """One replicate as one self-contained MCAP, written in memory."""
 
 import io
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.records import Best, Block, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
-from evoexp.store.digests import Chain, ContentDigest, array_bytes, channel_identity
+from evoexp.store.digests import Chain, ContentDigest, array_bytes
 from evoexp.store.log_bounds import MAX_LOG
 from evoexp.store.messages import (
     encode_front,
@@ -23,9 +24,8 @@ from evoexp.store.messages import (
 )
 
 LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
-SCHEMA_VERSION = (
-    2  # of everything a log holds; raised when a reader of the old version would misunderstand
-)
+# of everything a log holds; raised when a reader of the old version would misunderstand
+SCHEMA_VERSION = 2
 RUN = "evoexp.run"
 SUMMARY = "evoexp.summary"
 ENVIRONMENT = "evoexp.environment"
@@ -52,32 +52,15 @@ class Finished(NamedTuple):
 
 def array_file(array: NDArray[Any]) -> bytes:
     """Return an array as the bytes of a `.npy` file: C order, float64 or int64, little-endian."""
-    kind = "<f8" if array.dtype.kind == "f" else "<i8"
-    buffer = io.BytesIO()
-    np.lib.format.write_array(
-        buffer, np.ascontiguousarray(array, dtype=kind), version=(1, 0), allow_pickle=False
-    )
+    buffer, kind = io.BytesIO(), "<f8" if array.dtype.kind == "f" else "<i8"
+    np.save(buffer, np.ascontiguousarray(array, dtype=kind), allow_pickle=False)
     return buffer.getvalue()
-
-
-class _Channel:
-    """A channel of the log: its id, its part in the content digest, its number of messages."""
-
-    def __init__(
-        self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()
-    ) -> None:
-        name = f"evoexp.{record.__name__.removesuffix('Row')}"
-        schema_id = writer.register_schema(name, "jsonschema", json_schema(record, terms))
-        self.id = writer.register_channel(topic, "json", schema_id)
-        self.identity = channel_identity(topic, name, "json")
-        self.num_messages = 0
 
 
 class Log:
     """The log of one replicate: written block by block, finished into bytes.
 
-    The same content gives the same messages, chain and digests; wall and CPU times and the
-    environment are metadata and enter none of them.
+    Times and the environment enter neither messages nor chain nor digests.
     """
 
     def __init__(
@@ -93,20 +76,16 @@ class Log:
 
         Args:
             condition_id: Full hash of the condition, 64 hex digits.
-            config_json: The condition's configuration, from which alone the replicate can be run
-                again.
-            replicate: Index of the replicate.
+            config_json: The condition's configuration: the replicate can be run from it alone.
             rng: The replicate's generator, whose state enters the chain; never drawn from here.
             attachments: Further files that the condition needs, by name.
-            environment: Versions, CPU features and what else may explain a difference; any JSON
-                values.
+            environment: Versions, CPU features and what else may explain a difference.
         """
-        self._condition_id = condition_id
-        self._replicate = replicate
         self._environment = dict(environment or {})
         self._chain = Chain(rng)
         self._content = ContentDigest()
-        self._channels: dict[str, _Channel] = {}
+        self._channels: dict[str, tuple[int, str]] = {}  # id and name of schema, by topic
+        self._num_messages = Counter[str]()  # by topic
         self._last = -1  # index of the last generation
         self._population: NDArray[Any] = np.empty(0)  # of it, a view of the planner's memory
         # of the last generation, and of the last solution written: `array_bytes` of the best
@@ -133,16 +112,12 @@ class Log:
         self._writer.add_metadata(RUN, run)
         self._attach(CONFIG, config_json)
         for name, data in sorted((attachments or {}).items()):
-            if name == CONFIG:
-                raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
             self._attach(name, data)
 
     def write(self, block: Block, cpu_s: float = 0.0) -> None:
         """Append generations, and every best solution that is better than the last written.
 
-        Args:
-            cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
-                part of any digest.
+        The CPU time of the replicate until then [s] is the publish time of the messages.
         """
         self._cpu_ns = int(cpu_s * 1e9)
         state = self._chain.state() if block.states is None else b""
@@ -176,28 +151,11 @@ class Log:
             self._attach(name + ARRAY, array_file(array))
         if block.criteria is not None:
             for population, criteria in enumerate(block.criteria):
-                self.write_front(FrontRow(self._last, population, criteria.T))
-
-    def write_front(self, front: FrontRow) -> None:
-        """Append the front of a population of the generation last written."""
-        self._add(FRONT_TOPIC, FrontRow, front.generation, encode_front(front))
+                front = encode_front(FrontRow(self._last, population, criteria.T))
+                self._add(FRONT_TOPIC, FrontRow, self._last, front)
 
     def finish(self, summary: ReplicateSummary) -> Finished:
-        """Close the log.
-
-        Returns:
-            The log's bytes and the completed summary.
-
-        Raises:
-            ValueError: No generation was written, or the summary is of another replicate.
-        """
-        if self._last < 0:
-            raise ValueError("finish: no generation was written")
-        if (summary.condition, summary.replicate) != (self._condition_id, self._replicate):
-            raise ValueError(
-                f"finish: summary of {summary.condition[:12]} replicate {summary.replicate}, not "
-                "of this"
-            )
+        """Close the log; return its bytes and the summary, which gets its digest."""
         if self._best != self._written or self._best_cost != self._written_cost:
             self._write_solution(self._last)
         summary = summary._replace(digest=self._chain.finish(self._population))
@@ -213,8 +171,7 @@ class Log:
         self._add(SOLUTION_TOPIC, SolutionRow, index, data)
 
     def _attach(self, name: str, data: bytes) -> None:
-        is_json = name.endswith(".json")
-        kind = "application/json" if is_json else "application/octet-stream"
+        kind = "application/json" if name.endswith(".json") else "application/octet-stream"
         self._writer.add_attachment(0, 0, name, kind, data)
 
     def _add(
@@ -227,10 +184,12 @@ class Log:
                 f"log: its generations and solutions take more than {MAX_LOG // MEGABYTE} MB, "
                 "more than any log that is read; run fewer generations"
             )
-        channel = self._channels.get(topic)
-        if channel is None:
-            channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
-        log_time, sequence = int(generation) * _TICK, channel.num_messages
-        channel.num_messages += 1
-        self._writer.add_message(channel.id, log_time, data, self._cpu_ns, sequence)
-        self._content.update(channel.identity, log_time, sequence, data)
+        if topic not in self._channels:
+            name = f"evoexp.{record.__name__.removesuffix('Row')}"
+            schema = self._writer.register_schema(name, "jsonschema", json_schema(record, terms))
+            self._channels[topic] = self._writer.register_channel(topic, "json", schema), name
+        (channel, name), sequence = self._channels[topic], self._num_messages[topic]
+        self._num_messages[topic] += 1
+        log_time = int(generation) * _TICK
+        self._writer.add_message(channel, log_time, data, self._cpu_ns, sequence)
+        self._content.update((topic, name, "json"), log_time, sequence, data)

@@ -1,9 +1,7 @@
 """The bounds of a log: checked as a whole before mcap's reader sees it.
 
 A log may come from anybody, and checksums are no proof of good will. Whatever a file claims, what
-is read of it takes memory in proportion to `MAX_LOG` and `MAX_MESSAGE`: both checksums are
-compared, records must fit into their own bytes, sizes are compared with these limits before
-anything is decompressed, and the index must point to the records that are there and to no others.
+is read of it takes memory in proportion to `MAX_LOG` and `MAX_MESSAGE`.
 """
 
 import struct
@@ -15,13 +13,12 @@ from typing import Any, NamedTuple
 
 import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Attachment, Metadata
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
-from evoexp.errors import CorruptLog
+from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.input_files import MEGABYTE
 
 # Of a log's file, and of all its messages together. The largest log of a shipped experiment holds
@@ -33,26 +30,12 @@ MAX_CHUNK = MAX_MESSAGE + 64 * 1024  # a chunk ends with the message that passes
 MAX_METADATA = MEGABYTE  # [B] of a record of metadata
 MAX_SUMMARY = 8 * MEGABYTE  # [B] of the summary section
 MAX_ATTACHMENTS = 1000  # records of metadata included
-# Reading a log takes at most so many times the memory of `MAX_LOG`, whatever the log holds.
-MEMORY_FACTOR = 10
 
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _CHUNK = struct.Struct("<16xQ4xI4sQ")  # size, bytes of the compression's name, name, bytes of data
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
 _TAIL = _FOOTER.size + len(MAGIC)
-_UNREADABLE = (
-    McapError,
-    zstandard.ZstdError,
-    struct.error,
-    ArithmeticError,
-    AttributeError,
-    LookupError,
-    MemoryError,
-    RecursionError,
-    TypeError,
-    ValueError,
-)
 
 
 class CheckedLog(NamedTuple):
@@ -68,19 +51,16 @@ def unreadable_is_corrupt(name: str) -> Iterator[None]:
     """Turn any error of decoding damaged or foreign bytes into one line that names the log."""
     try:
         yield
-    except _UNREADABLE as error:
+    except EvoexpError:
+        raise
+    except Exception as error:
         raise CorruptLog(
             f"{name}: unreadable: {type(error).__name__}: {' '.join(str(error).split())}"
         ) from error
 
 
 def check(content: bytes, name: str) -> CheckedLog:
-    """Check the bytes of a log: magic, checksums, the sizes of its records, its index.
-
-    Raises:
-        CorruptLog: The bytes are empty, too many, no MCAP, cut, altered, beyond a limit, or an MCAP
-            without checksums.
-    """
+    """Check the bytes of a log: magic, checksums, the sizes of its records, its index."""
     summary_start = check_sums(content, name)
     with unreadable_is_corrupt(name):
         if len(content) - summary_start > MAX_SUMMARY:
@@ -98,11 +78,7 @@ def check(content: bytes, name: str) -> CheckedLog:
 
 
 def check_sums(content: bytes, name: str) -> int:
-    """Check magic, footer and both checksums, which together cover every byte.
-
-    Returns:
-        Where the summary section starts.
-    """
+    """Check magic, footer and both checksums; return where the summary section starts [B]."""
     if not content:
         raise CorruptLog(f"{name}: empty file")
     if len(content) > MAX_LOG:
@@ -136,10 +112,9 @@ def check_sums(content: bytes, name: str) -> int:
 
 
 def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
-    """Check the records of the data section; add metadata and attachments to a log.
+    """Check the data section; return where chunks, metadata and attachments stand.
 
-    Returns:
-        Where chunks, metadata and attachments stand.
+    Metadata and attachments are added to a log.
     """
     chunks, metadata, attachments = list[int](), list[int](), list[int]()
     size, start, view = 0, len(MAGIC), memoryview(content)
@@ -150,7 +125,17 @@ def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
             raise ValueError(f"a record ends at byte {stop}, beyond {data_end}")
         if opcode == Opcode.CHUNK:
             chunks.append(start)
-            size += _chunk_size(view[body:stop])
+            content_size, name_length, compression, num_compressed = _CHUNK.unpack_from(
+                content, body
+            )
+            frame = view[body + _CHUNK.size : stop]
+            if (name_length, compression, num_compressed) != (4, b"zstd", len(frame)):
+                raise ValueError("a chunk is not compressed by zstd")
+            if content_size > MAX_CHUNK:
+                raise ValueError(f"a chunk of {content_size} bytes; at most {MAX_CHUNK} are read")
+            if zstandard.get_frame_parameters(frame).content_size != content_size:
+                raise ValueError("a chunk is not of the size that it tells")
+            size += content_size
             if size > MAX_LOG:
                 raise ValueError(f"too large: {_too_large(size)}")
         elif opcode == Opcode.METADATA:
@@ -167,18 +152,6 @@ def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
             raise ValueError(f"more than {MAX_ATTACHMENTS} attachments and records of metadata")
         start = stop
     return [chunks, metadata, attachments]
-
-
-def _chunk_size(body: memoryview) -> int:
-    """Return the size of a chunk's content, which is what its compressed frame says, too."""
-    size, length, compression, num_compressed = _CHUNK.unpack_from(body)
-    if (length, compression) != (4, b"zstd") or num_compressed != len(body) - _CHUNK.size:
-        raise ValueError("a chunk is not compressed by zstd")
-    if size > MAX_CHUNK:
-        raise ValueError(f"a chunk of {size} bytes; at most {MAX_CHUNK} are read")
-    if zstandard.get_frame_parameters(body[_CHUNK.size :]).content_size != size:
-        raise ValueError("a chunk is not of the size that it tells")
-    return int(size)
 
 
 def _too_large(size: int) -> str:

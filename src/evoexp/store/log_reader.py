@@ -5,29 +5,28 @@ and compares the content digest.
 """
 
 import errno
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import orjson
+from mcap.reader import SeekingReader
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
 from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store.digests import ContentDigest, channel_identity
-from evoexp.store.log_bounds import MAX_LOG, CheckedLog, check, unreadable_is_corrupt
+from evoexp.store.digests import ContentDigest
+from evoexp.store.log_bounds import MAX_LOG, check, unreadable_is_corrupt
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
+    decode,
     decode_environment,
-    decode_front,
-    decode_generation,
-    decode_solution,
     decode_summary,
     decode_values,
     field_types,
@@ -35,12 +34,11 @@ from evoexp.store.messages import (
 )
 
 Source = str | PathLike[str] | bytes
-Value = TypeVar("Value")
 DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}
-_DECODE: dict[str, Callable[[bytes], Any]] = {
-    written.GENERATION_TOPIC: decode_generation,
-    written.SOLUTION_TOPIC: decode_solution,
-    written.FRONT_TOPIC: decode_front,
+_RECORDS: dict[str, type[Any]] = {
+    written.GENERATION_TOPIC: GenerationRow,
+    written.SOLUTION_TOPIC: SolutionRow,
+    written.FRONT_TOPIC: FrontRow,
 }
 
 
@@ -69,50 +67,26 @@ class LogContents(NamedTuple):
         }
 
 
-class _OpenLog:
+class _OpenLog(NamedTuple):
     """A log of a run, checked."""
 
-    def __init__(self, checked: CheckedLog, name: str) -> None:
-        """Look at what it says of itself."""
-        self.name, self.reader = name, checked.reader
-        records = [(each.name, each.metadata) for each in checked.metadata]
-        self._metadata = self._by_name(records)
-        files = [(each.name, each.data) for each in checked.attachments]
-        self.attachments = self._by_name(files)
-        if written.RUN not in self._metadata:
-            raise CorruptLog(
-                f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'"
-            )
-        self.run = self._metadata[written.RUN]
-        version = int(self.run["schema_version"])
-        if version != written.SCHEMA_VERSION:
-            age = "a newer" if version > written.SCHEMA_VERSION else "an older"
-            raise OtherVersion(
-                f"{name}: written by {age} evoexp: schema version {version}, this one reads "
-                f"{written.SCHEMA_VERSION}"
-            )
+    name: str
+    reader: SeekingReader  # of mcap, for its messages
+    records: dict[str, dict[str, str]]  # of metadata, by name
+    attachments: dict[str, bytes]  # by name
 
     def metadata(self, record: str) -> dict[str, str]:
         """Return a record of metadata."""
-        if record not in self._metadata:
+        if record not in self.records:
             raise CorruptLog(f"{self.name}: incomplete: no metadata record '{record}'")
-        return self._metadata[record]
+        return self.records[record]
 
     def summary(self) -> ReplicateSummary:
         """Return the summary of the replicate."""
-        summary = decode_summary(self.metadata(written.SUMMARY))
-        if (summary.condition, summary.replicate) != (
-            self.run["condition"],
-            int(self.run["replicate"]),
-        ):
+        summary, run = decode_summary(self.metadata(written.SUMMARY)), self.records[written.RUN]
+        if (summary.condition, summary.replicate) != (run["condition"], int(run["replicate"])):
             raise CorruptLog(f"{self.name}: altered: its summary is of another replicate")
         return summary
-
-    def _by_name(self, records: list[tuple[str, Value]]) -> dict[str, Value]:
-        """Return records by their names, of which none stands there twice."""
-        if len(by_name := dict(records)) < len(records):
-            raise CorruptLog(f"{self.name}: altered: it holds records of the same name")
-        return by_name
 
 
 @contextmanager
@@ -127,26 +101,35 @@ def _opened(source: Source) -> Iterator[_OpenLog]:
         raise CorruptLog(f"{name}: cannot be read: {error.strerror or error}") from error
     checked = check(content, name)
     with unreadable_is_corrupt(name):
-        yield _OpenLog(checked, name)
+        records = {each.name: each.metadata for each in checked.metadata}
+        attachments = {each.name: each.data for each in checked.attachments}
+        if len(records) + len(attachments) < len(checked.metadata) + len(checked.attachments):
+            raise CorruptLog(f"{name}: altered: it holds records of the same name")
+        if written.RUN not in records:
+            must = f"an MCAP without metadata record '{written.RUN}'"
+            raise CorruptLog(f"{name}: not a log of evoexp: {must}")
+        version = int(records[written.RUN]["schema_version"])
+        if version != written.SCHEMA_VERSION:
+            age = "a newer" if version > written.SCHEMA_VERSION else "an older"
+            raise OtherVersion(
+                f"{name}: written by {age} evoexp: schema version {version}, this one reads "
+                f"{written.SCHEMA_VERSION}"
+            )
+        yield _OpenLog(name, checked.reader, records, attachments)
 
 
 def read_log(source: Source) -> LogContents:
-    """Return everything that a log holds, verified.
-
-    Raises:
-        CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be
-            opened.
-    """
+    """Return everything that a log holds, verified; CorruptLog is raised where it is damaged."""
     with _opened(source) as log:
-        attachments = log.attachments
-        rows: dict[str, list[Any]] = {topic: [] for topic in _DECODE}
+        rows: dict[str, list[Any]] = {topic: [] for topic in _RECORDS}
         digest, cpu_ns = ContentDigest(), list[int]()
         for schema, channel, message in log.reader.iter_messages(log_time_order=False):
             name = schema.name if schema is not None else ""
-            identity = channel_identity(channel.topic, name, channel.message_encoding)
+            identity = (channel.topic, name, channel.message_encoding)
             digest.update(identity, message.log_time, message.sequence, message.data)
             if channel.topic in rows:
-                rows[channel.topic].append(_DECODE[channel.topic](message.data))
+                row = decode(_RECORDS[channel.topic], orjson.loads(message.data))
+                rows[channel.topic].append(row)
             if channel.topic == written.GENERATION_TOPIC:
                 cpu_ns.append(message.publish_time)
         content_digest = digest.hexdigest()
@@ -154,66 +137,56 @@ def read_log(source: Source) -> LogContents:
             raise CorruptLog(
                 f"{log.name}: altered: its messages do not give the content digest it carries"
             )
-        is_timed = log.run.get(written.PUBLISHED) == written.CPU_TIME
-        summary = log.summary()
+        run, summary = log.metadata(written.RUN), log.summary()
+        is_timed = run.get(written.PUBLISHED) == written.CPU_TIME
         return LogContents(
-            condition_id=log.run["condition"],
-            config_json=attachments.pop(written.CONFIG),
+            condition_id=run["condition"],
+            config_json=log.attachments.pop(written.CONFIG),
             replicate=summary.replicate,
             generations=rows[written.GENERATION_TOPIC],
             solutions=rows[written.SOLUTION_TOPIC],
             fronts=rows[written.FRONT_TOPIC],
             summary=summary,
             environment=decode_environment(log.metadata(written.ENVIRONMENT)),
-            attachments=attachments,
+            attachments=log.attachments,
             content_digest=content_digest,
             cpu_s=1e-9 * np.array(cpu_ns, np.float64) if is_timed else np.full(len(cpu_ns), np.nan),
         )
 
 
 def read_summary(source: Source) -> ReplicateSummary:
-    """Return a log's summary; no message is decoded.
-
-    Raises:
-        CorruptLog: As `read_log`, except that the content digest is not compared.
-    """
+    """Return a log's summary, checked as `read_log` does but for the content digest."""
     with _opened(source) as log:
         return log.summary()
 
 
 def checked_summary(source: Path | bytes, condition_id: str, replicate: int) -> ReplicateSummary:
-    """Return the summary of the log in the place of a replicate, or of its bytes.
-
-    Raises:
-        CorruptLog: The log is damaged, or it is of another condition or replicate.
-    """
+    """Return the summary of a log, or of its bytes, which must be of a condition and replicate."""
     summary = read_summary(source)
-    if (summary.condition, summary.replicate) != (condition_id, replicate):
-        theirs = f"replicate {summary.replicate} of {summary.condition[:12]}"
-        name = "log" if isinstance(source, bytes) else source
-        raise CorruptLog(f"{name}: holds {theirs}, which does not belong here")
+    name = "log" if isinstance(source, bytes) else str(source)
+    demand_place(name, (summary.condition, summary.replicate), (condition_id, replicate))
     return summary
 
 
-def read_solution(source: Source) -> SolutionRow:
-    """Return a log's last solution, the best of the replicate; only its chunk is decompressed.
+def demand_place(name: str, own: tuple[str, int], place: tuple[str, int]) -> None:
+    """Raise CorruptLog unless the condition and replicate of a log are those of its place."""
+    if own != place:
+        theirs = f"replicate {own[1]} of {own[0][:12]}"
+        raise CorruptLog(f"{name}: holds {theirs}, which does not belong here")
 
-    Raises:
-        CorruptLog: As `read_log`, except that the content digest is not compared.
-    """
+
+def read_solution(source: Source) -> SolutionRow:
+    """Return a log's last solution, the best of the replicate; only its chunk is decompressed."""
     with _opened(source) as log:
         for _, _, message in log.reader.iter_messages(written.SOLUTION_TOPIC, reverse=True):
-            return decode_solution(message.data)
+            return decode(SolutionRow, orjson.loads(message.data))
         raise ValueError("no solution")
 
 
 def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     """Return the records on /generation, without their chain, as arrays (generations,) by name.
 
-    A term that a generation does not have is NaN there.
-
-    Raises:
-        CorruptLog: As `read_log`, except that the content digest is not compared.
+    A term that a generation does not have is NaN there. The content digest is not compared.
     """
     with _opened(source) as log:
         messages = log.reader.iter_messages(written.GENERATION_TOPIC, log_time_order=False)

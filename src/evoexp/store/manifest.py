@@ -53,26 +53,25 @@ def manifest(condition_id: str, components: Mapping[str, str] | None = None) -> 
 
 
 def environment(components: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Return versions, platform and processor, without importing any of the packages.
-
-    Args:
-        components: Component → `distribution version` of those that are not evoexp's.
-    """
+    """Return versions, platform and processor, and the packages of components not of evoexp."""
     return {**_environment(), "components": dict(components)} if components else _environment()
 
 
 @cache
 def _environment() -> dict[str, Any]:
     """Return the part of the environment that is the same for all conditions, found in 15 ms."""
-    return {
-        "versions": {"python": platform.python_version(), **_versions()},
-        "platform": {
-            "system": platform.system(),
-            "machine": platform.machine(),
-            "libc": " ".join(platform.libc_ver()).strip() or None,
-        },
-        "cpu": _cpu(),
+    versions: dict[str, str | None] = {"python": platform.python_version()}
+    for name in _DISTRIBUTIONS:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = None
+    system = {
+        "system": platform.system(),
+        "machine": platform.machine(),
+        "libc": " ".join(platform.libc_ver()).strip() or None,
     }
+    return {"versions": versions, "platform": system, "cpu": _cpu()}
 
 
 @cache
@@ -89,21 +88,19 @@ def git_state() -> dict[str, Any] | None:
 def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Difference]:
     """Return the entries in which two manifests or environments differ, in alphabetical order.
 
-    Only sections that both have are compared: the environment of a log has no condition and no git
-    state. Of two lists (the features of processors) only entries that the other lacks are named.
+    Only sections that both have are compared; of two lists, entries that the other lacks are named.
     """
     shared = was.keys() & now.keys() - {"condition"}
     before = dict(_leaves({name: was[name] for name in shared}))
     after = dict(_leaves({name: now[name] for name in shared}))
-    found = []
+    entries = []
     for name in sorted(before.keys() | after.keys()):
         old, new = before.get(name), after.get(name)
-        if old == new:
-            continue
-        if isinstance(old, list) and isinstance(new, list):
+        if isinstance(old, list) and isinstance(new, list) and old != new:
             old, new = [x for x in old if x not in new], [x for x in new if x not in old]
-        found.append(Difference(name, old, new))
-    return found
+        if old != new:
+            entries.append(Difference(name, old, new))
+    return entries
 
 
 def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -112,16 +109,6 @@ def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield from _leaves(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
-
-
-def _versions() -> dict[str, str | None]:
-    versions: dict[str, str | None] = {}
-    for name in _DISTRIBUTIONS:
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            versions[name] = None
-    return versions
 
 
 def _cpu() -> dict[str, Any]:

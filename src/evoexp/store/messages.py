@@ -8,10 +8,9 @@ needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an el
 
 from collections.abc import Mapping
 from functools import cache
-from inspect import signature
 from math import isfinite
 from sys import intern
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 import orjson
@@ -25,6 +24,7 @@ from evoexp.records import (
     flatten,
 )
 
+Row = TypeVar("Row", GenerationRow, SolutionRow, FrontRow, ReplicateSummary)
 TERM = "term_"
 NONFINITE = "nonfinite"
 
@@ -49,18 +49,10 @@ def field_types(record: type) -> dict[str, Any]:
 
 
 @cache
-def _field_defaults(record: type) -> dict[str, Any]:
-    """Return the defaults of a record's fields that have one."""
-    fields = signature(record).parameters.values()
-    return {field.name: field.default for field in fields if field.default is not field.empty}
-
-
-@cache
 def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
     """Return the JSON Schema of a record's messages, one type per field, as Foxglove reads it.
 
-    Any number may be null, which JSON Schema could only say with a union type; see the module's
-    first lines.
+    Any number may be null, which JSON Schema could only say with a union type.
     """
     properties = {name: _JSON_TYPES[kind] for name, kind in field_types(record).items()}
     if record is FrontRow:  # a matrix travels flat
@@ -91,20 +83,14 @@ def encode_generation(row: GenerationRow) -> bytes:
 
 def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
     """Return the message of one solution; `values` is flat."""
-    row = {"generation": int(generation), "cost": float(cost), "values": values}
-    return _encode(row)
+    return _encode({"generation": int(generation), "cost": float(cost), "values": values})
 
 
 def encode_front(front: FrontRow) -> bytes:
     """Return the message of one front; its criteria travel flat, beside their number."""
     flat = np.ascontiguousarray(front.criteria, dtype=np.float64)
-    row = {
-        "generation": int(front.generation),
-        "population": int(front.population),
-        "criteria": flat.reshape(-1),
-        "num_criteria": int(flat.shape[1]),
-    }
-    return _encode(row)
+    row = {"generation": int(front.generation), "population": int(front.population)}
+    return _encode(row | {"criteria": flat.reshape(-1), "num_criteria": int(flat.shape[1])})
 
 
 def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
@@ -133,55 +119,13 @@ def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
     return environment
 
 
-def decode_generation(data: bytes) -> GenerationRow:
-    """Undo `encode_generation`."""
-    fields, terms = _typed(GenerationRow, orjson.loads(data))
-    return GenerationRow(**fields, terms=terms)
-
-
 def decode_summary(metadata: Mapping[str, str]) -> ReplicateSummary:
     """Undo `encode_summary`; keys that are no field of the summary are left out."""
-    fields, terms = _typed(ReplicateSummary, decode_values(metadata))
-    return ReplicateSummary(**fields, terms=terms)
+    return decode(ReplicateSummary, decode_values(metadata))
 
 
-def decode_solution(data: bytes) -> SolutionRow:
-    """Undo `encode_solution`."""
-    fields, _ = _typed(SolutionRow, orjson.loads(data))
-    return SolutionRow(**fields)
-
-
-def decode_front(data: bytes) -> FrontRow:
-    """Undo `encode_front`."""
-    row = orjson.loads(data)
-    fields, _ = _typed(FrontRow, row)
-    return FrontRow(**fields | {"criteria": fields["criteria"].reshape(-1, row["num_criteria"])})
-
-
-def _encode(row: dict[str, Any]) -> bytes:
-    text = orjson.dumps(row, option=orjson.OPT_SERIALIZE_NUMPY)
-    if b"null" in text:  # a number is not finite
-        return orjson.dumps(flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
-    return text
-
-
-def flagged(row: dict[str, Any]) -> dict[str, Any]:
-    """Return the row with `nonfinite` appended where a number of it needs the flag."""
-    flags: dict[str, Any] = {
-        name: repr(float(value))
-        for name, value in row.items()
-        if isinstance(value, float) and not isfinite(value)
-    }
-    for name, value in row.items():
-        if type(value) is np.ndarray:
-            where = np.flatnonzero(~np.isfinite(value))
-            if where.size:
-                flags[name] = {str(index): repr(float(value[index])) for index in where.tolist()}
-    return {**row, NONFINITE: flags} if flags else row
-
-
-def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return a row's fields in the types of the record, and its terms by name.
+def decode(record: type[Row], row: dict[str, Any]) -> Row:
+    """Build a record from the decoded JSON of its message.
 
     Raises:
         KeyError: A field without a default is missing.
@@ -191,8 +135,9 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
     if NONFINITE in row:
         restore(row)
     fields: dict[str, Any] = {}
-    for name, kind in field_types(record).items():
-        value = row[name] if name in row else _field_defaults(record)[name]
+    kinds: Any = record
+    for name, kind in field_types(kinds).items():
+        value = row[name] if name in row else record._field_defaults[name]
         if not isinstance(value, _TAKEN[kind]) or (value is True or value is False) is not (
             kind in _TRUTHS and value is not None
         ):
@@ -204,8 +149,33 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
             if value.ndim != 1:
                 raise ValueError(f"{name} is no list of numbers")
         fields[name] = value
-    terms = {intern(name[5:]): float(value) for name, value in row.items() if name[:5] == TERM}
-    return fields, terms
+    if "terms" in record._fields:
+        fields["terms"] = {
+            intern(name[5:]): float(value) for name, value in row.items() if name[:5] == TERM
+        }
+    if record is FrontRow:  # a matrix travels flat
+        fields["criteria"] = fields["criteria"].reshape(-1, row["num_criteria"])
+    return record(**fields)
+
+
+def _encode(row: dict[str, Any]) -> bytes:
+    text = orjson.dumps(row, option=orjson.OPT_SERIALIZE_NUMPY)
+    if b"null" in text:  # a number is not finite
+        return orjson.dumps(flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
+    return text
+
+
+def flagged(row: dict[str, Any]) -> dict[str, Any]:
+    """Return the row with `nonfinite` appended where a number of it needs the flag."""
+    flags: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, np.ndarray):
+            places = np.flatnonzero(~np.isfinite(value))
+            if places.size:
+                flags[name] = {str(place): repr(float(value[place])) for place in places.tolist()}
+        elif isinstance(value, float) and not isfinite(value):
+            flags[name] = repr(float(value))
+    return {**row, NONFINITE: flags} if flags else row
 
 
 def restore(row: dict[str, Any]) -> None:

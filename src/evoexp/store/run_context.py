@@ -8,10 +8,9 @@ import json
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
-
-import pyarrow as pa
 
 from evoexp.errors import EvoexpError, StoreError
 from evoexp.shipped import rows_of, shipped
@@ -26,13 +25,10 @@ _NO_SETTING = ("_target_", "revision", "sha256")
 
 
 def origin(manifest: Mapping[str, Any], condition_id: str) -> dict[str, Any]:
-    """Return experiment, label and budget of a run, and whether its experiment was changed.
+    """Return experiment, label and budget of a run, None if unknown; and whether it was `changed`.
 
     A shipped condition has the label and the budget of the shipped table, in the experiment that
     its manifest names if that has it: experiments share conditions.
-
-    Returns:
-        The keys of `ORIGIN`, None where nothing is known, and `changed`.
     """
     notes = {name: manifest.get(name) or None for name in ORIGIN}
     experiment, label = notes["experiment"], notes["label"]
@@ -58,27 +54,27 @@ def origin_of(run: RunDirectory) -> dict[str, Any]:
 
 
 def run_context(path: Path, condition_id: str, taken: Collection[str]) -> dict[str, Any]:
-    """Collect the origin and the settings of a run.
+    """Return name → value of the origin and the settings of a run, as far as they can be read.
 
     A setting has the last part of its name where no other setting and no column has it, else its
     name as it is typed: `population_size`, `collision.num_samples`. Components are called by their
     group: `planner`, `control`, `robot`. Lists of plain values are JSON; other lists are left out.
-
-    Returns:
-        Name → value; empty where neither configuration nor manifest can be read.
     """
-    manifest, config = (_read(path / name) for name in (MANIFEST, CONFIG))
-    known = origin(manifest, condition_id)
-    found = {name: str(known[name]) for name in ORIGIN if known[name]}
-    settings = dict(_settings(typed_parts(config)))
+    objects: dict[str, dict[str, Any]] = {MANIFEST: {}, CONFIG: {}}
+    for name in objects:
+        with suppress(StoreError):
+            objects[name] = read_object(path / name)
+    known = origin(objects[MANIFEST], condition_id)
+    columns = {name: str(known[name]) for name in ORIGIN if known[name]}
+    settings = dict(_settings(typed_parts(objects[CONFIG])))
     counts = Counter(name.rpartition(".")[2] for name in settings)
     for name, value in settings.items():
         short = name.rpartition(".")[2]
-        free = counts[short] == 1 and short not in taken and short not in found
-        column = short if free else name
+        is_free = counts[short] == 1 and short not in taken and short not in columns
+        column = short if is_free else name
         if column not in taken:
-            found[column] = value
-    return found
+            columns[column] = value
+    return columns
 
 
 def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -92,34 +88,16 @@ def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
             around = {key: value for key, value in component.items() if key != "planner"}
             parts |= {"control": around} | typed_parts({"planner": component["planner"]})
         elif name == "planner" and isinstance(component, Mapping):
+            fields = component.items()
             inner = {
-                key: value
-                for key, value in component.items()
-                if isinstance(value, Mapping) and TARGET in value
+                k: value for k, value in fields if isinstance(value, Mapping) and TARGET in value
             }
-            own = {key: value for key, value in component.items() if key not in inner}
-            parts |= {"planner": own} | inner
+            parts |= {"planner": {k: value for k, value in fields if k not in inner}} | inner
         elif name == MOST_QUERIES:
             parts["budget"] = {"collision_queries": component}
         else:
             parts[name] = component
     return parts
-
-
-def with_context(table: pa.Table, context: Mapping[str, Any]) -> pa.Table:
-    """Return a table with constant columns added at its end."""
-    for name, value in context.items():
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        constant = pa.repeat(float(value) if is_number else value, table.num_rows)
-        table = table.append_column(name, constant)
-    return table
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return read_object(path)
-    except StoreError:
-        return {}
 
 
 def _settings(config: Any, name: str = "") -> Iterator[tuple[str, Any]]:

@@ -1,11 +1,10 @@
 """The directory of one condition, `runs/<hash12>/`: its place, its finished parts, its lock."""
 
-import hashlib
 import json
 import os
 import re
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,14 @@ from filelock import FileLock, Timeout
 
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
-from evoexp.store.files import remove_stale, sync_directory, warn, write_file, write_files
+from evoexp.store.files import (
+    reason,
+    remove_stale,
+    sync_directory,
+    warn,
+    write_file,
+    write_files,
+)
 from evoexp.store.identity import (
     CONFIG,
     MANIFEST,
@@ -24,16 +30,14 @@ from evoexp.store.identity import (
     TAKEN,
     DamagedFile,
     Plan,
-    as_json,
     checked_manifest,
     config_id,
     lost_files,
     read,
     read_object,
-    read_plans,
     restored_manifest,
     stored_id,
-    whole_log,
+    whole_logs,
 )
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
@@ -51,31 +55,18 @@ class RunDirectory:
 
     Attributes:
         condition_id: Full hash of the condition, 64 hex digits: the SHA-256 of `config.json`.
+        hash12: Its first twelve digits, which name the run.
         path: The directory.
+        replicates: Directory of the logs.
+        summary_path: The table derived from the logs; see `tables`.
     """
 
     def __init__(self, outputs: Path, condition_id: str) -> None:
         """Name the directory; nothing is created or read."""
-        if not re.fullmatch("[0-9a-f]{64}", condition_id):
-            raise ValueError(f"condition_id: must be 64 hex digits, was {condition_id!r}")
-        self.condition_id = condition_id
-        self.path = Path(outputs) / "runs" / condition_id[:HASH_LENGTH]
+        self.condition_id, self.hash12 = condition_id, condition_id[:HASH_LENGTH]
+        self.path = Path(outputs) / "runs" / self.hash12
+        self.replicates, self.summary_path = self.path / REPLICATES, self.path / "summary.parquet"
         self._lock = FileLock(self.path / ".lock", timeout=0)
-
-    @property
-    def hash12(self) -> str:
-        """The twelve hex digits that name the run."""
-        return self.condition_id[:HASH_LENGTH]
-
-    @property
-    def replicates(self) -> Path:
-        """Directory of the logs."""
-        return self.path / REPLICATES
-
-    @property
-    def summary_path(self) -> Path:
-        """The table derived from the logs; see `tables`."""
-        return self.path / "summary.parquet"
 
     def log_path(self, replicate: int) -> Path:
         """Return where the finished log of a replicate is or will be."""
@@ -96,35 +87,24 @@ class RunDirectory:
         Args:
             config_json: Canonical form of the condition.
             manifest: See `manifest.manifest`.
-            files: Contents of the files that the condition refers to, by the names that
-                `attachments.attached` gives.
-
-        Raises:
-            StoreError: The directory is damaged or belongs to another condition.
+            files: Contents of the files that it refers to, by their names (`attachments.attached`).
         """
-        if hashlib.sha256(config_json).hexdigest() != self.condition_id:
-            raise ValueError(f"config_json: is not of condition {self.hash12}")
         if (self.path / CONFIG).exists():
             self.check()
         text = json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
         # the configuration comes behind the files that it refers to
         contents = {**(files or {}), CONFIG: config_json, MANIFEST: text}
-        missing = {
-            self.path / name: content
-            for name, content in contents.items()
-            if not (self.path / name).exists()
-        }
+        paths = {self.path / name: content for name, content in contents.items()}
+        missing = {path: content for path, content in paths.items() if not path.exists()}
         for folder in {self.replicates, *(path.parent for path in missing)}:
             folder.mkdir(parents=True, exist_ok=True)
         write_files(missing)
         sync_directory(self.path.parent)
 
     def check(self) -> None:
-        """Raise unless `config.json` is this very condition's.
+        """Raise unless `config.json` is this very condition's: a `DamagedFile`, or a StoreError.
 
-        Raises:
-            DamagedFile: It is missing, damaged or foreign.
-            StoreError: It is of a condition that shares the first twelve digits.
+        The latter where it is of a condition that shares the first twelve digits.
         """
         stored = config_id(self.path)
         if stored != self.condition_id:
@@ -134,11 +114,7 @@ class RunDirectory:
             )
 
     def check_identity(self) -> None:
-        """Raise where the directory is another condition's; a lost configuration is only said.
-
-        Raises:
-            StoreError: `config.json` is of a condition that shares the first twelve digits.
-        """
+        """Raise where the directory is another condition's; a lost configuration is only said."""
         try:
             self.check()
         except DamagedFile as error:
@@ -147,10 +123,7 @@ class RunDirectory:
     def config_json(self) -> bytes:
         """Return the canonical form of the condition, checked, and keep the files it refers to.
 
-        Where one of them is lost, a log has it; that is said.
-
-        Raises:
-            StoreError: No log has it, either.
+        Where one of them is lost, a log has it, which is said, or else StoreError is raised.
         """
         try:
             self.check()
@@ -162,21 +135,18 @@ class RunDirectory:
             error = StoreError(f"{lost[0]}: missing or damaged")
         except DamagedFile as damaged:
             error = damaged
-        found = whole_log(self.path, self.condition_id)
-        if found is None:
-            raise error
-        warn(f"{error}; taken from {found.name}. Mend it: {self.command}")
-        attached = found.contents.attachments
-        keep_all(data for name, data in attached.items() if name.startswith(PREFIX))
-        return found.contents.config_json
+        for name, log in whole_logs(self.path, self.condition_id):
+            warn(f"{error}; taken from {name}. Mend it: {self.command}")
+            attached = log.attachments.items()
+            keep_all(data for name, data in attached if name.startswith(PREFIX))
+            return log.config_json
+        raise error
 
     def manifest(self) -> dict[str, Any]:
         """Return the manifest that was written when the run was created.
 
-        Where it is lost, the environment of a log stands for it; that is said.
-
-        Raises:
-            StoreError: No log has it, either.
+        Where it is lost, the environment of a log stands for it, which is said, or else StoreError
+        is raised.
         """
         try:
             return checked_manifest(self.path, self.condition_id)
@@ -186,6 +156,35 @@ class RunDirectory:
                 raise
             warn(f"{error}; taken from {restored[RESTORED]}. Mend it: {COMMAND}")
             return restored
+
+    def damaged_files(self, config_json: bytes | None = None) -> dict[str, str]:
+        """Return name → what is wrong with it, of the files beside the logs.
+
+        StoreError is raised where it is another condition's, see `check`.
+
+        Args:
+            config_json: The canonical form of its condition; None: as it is stored.
+        """
+        if not is_stored(self.path):
+            return {}
+        damaged: dict[str, str] = {}
+        if self.replicates.exists() and not self.replicates.is_dir():
+            damaged[REPLICATES] = "damaged: not a directory"
+        checks: dict[str, Callable[[], object]] = {
+            CONFIG: self.check,
+            MANIFEST: lambda: checked_manifest(self.path, self.condition_id),
+            PLANS: self.plans,
+        }
+        for name, check in checks.items():
+            try:
+                check()
+            except DamagedFile as error:
+                if name != MANIFEST or os.path.lexists(self.path / MANIFEST) or self.completed():
+                    damaged[name] = reason(self.path / name, error)
+        if config_json is None:
+            config_json = b"" if CONFIG in damaged else read(self.path / CONFIG)
+        lost = lost_files(self.path, config_json)
+        return damaged | {str(path.relative_to(self.path)): why for path, why in lost}
 
     @property
     def command(self) -> str:
@@ -202,7 +201,17 @@ class RunDirectory:
 
     def plans(self) -> list[Plan]:
         """Return how many replicates were asked for, in the order in which that was done."""
-        return read_plans(self.path / PLANS)
+        path = self.path / PLANS
+        if not os.path.lexists(path):
+            return []
+        try:
+            rows = read_object(path)["plans"]
+            plans = [Plan(row["num_replicates"], row["stored"]) for row in rows]
+        except (KeyError, TypeError) as error:
+            raise DamagedFile(f"{path}: damaged: no list of plans") from error
+        if not all(type(number) is int and number >= 0 for plan in plans for number in plan):
+            raise DamagedFile(f"{path}: damaged: a plan is two whole numbers")
+        return plans
 
     def num_asked(self) -> int:
         """Return how many replicates were ever asked for; 0 where the plans are damaged."""
@@ -220,7 +229,8 @@ class RunDirectory:
         if num_replicates > self.num_asked():
             plans.append(Plan(num_replicates, len(self.completed())))
             self.path.mkdir(parents=True, exist_ok=True)
-            write_file(self.path / PLANS, as_json(plans))
+            text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
+            write_file(self.path / PLANS, text.encode() + b"\n")
 
     @staticmethod
     def is_own(name: str) -> bool:
@@ -238,9 +248,7 @@ class RunDirectory:
     def failure(self, replicate: int) -> dict[str, Any]:
         """Return `reason` and `traceback` of a failed replicate."""
         failure = read_object(self.failure_path(replicate))
-        if not (
-            isinstance(failure.get("reason"), str) and isinstance(failure.get("traceback"), str)
-        ):
+        if not all(isinstance(failure.get(name), str) for name in ("reason", "traceback")):
             raise StoreError(f"{self.failure_path(replicate)}: damaged: no reason and traceback")
         return failure
 
@@ -262,10 +270,7 @@ class RunDirectory:
         """Hold the run for writing; an operating-system lock that dies with its process.
 
         The same object may lock again inside. Temporary files that a killed parent left are
-        removed.
-
-        Raises:
-            Busy: Another process, or another object of this one, holds the run.
+        removed. `Busy` is raised where another process or object holds the run.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         try:
@@ -285,10 +290,8 @@ class RunDirectory:
             if (self.path / ".lock").exists():
                 with FileLock(self.path / ".lock", timeout=0):
                     return False
-        except Timeout:
-            return True
-        except OSError:  # outputs that may only be read
-            pass
+        except OSError as error:  # others are of outputs that may only be read
+            return isinstance(error, Timeout)
         return False
 
     def _matching(self, pattern: re.Pattern[str]) -> set[int]:
@@ -301,11 +304,7 @@ class RunDirectory:
 
 @contextmanager
 def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
-    """Hold several runs, taken in the order of their hashes: no two processes wait in a ring.
-
-    Raises:
-        Busy: One of them is held; none is then held from here.
-    """
+    """Hold several runs; in the order of their hashes, so that no two processes wait in a ring."""
     with ExitStack() as stack:
         distinct = {run.path: run for run in runs}.values()
         for run in sorted(distinct, key=lambda run: run.condition_id):
@@ -318,23 +317,8 @@ def outputs_root() -> Path:
     return Path(os.environ.get("EVOEXP_OUTPUTS") or "outputs")
 
 
-def find_runs(outputs: Path) -> list[RunDirectory]:
-    """Return all stored runs in the order of their hashes; one without identity is left out."""
-    found = []
-    for name in run_names(outputs):
-        try:
-            found.append(open_run(outputs, name))
-        except StoreError as error:
-            warn(f"{error}; the run is left out")
-    return found
-
-
 def open_run(outputs: Path, name: str) -> RunDirectory:
-    """Return a stored run by the name of its directory.
-
-    Raises:
-        StoreError: Nothing in it knows its condition.
-    """
+    """Return a stored run by its directory's name; StoreError: nothing there knows its hash."""
     path = Path(outputs) / "runs" / name
     try:
         return RunDirectory(outputs, stored_id(path))
@@ -348,7 +332,6 @@ def resolve(outputs: Path, prefix: str) -> RunDirectory:
     Raises:
         UnknownHash: The text is no hash, or no run here begins with it.
         AmbiguousHash: Several do.
-        StoreError: Nothing in the run's directory knows its condition.
     """
     digits = prefix.lower()
     if not re.fullmatch("[0-9a-f]{1,64}", digits):

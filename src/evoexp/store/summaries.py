@@ -7,7 +7,6 @@ import contextlib
 import errno
 import json
 import os
-import stat
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,7 +20,7 @@ from evoexp.store.files import listed, reason, set_aside, warn, write_file
 from evoexp.store.log_bounds import check_sums
 from evoexp.store.log_reader import checked_summary
 from evoexp.store.messages import field_types
-from evoexp.store.run_context import ORIGIN, run_context, with_context
+from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory
 
 Runs = RunDirectory | Iterable[RunDirectory]
@@ -35,7 +34,7 @@ class _Summary(NamedTuple):
     files: Stamps  # stamps of all files, in the order of the replicates
     # name → what is wrong with it; a damaged log has no row, a damaged failure has one
     damaged: dict[str, str]
-    settings: pa.Table | None = None  # the columns that `with_context` added, if read from a file
+    settings: pa.Table | None = None  # the columns of `run_context`, if read from a file
 
     @property
     def row_names(self) -> list[str]:
@@ -52,45 +51,35 @@ BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSumm
 
 
 def write_summary(
-    run: RunDirectory,
-    written: Mapping[int, ReplicateSummary] | None = None,
-    *,
-    thorough: bool = False,
+    run: RunDirectory, written: Mapping[int, ReplicateSummary] | None = None
 ) -> pa.Table:
-    """Bring `summary.parquet` up to date with the logs and failures of a run.
-
-    The caller must hold the run's lock.
-
-    Rows of files that did not change since the table was written are taken from it.
+    """Bring `summary.parquet` up to date with the logs and failures of a run, whose lock is held.
 
     Args:
-        written: Summaries of logs that the caller has just written, by replicate: those are not
-            read again.
+        written: Summaries of logs that were just written, by replicate: they are not read again.
 
     Returns:
         One row per replicate, done or failed, in order; a failed one has condition, replicate,
         status and stop_reason, everything else is null. A damaged log has no row.
     """
     known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
-    return _written(run, known, thorough).table
+    summary = _up_to_date(run, known)
+    if summary.settings is None:
+        _write(run, summary)
+    return summary.table
 
 
-def _written(
-    run: RunDirectory, written: Mapping[str, ReplicateSummary], thorough: bool
-) -> _Summary:
-    """Bring `summary.parquet` up to date, see `write_summary`; return what it then holds."""
-    stored, stamps = _stored(run), _stamps(run)
-    if stored is not None and _is_current(run, stored, stamps, thorough):
-        return stored
-    summary = _build(run, stored, stamps, written, thorough)
-    sink = pa.BufferOutputStream()
-    context = run_context(run.path, run.condition_id, summary.table.column_names)
-    table = with_context(summary.table, context)
+def _write(run: RunDirectory, summary: _Summary) -> None:
+    """Write the table of a run, with its origin and settings behind its own columns."""
+    table, sink = summary.table, pa.BufferOutputStream()
+    for name, value in run_context(run.path, run.condition_id, table.column_names).items():
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        constant = pa.repeat(float(value) if is_number else value, table.num_rows)
+        table = table.append_column(name, constant)
     pq.write_table(table, sink, compression="snappy", write_page_checksum=True)
     if run.summary_path.is_dir():
         set_aside(run.summary_path)
     write_file(run.summary_path, sink.getvalue().to_pybytes())
-    return summary
 
 
 def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
@@ -101,46 +90,29 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
 
     Args:
         runs: One or several.
-        thorough: Whether the checksums of all logs are looked at, not only of those whose size or
-            time changed: for who reads the logs anyway.
+        thorough: Whether the checksums of all logs are compared, not only of changed ones.
 
     Returns:
         Columns as `ReplicateSummary`, `terms` as `term_<name>` in alphabetical order.
     """
-    directories = distinct(runs)
-    summaries = [_current(run, thorough) for run in directories]
-    for run, summary in zip(directories, summaries, strict=True):
-        _tell_damage(run, summary)
-    tables = [pa.schema(BASE).empty_table(), *(summary.table for summary in summaries)]
+    tables = [pa.schema(BASE).empty_table()]
+    tables += [_current(run, thorough, tell=True).table for run in distinct(runs)]
     table = pa.concat_tables(tables, promote_options="default")
     names = [field.name for field in BASE]
-    return table.select(
-        names + sorted(set(table.column_names) - set(names))
-    ).replace_schema_metadata(None)
+    names += sorted(set(table.column_names) - set(names))
+    return table.select(names).replace_schema_metadata(None)
 
 
 def summary_rows(
     run: RunDirectory, names: Sequence[str]
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Return some columns of `summary_table` of one run, row by row, and its `damaged_logs`."""
-    summary = _current(run)
-    _tell_damage(run, summary)
+    summary = _current(run, tell=True)
     return summary.table.select(list(names)).to_pylist(), summary.damaged
 
 
-def _tell_damage(run: RunDirectory, summary: _Summary) -> None:
-    if summary.damaged:
-        warn(
-            f"run {run.hash12}: left out, damaged: {listed(summary.damaged)}; run again by: "
-            f"{run.command}"
-        )
-
-
 def damaged_logs(run: RunDirectory) -> dict[str, str]:
-    """Return name → what is wrong with it, of the damaged logs and failures of a run.
-
-    Only those are read whose size or time is not the one that `summary.parquet` notes.
-    """
+    """Return name → what is wrong with it, of the damaged logs and failures of a run."""
     return _current(run).damaged
 
 
@@ -152,31 +124,20 @@ def whole_logs(run: RunDirectory, *, thorough: bool = False) -> set[int]:
 
 def table_damage(run: RunDirectory) -> str:
     """Return the damage of `summary.parquet` in words; empty if it is whole or only outdated."""
-    path = run.summary_path
-    if not os.path.lexists(path) or _stored(run) is not None:
-        return ""
-    try:
-        _refuse_no_file(path)
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            notes = json.loads(file.read().schema.metadata[_KEY])
-        if notes["condition"] != run.condition_id:
-            return f"is of run {str(notes['condition'])[:12]}, which does not belong here"
-        return "" if notes["version"] != _VERSION else "damaged: its columns are others"
-    except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
-        return "damaged: it is derived from the logs and cannot be read"
+    return _stored(run)[1] if os.path.lexists(run.summary_path) else ""
 
 
 def altered(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> str:
     """Return how `summary.parquet` contradicts logs or settings of a run; empty: it does not.
 
-    Rows of logs that changed since the table was written are not looked at, nor is what the
-    manifest says of the origin, which may have changed since.
+    Rows of logs that changed since the table was written are not looked at, nor is the origin,
+    which may have changed since.
 
     Args:
         summaries: The logs' own, by the names of their files.
     """
-    stored, stamps = _stored(run), _stamps(run)
-    if stored is None or stored.settings is None:  # damaged, or of another version
+    (stored, _), stamps = _stored(run), _stamps(run)
+    if stored is None or stored.settings is None:
         return ""
     rows = dict(zip(stored.row_names, stored.table.to_pylist(), strict=True))
     names = [
@@ -216,39 +177,73 @@ def distinct(runs: Runs) -> list[RunDirectory]:
     return list({run.path: run for run in given}.values())
 
 
-def _current(run: RunDirectory, thorough: bool = False) -> _Summary:
-    stored, stamps = _stored(run), _stamps(run)
-    if not stamps:
-        return _table_of(run, {}, {}, {})
-    if stored is not None and _is_current(run, stored, stamps, thorough):
-        return stored
-    try:
-        with run.lock():
-            return _written(run, {}, thorough)
-    except (Busy, OSError):
+def _current(run: RunDirectory, thorough: bool = False, tell: bool = False) -> _Summary:
+    """Return the table of a run as its files are, written if it is new and nobody holds the run.
+
+    Where `tell` is set, damaged logs, which have no row, are named in a line.
+    """
+    summary = _up_to_date(run, {}, thorough)
+    if summary.settings is None and summary.files:
         # another process writes the run, or it may only be read: the rows are the same
-        return _build(run, stored, stamps, {}, thorough)
+        with contextlib.suppress(Busy, OSError), run.lock():
+            _write(run, summary)
+    if tell and summary.damaged:
+        names = listed(summary.damaged)
+        warn(f"run {run.hash12}: left out, damaged: {names}; run again by: {run.command}")
+    return summary
 
 
-def _is_current(run: RunDirectory, stored: _Summary, stamps: Stamps, thorough: bool) -> bool:
-    """Return whether the files are as a table notes them; damaged ones are looked at again."""
-    if stored.files != stamps:
+def _up_to_date(
+    run: RunDirectory, written: Mapping[str, ReplicateSummary], thorough: bool = False
+) -> _Summary:
+    """Return the table of a run as its files are: the stored one, or a new one without settings.
+
+    Rows of unchanged files are taken from the stored one, summaries of `written` files as they are;
+    damaged files are looked at again. `thorough` compares the checksums of unchanged logs, too.
+    """
+    (stored, _), stamps = _stored(run), _stamps(run)
+    unchanged = set[str]()
+    if stored is not None:
+        unchanged = {
+            name
+            for name, stamp in stored.files.items()
+            if stamps.get(name) == stamp
+            and name not in stored.damaged
+            and not (thorough and _is_log(name) and not _is_intact(run.replicates / name))
+        }
+    rows, damaged = dict[str, dict[str, Any]](), dict[str, str]()
+    for name in [name for name in stamps if name not in unchanged]:
+        if name in written:
+            rows[name] = flatten(written[name])
+        else:
+            row, why = _row(run, name)
+            rows |= {name: row} if row else {}
+            damaged |= {name: why} if why else {}
+    if stored is not None and (stored.files, stored.damaged) == (stamps, damaged):
+        return stored
+    if stored is not None and unchanged:
+        pairs = zip(stored.row_names, stored.table.to_pylist(), strict=True)
+        rows |= {name: row for name, row in pairs if name in unchanged}
+
+    # the columns of all tables, then the terms; a stored row has null for its neighbours' terms
+    names = {key for row in rows.values() for key, value in row.items() if value is not None}
+    terms = sorted(names - {field.name for field in BASE})
+    schema = pa.schema(BASE + [pa.field(name, pa.float64()) for name in terms])
+    damaged = {name: damaged[name] for name in stamps if name in damaged}
+    notes = {"version": _VERSION, "condition": run.condition_id}
+    notes |= {"files": stamps, "damaged": damaged, "columns": schema.names}
+    table = pa.Table.from_pylist([rows[name] for name in stamps if name in rows], schema)
+    table = table.replace_schema_metadata({_KEY: json.dumps(notes).encode()})
+    return _Summary(table, stamps, damaged)
+
+
+def _is_intact(log: Path) -> bool:
+    """Return whether the checksums of a log are right."""
+    try:
+        check_sums(log.read_bytes(), log.name)
+    except (CorruptLog, OSError):
         return False
-    again = {name: why for name in stored.damaged if (why := _row(run, name)[1])}
-    return again == stored.damaged and (not thorough or all(_intact(run, stored).values()))
-
-
-def _intact(run: RunDirectory, stored: _Summary) -> dict[str, bool]:
-    """Return name → whether its checksums are right, of the logs behind the rows of a table."""
-    folder, found = str(run.replicates), {}
-    for name in filter(_is_log, stored.row_names):
-        try:
-            with open(f"{folder}/{name}", "rb") as file:
-                check_sums(file.read(), name)
-            found[name] = True
-        except (CorruptLog, OSError):
-            found[name] = False
-    return found
+    return True
 
 
 def _is_log(name: str) -> bool:
@@ -257,100 +252,46 @@ def _is_log(name: str) -> bool:
 
 def _stamps(run: RunDirectory) -> Stamps:
     """Return size and time of the files behind the table, in the order of the replicates."""
-    found: dict[str, os.stat_result] = {}
+    statuses: dict[str, os.stat_result] = {}
     nothing = contextlib.suppress(FileNotFoundError, NotADirectoryError)
     with nothing, os.scandir(run.replicates) as entries:
-        for entry in entries:
-            if run.is_own(entry.name):
-                # what is gone was a failure that another process has just replaced by a log
-                with contextlib.suppress(FileNotFoundError):
-                    found[entry.name] = _status(entry)
-    done = {replicate_of(name) for name in found if _is_log(name)}
-    names = [name for name in found if _is_log(name) or replicate_of(name) not in done]
+        for entry in filter(lambda entry: run.is_own(entry.name), entries):
+            # what is gone was a failure that another process has just replaced by a log
+            with contextlib.suppress(FileNotFoundError):
+                try:
+                    statuses[entry.name] = entry.stat()
+                except OSError:  # of a link that leads nowhere
+                    statuses[entry.name] = entry.stat(follow_symlinks=False)
+    done = {replicate_of(name) for name in statuses if _is_log(name)}
+    names = [name for name in statuses if _is_log(name) or replicate_of(name) not in done]
     return {
-        name: [found[name].st_size, found[name].st_mtime_ns]
+        name: [statuses[name].st_size, statuses[name].st_mtime_ns]
         for name in sorted(names, key=replicate_of)
     }
 
 
-def _status(entry: os.DirEntry[str]) -> os.stat_result:
+def _stored(run: RunDirectory) -> tuple[_Summary | None, str]:
+    """Return the table as it was written, None if of another version, and what is wrong with it."""
+    path = run.summary_path
     try:
-        return entry.stat()
-    except OSError:
-        return entry.stat(follow_symlinks=False)  # of a link that leads nowhere
-
-
-def _stored(run: RunDirectory) -> _Summary | None:
-    """Return the table as it was written, or None where there is no valid one of this version."""
-    try:
-        _refuse_no_file(run.summary_path)
-        with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
+        if not path.is_file():  # a pipe would keep its reader for ever
+            raise OSError(errno.EINVAL, "not a regular file", str(path))
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
             whole = file.read(use_threads=False)  # starting them takes longer than most tables
         notes = json.loads(whole.schema.metadata[_KEY])
+        if notes["condition"] != run.condition_id:
+            theirs = str(notes["condition"])[:12]
+            return None, f"is of run {theirs}, which does not belong here"
+        if notes["version"] != _VERSION:
+            return None, ""
         table, settings = whole.select(notes["columns"]), whole.drop_columns(notes["columns"])
-        valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id
-        valid = valid and all(table.schema.field(field.name).equals(field) for field in BASE)
         summary = _Summary(table, notes["files"], notes["damaged"], settings)
-        valid = valid and len(summary.row_names) == table.num_rows
+        is_valid = all(table.schema.field(field.name).equals(field) for field in BASE)
+        if is_valid and len(summary.row_names) == table.num_rows:
+            return summary, ""
+        return None, "damaged: its columns are others"
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
-        return None
-    return summary if valid else None
-
-
-def _refuse_no_file(path: Path) -> None:
-    """Raise an OSError unless a path is a regular file: a pipe would keep its reader for ever."""
-    if not stat.S_ISREG(path.stat().st_mode):
-        raise OSError(errno.EINVAL, "not a regular file", str(path))
-
-
-def _build(
-    run: RunDirectory,
-    stored: _Summary | None,
-    stamps: Stamps,
-    written: Mapping[str, ReplicateSummary],
-    thorough: bool,
-) -> _Summary:
-    """Build the table of a run; rows of files that did not change are taken from the stored one."""
-    kept: dict[str, dict[str, Any]] = {}
-    if stored is not None:
-        intact = _intact(run, stored) if thorough else {}
-        kept = {
-            name: row
-            for name, row in zip(stored.row_names, stored.table.to_pylist(), strict=True)
-            if stamps.get(name) == stored.files[name]
-            and name not in stored.damaged
-            and intact.get(name, True)
-        }
-    rows, damaged = dict[str, dict[str, Any]](), dict[str, str]()
-    for name in stamps:
-        if name in written:
-            rows[name] = flatten(written[name])
-        elif name in kept:
-            rows[name] = kept[name]
-        else:
-            row, why = _row(run, name)
-            if row:
-                rows[name] = row
-            if why:
-                damaged[name] = why
-    return _table_of(run, rows, stamps, damaged)
-
-
-def _table_of(
-    run: RunDirectory, rows: Mapping[str, dict[str, Any]], stamps: Stamps, damaged: dict[str, str]
-) -> _Summary:
-    """Return rows as a table with its notes: version, columns, the files that it follows from."""
-    known = {field.name for field in BASE}
-    # a stored row has null for the terms that only its neighbours have
-    terms = {
-        key for row in rows.values() for key, value in row.items() if value is not None
-    } - known
-    schema = pa.schema(BASE + [pa.field(name, pa.float64()) for name in sorted(terms)])
-    notes = {"version": _VERSION, "condition": run.condition_id}
-    notes |= {"files": stamps, "damaged": damaged, "columns": schema.names}
-    table = pa.Table.from_pylist(list(rows.values()), schema)
-    table = table.replace_schema_metadata({_KEY: json.dumps(notes).encode()})
-    return _Summary(table, stamps, damaged)
+        return None, "damaged: it is derived from the logs and cannot be read"
 
 
 def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:

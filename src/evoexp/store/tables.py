@@ -30,15 +30,11 @@ def read_summaries(runs: Runs, *, thorough: bool = False) -> pd.DataFrame:
 def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> pd.DataFrame:
     """Return the generations of completed replicates of one or several runs.
 
-    Logs are read one after the other; of each only its columns are kept. Damaged ones are left
-    out; `read_summaries` says so.
+    Damaged logs are left out; `read_summaries` says so.
 
     Returns:
         Columns condition (categorical), replicate, those of `GenerationRow` without its chain, and
         `term_<name>` in alphabetical order, NaN where a generation lacks the term.
-
-    Raises:
-        CorruptLog: A log was damaged since `read_summaries` looked at all of them.
     """
     directories = distinct(runs)
     codes, indices, parts = list[int](), list[int](), list[dict[str, NDArray[Any]]]()

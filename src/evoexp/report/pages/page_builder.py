@@ -43,7 +43,8 @@ def build(
     entry = file.pages[name]
     given = {"results": results, "settings": settings, "rules": file.rules, "page": entry}
     scope = Scope(file.functions, {**given, "paper": file.words.name, **values})
-    if "fits" in entry and not scope.value(entry["fits"]):
+    fits = entry.get("fits", ())
+    if not all(map(scope.value, [fits] if isinstance(fits, str) else fits)):
         other = entry.get("otherwise", GENERIC)
         own = own_pages() if other == GENERIC else file
         return build(own, other, results, settings)
@@ -138,8 +139,7 @@ class PageBuilder:
             if isinstance(each, str):
                 yield from self.scope[each]
             elif "controls" in each:
-                found = [measure(self.scope, *row) for row in each["controls"]]
-                own = [(one.name, one.lower_is_better, one.values) for one in found]
+                own = [measure(self.scope, *row) for row in each["controls"]]
                 yield from compared_with_controls(
                     self.scope["results"], self.scope["settings"], own
                 )

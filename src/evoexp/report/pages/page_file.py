@@ -9,7 +9,7 @@ Its entry points `evoexp.pages` name the file: `my_paper = "my_paper:page.yaml"`
     functions: [measures, claims]     # modules of the package: their functions may be named
     pages:
       lavoie:
-        fits: fits                    # function; where it returns false, another page is shown:
+        fits: planned[redundant_ga]   # or several; where a value is false, another page is shown:
         otherwise: generic            # of this file; `generic` if none is named
         title: "…"                    # "{paper}: {experiment}" if there is none
         introduction: "…"

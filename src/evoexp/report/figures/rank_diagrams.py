@@ -77,10 +77,10 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
     words: dict[str, Any] = {"fontsize": 6.0 if is_narrow else 7.5}  # [pt]
     line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0}
     axes.plot([1.0, count], [0.0, 0.0], **line)
-    for rank in range(1, count + 1):
-        axes.plot([rank, rank], [0.0, 0.06], **line)
-        if rank % 2 or not is_narrow:
-            axes.text(rank, 0.09, str(rank), ha="center", va="bottom", **words)
+    for tick in range(1, count + 1):
+        axes.plot([tick, tick], [0.0, 0.06], **line)
+        if tick % 2 or not is_narrow:
+            axes.text(tick, 0.09, str(tick), ha="center", va="bottom", **words)
     axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", **words)
     axes.plot([1.0, 1.0 + difference], [0.4, 0.4], **line)
     for end in (1.0, 1.0 + difference):

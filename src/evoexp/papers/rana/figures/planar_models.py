@@ -105,8 +105,21 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
         axes.plot(
             *(final[name] for name in ANGLES), **looks[last] | {"color": style.arm_colour(arm)}
         )
-        x, y, instants = (final[name].to_numpy() for name in (*ANGLES, "instant"))
-        _numbers(axes, x, y, instants, rows[ANGLES].to_numpy())
+        # every fifth via-point, the start and the goal have their number at that of eight places
+        # around that is farthest from all points, and from the numbers that stand there already
+        points, taken = final[ANGLES].to_numpy(), list(rows[ANGLES].to_numpy())
+        size = max(float(np.ptp(points, axis=0).max()), 1e-9)
+        angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
+        for k, (here, instant) in enumerate(zip(points, final["instant"], strict=True)):
+            if instant % NUMBERED and k < len(points) - 1:
+                continue
+            places = [here + NUMBER_ROOM * size * np.array([c, s]) for s, c in angles]
+            best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
+            s, c = angles[best]
+            taken.append(places[best])
+            look: dict[str, Any] = {"va": "center", "fontsize": 7, "zorder": 6}
+            offset = NUMBER_OFFSET * c, NUMBER_OFFSET * s
+            marks.write(axes, str(instant), here, offset, path_effects=marks.HALO, **look)
         axes.margins(0.1)
     keys = [
         style.key(first, **looks[first]),
@@ -199,27 +212,3 @@ def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFram
         angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")
         frames.append(pd.DataFrame({"arm": arm, "instant": range(rows)}).join(angles))
     return pd.concat(frames, ignore_index=True)
-
-
-def _numbers(
-    axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray, around: FloatArray
-) -> None:
-    """Write the number of every fifth via-point, the start and the goal where there is room.
-
-    Of eight places around a via-point the one is taken that is farthest from all points `around`,
-    (points, 2), and from the numbers that stand there already.
-    """
-    size = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
-    taken = list(around)
-    angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
-    for k, instant in enumerate(instants):
-        if instant % NUMBERED and k < len(instants) - 1:
-            continue
-        here = np.array([x[k], y[k]])
-        places = [here + NUMBER_ROOM * size * np.array([c, s]) for s, c in angles]
-        best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
-        s, c = angles[best]
-        taken.append(places[best])
-        look: dict[str, Any] = {"va": "center", "fontsize": 7, "zorder": 6}
-        offset = NUMBER_OFFSET * c, NUMBER_OFFSET * s
-        marks.write(axes, str(instant), (x[k], y[k]), offset, path_effects=marks.HALO, **look)

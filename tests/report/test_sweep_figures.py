@@ -139,7 +139,7 @@ def test_a_legend_takes_as_many_columns_as_fit(length: int, columns: int) -> Non
     figure = style.figure(3.0)
     axes = figure.subplots()
     for k in range(6):
-        axes.plot([0.0, 1.0], [0.0, k], label="w" * (length // 2) + "i" * (length // 2))
+        axes.plot([0.0, 1.0], [0.0, k], label=f"{'w' * (length // 2)}{'i' * (length // 2 - 1)}{k}")
     style.legend_below(figure, [axes], 6)
     (legend,) = figure.legends
     assert len(legend.get_texts()) == 6

@@ -252,7 +252,7 @@ def test_shares_of_a_gain_are_what_medians_say(outputs: Path) -> None:
         for name, level in levels.items()
     }
     corner = hall_shares.Corner("", runs["nothing"], (runs["elites"],), runs["hall"], None, ())
-    measure, settings = hall_shares.gain_measures(9.0, "9")[0], page_settings("curkovic_hall")
+    measure, settings = hall_shares.gains(9.0)[0], page_settings("curkovic_hall")
     found = hall_shares.share(corner, measure, runs["elites"], runs["hall"], settings)
     medians = {name: float(np.median(c.column("best_cost"))) for name, c in runs.items()}
     expected = (medians["nothing"] - medians["elites"]) / (medians["nothing"] - medians["hall"])
@@ -369,7 +369,7 @@ def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> Non
 
 def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
     condition = smoke_results(outputs, "curkovic_motion").conditions[1]
-    refuted, leaves, fast = measures.rates(condition).values()
+    refuted, leaves, fast = measures.defects(condition)
     assert refuted == (
         condition.verdicts.solved_refuted,
         condition.solved,

@@ -11,7 +11,7 @@ def names_of(count: int, look: style.Look) -> tuple[list[str], int]:
     seen = []
 
     def draw() -> object:
-        figure, (axes,) = style.row_of_panels(3.0, 1)
+        figure, (axes,) = style.panels(3.0)
         for k in range(count):
             axes.plot([0.0, 1.0], [0.5, 0.1 * k], label=f"planner {k}", **style.curve_look(k))
         name_curves(figure, axes, 3)

@@ -19,11 +19,11 @@ LONG = "a name that is by far too long for the width of one of two columns of a 
 
 
 def draw(label: str = "a curve") -> Figure:
-    found, panels = style.row_of_panels(3.0, 2)
+    found, panels = style.panels(3.0, 2)
     for axes in panels:
         axes.plot([0.0, 1.0], [0.0, 2.0], label=label)
         axes.set(xlabel="instant", ylabel="distance [m]", title="one")
-    style.legend_below(found, panels[0], 1)
+    style.legend_below(found, panels[:1], 1)
     return found
 
 

@@ -17,7 +17,7 @@ LONG = "share of the runs that were begun and came to their end [%]"
 
 
 def row(count: int) -> Figure:
-    found, panels = style.row_of_panels(2.7, count, sharey=True)
+    found, panels = style.panels(2.7, count, sharey=True)
     for k, axes in enumerate(panels):
         axes.barh(range(3), [1e4, 2e4, 3e4])
         axes.set(yticks=range(3), yticklabels=NAMES, xlabel=LONG, title=f"ended by the goal {k}")
@@ -25,16 +25,16 @@ def row(count: int) -> Figure:
 
 
 def lines() -> Figure:
-    found, panels = style.lines_of_panels(2.1, 10, 3, 0.8)
+    found, panels = style.panels(2.1, 10, 3, 0.8)
     for k, axes in enumerate(panels):
         axes.plot([0.0, 12345.0], [0.0, 1.0], label=f"a curve with a long name, number {k}")
         axes.set_title(f"panel {k} of many, of which each has a name that is too long")
-    style.legend_of_all(found, panels, 4)
+    style.legend_below(found, panels, 4)
     return found
 
 
 def boxes() -> Figure:
-    found, (axes,) = style.row_of_panels(3.0, 1)
+    found, (axes,) = style.panels(3.0)
     axes.bar(range(8), range(8))
     axes.set_xticks(range(8), [f"{k}\nn = 50, 2 refuted" for k in range(8)])
     axes.set_title("b  at the end of each of the runs that were begun, those that failed included")
@@ -55,7 +55,7 @@ def stack() -> Figure:
 
 
 def coloured() -> Figure:
-    found, panels = style.row_of_panels(3.4, 2)
+    found, panels = style.panels(3.4, 2)
     for axes in panels:
         image = axes.imshow([[0.0, 100.0], [200.0, 50.0]])
         found.colorbar(image, ax=axes, label="potential [-]")
@@ -139,7 +139,7 @@ def test_panels_that_begin_a_line_have_numbers_and_others_that_share_them_none()
 
 def test_titles_of_a_page_are_broken_where_they_would_reach_into_the_next_panel() -> None:
     def long_titles() -> Figure:
-        found, panels = style.row_of_panels(3.0, 2)
+        found, panels = style.panels(3.0, 2)
         for axes in panels:
             axes.set_title(
                 "a condition that has a name as long as those of a sweep: 4 exact bodies"

@@ -71,9 +71,9 @@ def test_a_box_is_tukeys() -> None:
     for size in (5, 30, 200):
         found = rng.standard_t(2, size)
         axes = style.figure(2.0).subplots()
-        draw_box(axes, 0.0, found, "#000000", "vertical")
+        draw_box(axes, 0.0, found, "#000000")
         (expected,) = cbook.boxplot_stats(found)
-        drawn = np.concatenate([np.ravel(line.get_ydata()) for line in axes.get_lines()])
+        drawn = np.concatenate([np.ravel(line.get_xdata()) for line in axes.get_lines()])
         for name in ("q1", "med", "q3", "whislo", "whishi"):
             assert np.isclose(drawn, expected[name]).any(), name
 
@@ -134,13 +134,13 @@ def test_rows_of_more_conditions_than_colours_have_no_colours_of_others() -> Non
     ]
 
 
-@pytest.mark.parametrize(("length", "columns"), [(4, 6), (40, 2), (90, 1)])
+@pytest.mark.parametrize(("length", "columns"), [(4, 6), (38, 2), (90, 1)])
 def test_a_legend_takes_as_many_columns_as_fit(length: int, columns: int) -> None:
     figure = style.figure(3.0)
     axes = figure.subplots()
     for k in range(6):
-        axes.plot([0.0, 1.0], [0.0, k], label="w" * (length // 2) + "i" * (length // 2))
-    style.legend_below(figure, axes, 6)
+        axes.plot([0.0, 1.0], [0.0, k], label=f"{'w' * (length // 2)}{'i' * (length // 2 - 1)}{k}")
+    style.legend_below(figure, [axes], 6)
     (legend,) = figure.legends
     assert len(legend.get_texts()) == 6
     figure.draw_without_rendering()

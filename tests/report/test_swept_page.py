@@ -129,7 +129,7 @@ def test_three_settings_have_a_panel_for_each_value_of_the_first() -> None:
 
 
 def test_names_at_the_ends_of_curves_keep_apart() -> None:
-    figure, (axes,) = style.row_of_panels(3.0, 1)
+    figure, (axes,) = style.panels(3.0)
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     heights = [0.5] * 5 + [0.99, np.nan]
     name_ends(axes, [CurveEnd(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])

@@ -101,11 +101,6 @@ class Case(NamedTuple):
         found = self.measured(angles)
         return np.array([found[f"torque_{k}"] for k in (1, 2, 3)])
 
-    def mirrored(self) -> list[FloatArray]:
-        """Return the angles θ1, θ2 [deg] of all optima: mirror images cost the same."""
-        best = self.minima[:, 2] <= self.least * (1.0 + 1e-9)
-        return [row[:2] for row in self.minima[best]]
-
     def ends(self) -> dict[str, FloatArray]:
         """Return local method → the postures at which it ends, (starts, 3): θ1, θ2 [deg], E."""
         own = self.conventional
@@ -118,16 +113,16 @@ class Case(NamedTuple):
 
 def cases(results: Results) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
-    groups = grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective))
-    return [Case(_name(own[0]), **{_role(c): c for c in reversed(own)}) for own in groups]
-
-
-def _role(condition: ConditionResults) -> str:
-    """Return the attribute of `Case` that a condition belongs to."""
-    if condition.is_reference:
-        return str(condition.condition.planner.component).removeprefix("placement_")
-    evolved = "elitist" if condition.planner.ga.num_elites else "plain"
-    return "search" if condition.is_control else evolved
+    found = []
+    for own in grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective)):
+        roles: dict[str, ConditionResults] = {}
+        for c in own:
+            role = "elitist" if c.planner.ga.num_elites else "plain"
+            if c.is_reference:
+                role = str(c.condition.planner.component).removeprefix("placement_")
+            roles.setdefault("search" if c.is_control else role, c)
+        found.append(Case(_name(own[0]), **roles))
+    return found
 
 
 def _name(condition: ConditionResults) -> str:

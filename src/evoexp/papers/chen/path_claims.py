@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.results import run_measures
-from evoexp.report.results.run_measures import counted, planned_by
+from evoexp.report.results.run_measures import counted, planned
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import adjusted, by_column, compared
 from evoexp.report.statistics.judging import Judge, evidence
@@ -49,12 +48,12 @@ class Group(NamedTuple):
     @property
     def optimum(self) -> float:
         """Cost of the best path that the reference knows; NaN without a reference."""
-        return float(self.truth.column("best_cost")[0]) if self.truth is not None else np.nan
+        return cost_known(self.truth)
 
     @property
     def bound(self) -> float:
         """The greatest known lower bound of the cost of any path; NaN without a reference."""
-        return float(self.truth.column("term_lower_bound")[0]) if self.truth is not None else np.nan
+        return bound_known(self.truth)
 
     @property
     def best_path(self) -> list[FloatArray]:
@@ -65,7 +64,7 @@ class Group(NamedTuple):
 def fits_paths(results: Results) -> bool:
     """Whether there are planners' results, and all are of paths over a plane grid."""
     found = results.with_data
-    evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
+    evolved = planned(results)["grid_path_ga"] and any(not c.is_reference for c in found)
     return evolved and all(len(c.scenario.size) == 2 for c in found)
 
 
@@ -84,19 +83,43 @@ def groups(results: Results) -> tuple[Group, ...]:
 
 def shortest(groups: tuple[Group, ...]) -> float:
     """Return the length of the shortest path [cell]; NaN without a reference."""
-    known = (g.truth.array("frontier")[:, 1].min() for g in groups if g.truth is not None)
-    return float(min(known, default=np.nan))
+    known = (shortest_known(g.truth) for g in groups if g.truth is not None)
+    return min(known, default=np.nan)
 
 
-def gaps(condition: ConditionResults, truth: float) -> FloatArray:
-    """Return the gap of each run's cost above a known cost, (done,) [%]."""
-    return np.asarray(np.round(100.0 * (condition.column("best_cost") / truth - 1.0), 9))
+def truth(results: Results, condition: ConditionResults) -> ConditionResults | None:
+    """Return the reference of the same map, potentials and weights, if it is there."""
+    return next((c for c in results.references if _problem(c) == _problem(condition)), None)
 
 
-def cost_of(truth: ConditionResults, weights: tuple[float, float]) -> float:
-    """Return the cost of a reference's best path by other weights ε and λ."""
-    terms = (float(truth.column(f"term_{name}")[0]) for name in ("distance", "unsafeness"))
-    return sum(weight * term for weight, term in zip(weights, terms, strict=True))
+def _problem(condition: ConditionResults) -> tuple[object, ...]:
+    planner, own = condition.planner, condition.condition
+    return own.robot, own.scenario, planner.objective, planner.collision, planner.revisits
+
+
+def cost_known(truth: ConditionResults | None) -> float:
+    """Return the cost of the best path known; NaN without a reference."""
+    return np.nan if truth is None else float(truth.column("best_cost")[0])
+
+
+def bound_known(truth: ConditionResults | None) -> float:
+    """Return the greatest known lower bound of the cost of any path; NaN without a reference."""
+    return np.nan if truth is None else float(truth.column("term_lower_bound")[0])
+
+
+def shortest_known(truth: ConditionResults) -> float:
+    """Return the length of the shortest path [cell]."""
+    return float(truth.array("frontier")[:, 1].min())
+
+
+def above_known(condition: ConditionResults, cost_known: float) -> FloatArray:
+    """Return the gap of each run's cost above that of the best path known, (done,) [%]."""
+    return np.asarray(np.round(100.0 * (condition.column("best_cost") / cost_known - 1.0), 9))
+
+
+def above_bound(condition: ConditionResults, bound_known: float) -> FloatArray:
+    """Return the gap of each run's cost above the bound of any path, (done,) [%]."""
+    return above_known(condition, bound_known)
 
 
 def paths(condition: ConditionResults) -> dict[int, FloatArray]:
@@ -104,15 +127,10 @@ def paths(condition: ConditionResults) -> dict[int, FloatArray]:
     return {k: values.reshape(-1, 2) for k, values in condition.solutions.items()}
 
 
-def boxes(condition: ConditionResults) -> list[tuple[int, ...]]:
-    """Return the obstacles as blocks of nodes (x0, y0, x1, y1)."""
-    return list(condition.scenario.obstacles)
-
-
 def route_list(groups: tuple[Group, ...]) -> Routes:
     """Return the routes of all first conditions together: members are (label, replicate)."""
     of = {(g.main.label, k): path for g in groups for k, path in paths(g.main).items()}
-    return routes(of, inside_points(boxes(groups[0].main)))
+    return routes(of, inside_points(groups[0].main.scenario.obstacles))
 
 
 def routes_of(condition: ConditionResults, found: Routes) -> dict[str, list[int]]:
@@ -173,34 +191,56 @@ def _name(number: int) -> str:
     return (_name(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> tuple[Claim, ...]:
+def judge_paths(judge: Judge, groups: tuple[Group, ...]) -> Iterator[Claim]:
     """Judge the claims of Fig. 2: they need its three weightings, in their order."""
-    return (
-        nearly_shortest(judge, groups[0].main, shortest(groups)),
-        *(_compromise(judge, groups) if len(groups) == 3 else ()),
-        *(_converges(judge, group.main) for group in groups),
-        *(
-            nearly_best(judge, group.main, group.optimum, group.bound)
-            for group in groups
-            if group.truth is not None
-        ),
-        *(claim for group in groups for claim in _evolution_of(judge, group)),
-    )
+    yield nearly_shortest(judge, groups[0].main, shortest(groups))
+    if len(groups) == 3:
+        a, b, c = (group.main for group in groups)
+        unsafeness, distance = by_column(UNSAFENESS), by_column(DISTANCE)
+        safer = compared([(b, a)], unsafeness, judge.settings)
+        shorter = compared([(b, c)], distance, judge.settings)
+        told = "; ".join(
+            f"against {other.label}: {evidence(row, word)}"
+            for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
+            for row in rows
+        )
+        hearing = judge.on("compromise", condition=b.label, first=a.label, last=c.label)
+        yield hearing.better_than_all(told, adjusted([*safer, *shorter]))
+        hearing = judge.on("safest", condition=c.label, other=b.label)
+        yield hearing.better(judge.compared(c, b, unsafeness), "safer")
+        yield much_longer(judge, c, shortest(groups), groups[2].truth)
+    # the best cost decreases, and the average cost converges toward it
+    for main in (group.main for group in groups):
+        generations = main.generations.sort_values("index").groupby("replicate")
+        first, last = generations.first(), generations.last()
+        hearing = judge.on("converges", condition=main.label)
+        most = 1.0 + hearing.rule.limits["spread_percent"] / 100.0
+        lower = last["best_cost"] < first["best_cost"]
+        runs = counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
+        complete = 0 < main.planned <= main.done
+        holds = False if runs.having < main.done else True if complete else None
+        yield hearing.own({"runs": runs}, main.done, holds)
+    for group in groups:
+        if group.truth is not None:
+            yield nearly_best(judge, group.main, group.optimum, group.bound)
+    for group in groups:
+        controls = tuple(c for c in group.conditions if c.is_control)
+        for own in group.conditions if controls else ():
+            if not own.is_control:
+                yield evolution(judge, own, controls)
 
 
-def excess_of(condition: ConditionResults, shortest: float) -> FloatArray:
+def excess(condition: ConditionResults, shortest_known: float) -> FloatArray:
     """Return the excess of each run's length over the shortest one, (done,) [%]."""
-    return np.asarray(100.0 * (condition.column(DISTANCE) / shortest - 1.0))
+    return np.asarray(100.0 * (condition.column(DISTANCE) / shortest_known - 1.0))
 
 
 def nearly_shortest(judge: Judge, condition: ConditionResults, shortest: float) -> Claim:
     """Judge that paths are nearly shortest without safety."""
-    hearing, excess = (
-        judge.on("nearly_shortest", condition=condition.label),
-        excess_of(condition, shortest),
-    )
-    near = counted(excess <= hearing.rule.limits["near_percent"])
-    told = {"length": np.median(condition.column(DISTANCE)), "excess": np.median(excess)}
+    hearing = judge.on("nearly_shortest", condition=condition.label)
+    longer = excess(condition, shortest)
+    near = counted(longer <= hearing.rule.limits["near_percent"])
+    told = {"length": np.median(condition.column(DISTANCE)), "excess": np.median(longer)}
     return hearing.majority(told | {"shortest": shortest, "near": near}, *near)
 
 
@@ -208,7 +248,8 @@ def nearly_best(
     judge: Judge, condition: ConditionResults, cost_known: float, bound_known: float
 ) -> Claim:
     """Judge that costs are near that of the best path known."""
-    hearing, above = judge.on("nearly_best", condition=condition.label), gaps(condition, cost_known)
+    hearing = judge.on("nearly_best", condition=condition.label)
+    above = above_known(condition, cost_known)
     near = counted(above <= hearing.rule.limits["near_percent"])
     told = {"cost": float(np.median(condition.column(COST))), "above": float(np.median(above))}
     told |= {"known": cost_known, "bound": bound_known}
@@ -220,58 +261,13 @@ def much_longer(
 ) -> Claim:
     """Judge that the safe path is much longer, and tell how long the best path known is."""
     hearing = judge.on("much_longer", condition=condition.label)
-    excess = excess_of(condition, shortest_known)
-    longer = counted(excess > hearing.rule.limits["much_percent"])
-    told = f"median {np.median(excess):.0f} % longer, {longer} runs"
+    percents = excess(condition, shortest_known)
+    longer = counted(percents > hearing.rule.limits["much_percent"])
+    told = f"median {np.median(percents):.0f} % longer, {longer} runs"
     if truth is not None:
-        known = float(excess_of(truth, shortest_known)[0])
+        known = float(excess(truth, shortest_known)[0])
         told += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
     return hearing.majority(told, *longer)
-
-
-def _compromise(judge: Judge, groups: tuple[Group, ...]) -> tuple[Claim, ...]:
-    """Judge the claims that compare the three weightings."""
-    a, b, c = (group.main for group in groups)
-    unsafeness, distance = by_column(UNSAFENESS), by_column(DISTANCE)
-    safer = compared([(b, a)], unsafeness, judge.settings)
-    shorter = compared([(b, c)], distance, judge.settings)
-    told = "; ".join(
-        f"against {other.label}: {evidence(row, word)}"
-        for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
-        for row in rows
-    )
-    rows = adjusted([*safer, *shorter])
-    return (
-        judge.on("compromise", condition=b.label, first=a.label, last=c.label).better_than_all(
-            told, rows
-        ),
-        judge.on("safest", condition=c.label, other=b.label).better(
-            judge.compared(c, b, unsafeness), "safer"
-        ),
-        much_longer(judge, c, shortest(groups), groups[2].truth),
-    )
-
-
-def _converges(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge that the best cost decreases, and that the average cost converges toward it."""
-    rows = condition.generations.sort_values("index").groupby("replicate")
-    first, last = rows.first(), rows.last()
-    lower = last["best_cost"] < first["best_cost"]
-    hearing = judge.on("converges", condition=condition.label)
-    most = 1.0 + hearing.rule.limits["spread_percent"] / 100.0
-    runs = counted(lower & (last["mean_cost"] <= most * last["best_cost_in_generation"]))
-    complete = 0 < condition.planned <= condition.done
-    holds = False if runs.having < condition.done else True if complete else None
-    return hearing.own({"runs": runs}, condition.done, holds)
-
-
-def _evolution_of(judge: Judge, group: Group) -> Iterator[Claim]:
-    """Judge the genetic algorithm, without and with elitism, against all controls."""
-    controls = tuple(c for c in group.conditions if c.is_control)
-    if controls:
-        for own in group.conditions:
-            if not own.is_control:
-                yield evolution(judge, own, controls)
 
 
 def evolution(

@@ -1,6 +1,7 @@
 """The claims of Chen & Zalzala 1995 on docking postures, judged by exact optima and controls."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -8,7 +9,6 @@ from evoexp.papers.chen.cases import METHODS, Case
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.comparisons import by_column, compared
 from evoexp.report.statistics.inference import Proportion, fisher_exact
 from evoexp.report.statistics.judging import Judge
@@ -17,17 +17,38 @@ from evoexp.report.statistics.judging import Judge
 def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge the number, the angles, the torques and their ratio, as far as they are printed."""
     printed = case.printed
+    angles = _signed("({:g}, {:g})°".format(*printed.angles)) if printed.angles else ""
+    on = partial(judge.on, case=case.name, figure=printed.figure, angles=angles)
     if not np.isnan(printed.value):
         yield judge_value(judge, case)
     if printed.angles is not None:
-        yield _angles(judge, case, printed.angles)
-    if printed.torques is not None:
-        torques = np.array(printed.torques)
-        yield _torques(judge, case, torques)
-        if printed.angles is not None:
-            yield _torques_at_angles(judge, case, torques, printed.angles)
-        if not np.isnan(printed.ratio):
-            yield _ratio(judge, case, torques)
+        cost = case.measured(printed.angles)["cost"]
+        gap = 100.0 * float(case.gaps(np.array([cost]))[0])
+        hearing = on("printed_angles")
+        told: dict[str, object] = {"cost": cost, "least": case.least, "gap": gap}
+        yield hearing.own(told, 1, gap <= hearing.rule.limits["near_percent"])
+    if printed.torques is None:
+        return
+    # the torques of the exact optimum, of its mirror images the nearest
+    torques = np.array(printed.torques)
+    optima = case.minima[case.minima[:, 2] <= case.least * (1.0 + 1e-9), :2]
+    exact = min(map(case.torques, optima), key=lambda own: float(np.abs(own - torques).max()))
+    by_norm = case.conditions[0].planner.objective.torque_norm_weight > 0.0
+    cost = float((torques**2).sum() if by_norm else np.abs(torques).max())
+    gap, off = 100.0 * (cost / case.least - 1.0), float(np.abs(exact - torques).max())
+    hearing = on("printed_torques", torques=triple(torques, 2))
+    limits = hearing.rule.limits
+    told = {"exact": triple(exact, 4), "off": off, "cost": cost, "gap": gap, "least": case.least}
+    yield hearing.own(told, 1, gap <= limits["near_percent"] and off <= limits["rounded"])
+    # those of our model at the printed angles
+    if printed.angles is not None:
+        own = case.torques(printed.angles)
+        off = float(np.abs(own - torques).max())
+        hearing = on("torques_at_angles", torques=triple(torques, 2))
+        told = {"own": triple(own, 4), "off": off}
+        yield hearing.own(told, 1, off <= hearing.rule.limits["rounded"])
+    if not np.isnan(printed.ratio):
+        yield _ratio(judge, case, np.abs(torques), np.abs(exact))
 
 
 def judge_value(judge: Judge, case: Case) -> Claim:
@@ -49,50 +70,14 @@ def judge_value(judge: Judge, case: Case) -> Claim:
     return hearing.own(told, 1, agrees)
 
 
-def _angles(judge: Judge, case: Case, angles: tuple[float, float]) -> Claim:
-    """Judge that the printed angles are near the optimum."""
-    cost = case.measured(angles)["cost"]
-    gap = 100.0 * float(case.gaps(np.array([cost]))[0])
-    words = {"case": case.name, "angles": _degrees(angles), "figure": case.printed.figure}
-    hearing = judge.on("printed_angles", **words)
-    told = {"cost": cost, "least": case.least, "gap": gap}
-    return hearing.own(told, 1, gap <= hearing.rule.limits["near_percent"])
-
-
-def _torques(judge: Judge, case: Case, torques: FloatArray) -> Claim:
-    """Judge the printed torques by those of the exact optimum, of its mirror images the nearest."""
-    exact = _nearest(case, torques)
-    by_norm = case.conditions[0].planner.objective.torque_norm_weight > 0.0
-    cost = float((torques**2).sum() if by_norm else np.abs(torques).max())
-    gap, off = 100.0 * (cost / case.least - 1.0), float(np.abs(exact - torques).max())
-    words = {"case": case.name, "torques": triple(torques, 2), "figure": case.printed.figure}
-    hearing = judge.on("printed_torques", **words)
-    limits = hearing.rule.limits
-    told = {"exact": triple(exact, 4), "off": off, "cost": cost, "gap": gap, "least": case.least}
-    return hearing.own(told, 1, gap <= limits["near_percent"] and off <= limits["rounded"])
-
-
-def _torques_at_angles(
-    judge: Judge, case: Case, torques: FloatArray, angles: tuple[float, float]
-) -> Claim:
-    """Judge the printed torques by those of our model at the printed angles."""
-    own = case.torques(angles)
-    off = float(np.abs(own - torques).max())
-    words = {"torques": triple(torques, 2), "angles": _degrees(angles)}
-    hearing = judge.on("torques_at_angles", case=case.name, figure=case.printed.figure, **words)
-    told = {"own": triple(own, 4), "off": off}
-    return hearing.own(told, 1, off <= hearing.rule.limits["rounded"])
-
-
-def _ratio(judge: Judge, case: Case, torques: FloatArray) -> Claim:
-    """Judge the printed ratio of torques by the printed torques, and by the exact optimum."""
-    printed, sizes = case.printed, np.abs(torques)
+def _ratio(judge: Judge, case: Case, sizes: FloatArray, exact: FloatArray) -> Claim:
+    """Judge the printed ratio of torques by the printed sizes, and by those of the optimum."""
+    printed = case.printed
     words = {"case": case.name, "ratio": f"{printed.ratio:g}", "figure": printed.figure}
     hearing = judge.on("torque_ratio", **words)
     rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
     lowest = (sizes.max() - rounded) / (sizes.min() + rounded)
     greatest = (sizes.max() + rounded) / (sizes.min() - rounded)
-    exact = np.abs(_nearest(case, torques))
     own = float(exact.max() / exact.min())
     off = 100.0 * (own / printed.ratio - 1.0)
     told = {"printed": sizes.max() / sizes.min(), "lowest": lowest, "greatest": greatest}
@@ -100,32 +85,28 @@ def _ratio(judge: Judge, case: Case, torques: FloatArray) -> Claim:
     return hearing.own(told | {"own": own, "off": off}, 1, holds)
 
 
-def _nearest(case: Case, torques: FloatArray) -> FloatArray:
-    """Return the torques of the optimum, of its mirror images those nearest to some others."""
-    found = [case.torques(angles) for angles in case.mirrored()]
-    return min(found, key=lambda own: float(np.abs(own - torques).max()))
-
-
 def triple(torques: FloatArray, digits: int) -> str:
     """Return torques in words: (−0.61, 1.13, −0.30)."""
-    told = ", ".join(f"{torque:.{digits}f}" for torque in torques)
-    return f"({told})".replace("-", "−")
+    return _signed(f"({', '.join(f'{torque:.{digits}f}' for torque in torques)})")
 
 
-def _degrees(angles: tuple[float, float]) -> str:
-    return f"({angles[0]:g}, {angles[1]:g})°".replace("-", "−")
+def _signed(text: str) -> str:
+    return text.replace("-", "−")
 
 
-def judge_cases(judge: Judge, exact_cases: list[Case]) -> tuple[Claim, ...]:
+def judge_cases(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
     """Judge all claims; the optimum of every case is known."""
-    cases = exact_cases
-    minimax = [case for case in cases if case.name == "minimax torque"]
-    return (
-        *(one for case in cases for one in judge_printed(judge, case)),
-        *_against_search(judge, cases),
-        *(one for case in cases for one in _against_conventional(judge, case)),
-        *(_seconds(judge, case.name, case.plain) for case in minimax if case.plain is not None),
-    )
+    for case in exact_cases:
+        yield from judge_printed(judge, case)
+    yield from _against_search(judge, exact_cases)
+    for case in exact_cases:
+        yield from _against_conventional(judge, case)
+    for case in exact_cases:
+        if case.name == "minimax torque" and case.plain is not None:
+            seconds = float(np.median(case.plain.column("cpu_s")))
+            hearing = judge.on("seconds", case=case.name)
+            told, holds = {"milliseconds": 1e3 * seconds}, seconds <= hearing.rule.limits["most_s"]
+            yield hearing.own(told, case.plain.done, holds)
 
 
 def _against_search(judge: Judge, cases: list[Case]) -> list[Claim]:
@@ -158,37 +139,25 @@ def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
         hearing = judge.on("gets_stuck", case=case.name, method=method)
         at_best = case.within(ends[:, 2], hearing.rule.limits["near_percent"] / 100.0)
         stuck = Proportion(at_best.total - at_best.having, at_best.total)
-        told = {"stuck": stuck, "interval": markdown.percent(stuck.interval(judge.level))}
+        interval = markdown.percent(stuck.interval(judge.level))
+        told: dict[str, object] = {"stuck": stuck, "interval": interval}
         yield hearing.own(told, stuck.total, stuck.having > 0)
-        if case.elitist is not None:
-            yield from _better(judge, case, case.elitist, method, at_best)
-
-
-def _better(
-    judge: Judge, case: Case, elitist: ConditionResults, method: str, at_best: Proportion
-) -> Iterator[Claim]:
-    """Judge a run of the genetic algorithm against one start of a method, and their efforts."""
-    assert case.conventional is not None
-    efforts = judge.on("per_success", case=case.name, method=method)
-    close = efforts.rule.limits["near_percent"]
-    own = case.within(elitist.column("best_cost"), close / 100.0)
-    of_start = float(case.conventional.column(f"term_{METHODS[method]}_evaluations")[0])
-    of_run = float(elitist.column("evaluations").mean())
-    told = {"close": close, "runs": 100 * own.share, "starts": 100 * at_best.share}
-    told |= {"p": fisher_exact(own, at_best), "of_run": of_run, "of_start": of_start}
-    runs = judge.on("better_than_a_start", case=case.name, method=method)
-    yield runs.greater(told, own, at_best)
-    run, start = (
-        effort / share if share else np.inf
-        for effort, share in ((of_run, own.share), (of_start, at_best.share))
-    )
-    text = f"{run:.0f} against {start:.0f}".replace("inf", "∞")
-    holds = run < start if min(run, start) < np.inf else None
-    yield efforts.own(text, f"{own.total} and {at_best.total}", holds)
-
-
-def _seconds(judge: Judge, name: str, condition: ConditionResults) -> Claim:
-    """Judge that the minimax problem takes seconds."""
-    seconds, hearing = float(np.median(condition.column("cpu_s"))), judge.on("seconds", case=name)
-    told = {"milliseconds": 1000 * seconds}
-    return hearing.own(told, condition.done, seconds <= hearing.rule.limits["most_s"])
+        if case.elitist is None or case.conventional is None:
+            continue
+        # a run of the genetic algorithm against one start of the method, and their efforts
+        efforts = judge.on("per_success", case=case.name, method=method)
+        close = efforts.rule.limits["near_percent"]
+        own = case.within(case.elitist.column("best_cost"), close / 100.0)
+        of_start = float(case.conventional.column(f"term_{METHODS[method]}_evaluations")[0])
+        of_run = float(case.elitist.column("evaluations").mean())
+        told = {"close": close, "runs": 100 * own.share, "starts": 100 * at_best.share}
+        told |= {"p": fisher_exact(own, at_best), "of_run": of_run, "of_start": of_start}
+        runs = judge.on("better_than_a_start", case=case.name, method=method)
+        yield runs.greater(told, own, at_best)
+        run, start = (
+            effort / share if share else np.inf
+            for effort, share in ((of_run, own.share), (of_start, at_best.share))
+        )
+        text = f"{run:.0f} against {start:.0f}".replace("inf", "∞")
+        better = run < start if min(run, start) < np.inf else None
+        yield efforts.own(text, f"{own.total} and {at_best.total}", better)

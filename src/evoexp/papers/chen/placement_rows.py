@@ -5,19 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from evoexp.papers.chen.cases import CLOSE, Case
-from evoexp.papers.chen.cases import cases as case_list
-from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.report.pages import markdown
-from evoexp.report.results.run_measures import planned_by
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.inference import spread
 
 Conditions = tuple[ConditionResults, ...]
-
-
-def fits_placements(results: Results) -> bool:
-    """Return whether there are results, all of docking postures."""
-    return planned_by(results, PlacementGa)
 
 
 def exact_cases(cases: list[Case]) -> list[Case]:
@@ -30,10 +22,9 @@ def evolved_cases(exact_cases: list[Case]) -> list[Case]:
     return [case for case in exact_cases if case.evolved]
 
 
-def landscapes(results: Results) -> list[Case]:
+def landscapes(cases: list[Case]) -> list[Case]:
     """Return the criteria whose landscape was computed."""
-    found = case_list(results) if fits_placements(results) else []
-    return [case for case in found if case.landscape is not None]
+    return [case for case in cases if case.landscape is not None]
 
 
 def case_conditions(cases: list[Case]) -> Conditions:
@@ -52,27 +43,16 @@ def landscape_row(case: Case) -> tuple[object, ...]:
 
 def result_row(case: Case) -> tuple[str, ...]:
     """Return a criterion's row: paper, exact optimum, GA, random search, conventional methods."""
+    value, angles = case.printed.value, case.printed.angles
+    paper = [] if np.isnan(value) else [f"{case.printed.term.replace('_', ' ')} {value:g}"]
+    if angles is not None:
+        paper.append(f"E = {case.measured(angles)['cost']:.6g} at its angles")
     methods = (f"{name} {_shares(case, ends[:, 2])}" for name, ends in case.ends().items())
     least = f"E = {case.least:.6g}" if case.optimum is not None else "–"
-    runs = (_run(case, c) for c in (case.plain, case.elitist, case.search))
-    return (case.name, _paper(case) or "–", least, *runs, "; ".join(methods) or "–")
-
-
-def _paper(case: Case) -> str:
-    """Return the printed number, and E at the printed angles."""
-    value, angles = case.printed.value, case.printed.angles
-    told = [] if np.isnan(value) else [f"{case.printed.term.replace('_', ' ')} {value:g}"]
-    if angles is not None:
-        told.append(f"E = {case.measured(angles)['cost']:.6g} at its angles")
-    return "; ".join(told)
-
-
-def _run(case: Case, condition: ConditionResults | None) -> str:
-    """Return the spread of the best E of a condition's runs, and shares near the optimum."""
-    if condition is None:
-        return "–"
-    costs = condition.column("best_cost")
-    return f"{markdown.spread(spread(costs))} {_shares(case, costs)}"
+    evolved = (case.plain, case.elitist, case.search)
+    costs = [np.empty(0) if c is None else c.column("best_cost") for c in evolved]
+    runs = (f"{markdown.spread(spread(e))} {_shares(case, e)}" if len(e) else "–" for e in costs)
+    return (case.name, "; ".join(paper) or "–", least, *runs, "; ".join(methods) or "–")
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:

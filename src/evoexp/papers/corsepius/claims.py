@@ -27,25 +27,44 @@ METRICS: dict[str, Values] = {
 }
 
 
-def judge_tasks(judge: Judge, results: Results) -> tuple[Claim, ...]:
+def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge the claims that the conditions of an experiment allow to judge."""
     found = measures.obstructed(results.main)
+    for c in found:
+        yield judge_met(judge, c)
+        yield judge_free(judge, c)
+        yield from _tilt(judge, c)
+        # the planning time that the paper prints beside ours
+        objects = [getattr(phase.goal, "object", "") for phase in c.scenario.phases]
+        if objects == [BALL] and c.solved:
+            times, cycles = 1e3 * measures.usual_seconds(c), measures.cycles(c)
+            shapes = measures.problem(c).bodies.num_shapes
+            words = {"milliseconds": times, "cycles": cycles, "shapes": shapes}
+            verdict = f"{judging.NOT_JUDGED} (another machine, another model)"
+            yield judge.on("planning_time", who=c.label).made(words, c.done, verdict)
+    # for highly redundant arms the approach finds a certified path
     many = judge.rules["redundant_arms"].limits["joints"]
     arms = [c for c in found if run_measures.num_joints(c) > many]
-    single = (
-        (judge_met(judge, c), judge_free(judge, c), *_tilt(judge, c), *_planning_time(judge, c))
-        for c in found
+    free = {c.label: run_measures.certified(c).having for c in arms}
+    told = "; ".join(
+        f"{c.label}, {run_measures.num_joints(c)} joints: goal met "
+        f"{judge.share(run_measures.success(c))}, {free[c.label]} of them certified"
+        for c in arms
     )
-    stuck = (
-        _stuck(judge, one, helped)
-        for one in found
-        for helped in found
-        if measures.only_subgoals_differ(one, helped)
-    )
-    pairs = measures.with_empty_scenes(results.main)
-    redundant = [_redundant(judge, arms)] if arms else []
-    at_obstacles = [_at_obstacles(judge, pairs)] if pairs else []
-    return (*(one for own in single for one in own), *redundant, *stuck, *at_obstacles)
+    if arms:
+        runs = sum(c.done for c in arms)
+        yield judge.on("redundant_arms").own(told, runs, any(free.values()))
+    # the search gets stuck where the same task with a sub-goal finds a way
+    for stuck, helped in measures.subgoal_pairs(found):
+        one, two = run_measures.success(helped), run_measures.success(stuck)
+        told = (
+            f"goal met {judge.share(two)}; {helped.label}: {judge.share(one)}; "
+            f"{fisher_evidence(one, two)}; ended by stagnation: "
+            f"{judge.share(measures.reasons(stuck)['stagnation'])}"
+        )
+        yield judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
+    if pairs := measures.with_empty_scenes(results.main):
+        yield _at_obstacles(judge, pairs)
 
 
 def judge_met(judge: Judge, condition: ConditionResults) -> Claim:
@@ -89,61 +108,22 @@ def _tilt(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
             yield judge.on("not_tilted", who=condition.label).every(told, *kept, planned)
 
 
-def _redundant(judge: Judge, arms: list[ConditionResults]) -> Claim:
-    """Judge that the approach works for highly redundant arms: it finds a certified path."""
-    free = {c.label: run_measures.certified(c).having for c in arms}
-    texts = [
-        f"{c.label}, {run_measures.num_joints(c)} joints: goal met "
-        f"{judge.share(run_measures.success(c))}, {free[c.label]} of them certified"
-        for c in arms
-    ]
-    runs = sum(c.done for c in arms)
-    return judge.on("redundant_arms").own("; ".join(texts), runs, any(free.values()))
-
-
-def _planning_time(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
-    """Set the planning time that the paper prints beside ours."""
-    scenario = condition.scenario
-    goals = [phase.goal for phase in scenario.phases]
-    if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
-        return
-    milliseconds = 1e3 * measures.usual_seconds(condition)
-    cycles, shapes = measures.cycles(condition), measures.problem(condition).bodies.num_shapes
-    told = (
-        f"here {milliseconds.min():.2g} to {milliseconds.max():.2g} ms of search on one core, "
-        f"{cycles.min():.0f} to {cycles.max():.0f} cycles; theirs: a Pentium III, and some 30 000 "
-        f"spheres to this model's {shapes}"
-    )
-    verdict = f"{judging.NOT_JUDGED} (another machine, another model)"
-    yield judge.on("planning_time", who=condition.label).made(told, condition.done, verdict)
-
-
-def _stuck(judge: Judge, stuck: ConditionResults, helped: ConditionResults) -> Claim:
-    """Judge that the search gets stuck where the same task with a sub-goal finds a way."""
-    one, two = run_measures.success(helped), run_measures.success(stuck)
-    told = (
-        f"goal met {judge.share(two)}; {helped.label}: {judge.share(one)}; "
-        f"{fisher_evidence(one, two)}; ended by stagnation: "
-        f"{judge.share(measures.reasons(stuck)['stagnation'])}"
-    )
-    return judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
-
-
 def _at_obstacles(judge: Judge, pairs: list[tuple[ConditionResults, ConditionResults]]) -> Claim:
     """Judge that obstacles, and nothing else, keep the search from its goals."""
-    shares = [(c.label, run_measures.success(c), run_measures.success(empty)) for c, empty in pairs]
-    adjusted = inference.holm([inference.fisher_exact(own, empty) for _, own, empty in shares])
-    texts = [
-        f"{label} {markdown.share(*own)}, empty scene {markdown.share(*empty)}, p = "
-        f"{markdown.p_value(p)}"
-        for (label, own, empty), p in zip(shares, adjusted, strict=True)
+    shares = [(run_measures.success(c), run_measures.success(empty)) for c, empty in pairs]
+    adjusted = inference.fisher_family(shares)
+    told = "; ".join(
+        f"{c.label} {own}, empty scene {empty}, p = {markdown.p_value(p)}"
+        for (c, _), (own, empty), p in zip(pairs, shares, adjusted, strict=True)
+    )
+    less = [
+        p < judge.significance
+        for (own, empty), p in zip(shares, adjusted, strict=True)
+        if own.share < empty.share
     ]
-    less = [own.share < empty.share for _, own, empty in shares]
-    clear = [p < judge.significance for p in adjusted]
-    stuck = any(a and b for a, b in zip(less, clear, strict=True))
-    holds = True if stuck else None if any(less) else False
-    runs = sum(own.total + empty.total for _, own, empty in shares)
-    return judge.on("stuck_at_obstacles").own("; ".join(texts), runs, holds)
+    runs = sum(one.total for pair in shares for one in pair)
+    holds = True if any(less) else None if less else False
+    return judge.on("stuck_at_obstacles").own(told, runs, holds)
 
 
 class SizeComparison(NamedTuple):
@@ -165,15 +145,9 @@ def judge_study(
     judge: Judge, sizes: Tasks, size_ratios: dict[str, list[SizeComparison]]
 ) -> tuple[Claim, ...]:
     """Judge the claims on the size."""
-    larger = {m: [row for row in own if row.value > RECOMMENDED] for m, own in size_ratios.items()}
-    smaller = {m: [row for row in own if row.value < RECOMMENDED] for m, own in size_ratios.items()}
     return (
-        *(
-            claim(judge, metric, own)
-            for metric, own in larger.items()
-            for claim in (_no_faster, _not_necessarily)
-        ),
-        *(_over_proportional(judge, metric, own) for metric, own in smaller.items()),
+        *(claim for metric, rows in size_ratios.items() for claim in _larger(judge, metric, rows)),
+        *(_over_proportional(judge, metric, rows) for metric, rows in size_ratios.items()),
         _converges_less(judge, sizes),
         *(_reasonable(judge, metric, sizes, values) for metric, values in METRICS.items()),
     )
@@ -237,20 +211,19 @@ def _unless(against: object, favour: object) -> bool | None:
     return False if against else True if favour else None
 
 
-def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
-    """Judge that nothing larger is faster, on any task."""
-    says = [row.says for row in rows]
+def _larger(judge: Judge, metric: str, compared: list[SizeComparison]) -> Iterator[Claim]:
+    """Judge that nothing larger is faster, on any task, or, weaker, that there are such tasks."""
+    rows = [row for row in compared if row.value > RECOMMENDED]
+    says: dict[str, list[int]] = {}
+    for row in rows:
+        says.setdefault(row.task, []).append(row.says)
     told = (
         f"expected {metric} over those of 100 individuals, λ in brackets: less for "
         f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)}"
     )
+    seen = {row.says for row in rows}
     hearing = judge.on("larger_no_faster", metric=metric)
-    return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, 1 in says))
-
-
-def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
-    """Judge the weaker reading: there are tasks on which nothing larger is faster."""
-    says = {name: [row.says for row in rows if row.task == name] for name in (r.task for r in rows)}
+    yield hearing.own(told, f"{len(rows)} ratios", _unless(-1 in seen, 1 in seen))
     never = [name for name, own in says.items() if min(own) >= 0]
     slower = [name for name in never if max(says[name]) > 0]
     told = (
@@ -258,11 +231,12 @@ def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> C
         f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them"
     )
     hearing = judge.on("larger_not_necessarily_faster", metric=metric)
-    return hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
+    yield hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
 
 
-def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
+def _over_proportional(judge: Judge, metric: str, compared: list[SizeComparison]) -> Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
+    rows = [row for row in compared if row.value < RECOMMENDED]
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
     told = (
@@ -276,26 +250,20 @@ def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) ->
 def _converges_less(judge: Judge, found: Tasks) -> Claim:
     """Judge that smaller populations meet their goals less often."""
     pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
-    adjusted = inference.holm(
-        [
-            inference.fisher_exact(run_measures.success(c), run_measures.success(own))
-            for _, _, c, own in pairs
-        ]
-    )
+    shares = [(run_measures.success(own), run_measures.success(c)) for _, _, c, own in pairs]
     says = [
-        judging.greater(run_measures.success(own), run_measures.success(c), p, judge.significance)
-        for (_, _, c, own), p in zip(pairs, adjusted, strict=True)
+        judging.greater(*pair, p, judge.significance)
+        for pair, p in zip(shares, inference.fisher_family(shares), strict=True)
     ]
-    clear = [pair for pair, said in zip(pairs, says, strict=True) if said]
-    less, more = says.count(1), says.count(-1)
-    texts = (
-        f"{name} {value:g}: {markdown.share(*run_measures.success(c))} for "
-        f"{markdown.share(*run_measures.success(own))}"
-        for name, value, c, own in clear
+    texts = "; ".join(
+        f"{name} {value:g}: {smaller} for {recommended}"
+        for (name, value, *_), (recommended, smaller), said in zip(pairs, shares, says, strict=True)
+        if said
     )
+    less, more = says.count(1), says.count(-1)
     told = (
         f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
-        f"often in {more}: {'; '.join(texts) or '–'}"
+        f"often in {more}: {texts or '–'}"
     )
     hearing = judge.on("smaller_converge_less")
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))

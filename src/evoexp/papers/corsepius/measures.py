@@ -23,6 +23,7 @@ evaluations = by_column("evaluations")  # of each run, (done,)
 
 
 Conditions = tuple[ConditionResults, ...]
+Pair = tuple[ConditionResults, ConditionResults]
 
 
 class Task(NamedTuple):
@@ -160,40 +161,31 @@ def tolerances(condition: ConditionResults) -> tuple[float, ...]:
     return tuple(phase.position_tolerance or task.position_tolerance for phase in task.all_phases)
 
 
-def subgoals(condition: ConditionResults) -> tuple[Any, ...]:
-    """Return the points that the tool passes before the first phase."""
-    return tuple(condition.scenario.subgoals)
-
-
-def only_subgoals_differ(without: ConditionResults, having: ConditionResults) -> bool:
-    """Whether the second condition is the first one with sub-goals."""
-    (robot, one), (same_robot, two) = scene(without), scene(having)
-    one, two = ({**task, "subgoals": None} for task in (one, two))
-    added = bool(subgoals(having)) and not subgoals(without)
-    return added and (robot, one, without.planner) == (same_robot, two, having.planner)
-
-
-def empty(condition: ConditionResults) -> bool:
-    """Whether the obstacles of a condition are taken away: a control."""
-    return bool(condition.scenario.empty_scene)
+def subgoal_pairs(conditions: Conditions) -> list[Pair]:
+    """Return the conditions without sub-goals, each with itself with sub-goals."""
+    return _pairs_but_for(conditions, "subgoals")
 
 
 def obstructed(main: Conditions) -> Conditions:
     """Return the conditions whose obstacles stand."""
-    return tuple(c for c in main if not empty(c))
+    return tuple(c for c in main if not c.scenario.empty_scene)
 
 
-def with_empty_scenes(
-    conditions: Conditions,
-) -> list[tuple[ConditionResults, ConditionResults]]:
+def with_empty_scenes(conditions: Conditions) -> list[Pair]:
     """Return the conditions that have an empty scene as a control, each with its control."""
+    return _pairs_but_for(conditions, "empty_scene")
+
+
+def _pairs_but_for(conditions: Conditions, setting: str) -> list[Pair]:
+    """Return (one without a setting of the task, the same one with it)."""
 
     def key(condition: ConditionResults) -> tuple[Any, ...]:
         robot, task = scene(condition)
-        return robot, {**task, "empty_scene": None}, condition.planner
+        return robot, {**task, setting: None}, condition.planner
 
-    pairs = ((c, [e for e in conditions if empty(e) and key(e) == key(c)]) for c in conditions)
-    return [(c, controls[0]) for c, controls in pairs if controls and not empty(c)]
+    having = [(c, key(c)) for c in conditions if getattr(c.scenario, setting)]
+    without = [(c, key(c)) for c in conditions if not getattr(c.scenario, setting)]
+    return [(one, two) for one, own in without for two, other in having if own == other]
 
 
 class AllowedContacts(NamedTuple):
@@ -211,12 +203,6 @@ def allowed_contacts(condition: ConditionResults) -> AllowedContacts | None:
     limit = condition.scenario.allowed_penetration
     unit = condition.length_unit
     return AllowedContacts(", ".join(pairs), float(limit), unit) if pairs and limit else None
-
-
-def lets_go(condition: ConditionResults) -> bool:
-    """Whether the task lets go of an object."""
-    phases = condition.scenario.phases
-    return any(phase.then == "detach" for phase in phases)
 
 
 class Release(NamedTuple):
@@ -244,10 +230,10 @@ def releases(condition: ConditionResults) -> tuple[Release, ...]:
     return tuple(found)
 
 
-def by_robot(conditions: Conditions) -> Conditions:
+def robots(obstructed: Conditions) -> Conditions:
     """Return the first condition of every robot and its collision model."""
     groups = run_measures.grouped(
-        conditions, lambda c: (c.robot.canonical(), c.planner.collision.canonical())
+        obstructed, lambda c: (c.robot.canonical(), c.planner.collision.canonical())
     )
     return tuple(group[0] for group in groups)
 

@@ -9,7 +9,6 @@ from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.claims import METRICS
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
 from evoexp.papers.corsepius.measures import Conditions, Tasks
-from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
@@ -26,14 +25,9 @@ cycles_to_goal = run_measures.where_solved(measures.cycles)
 steps_to_goal = run_measures.where_solved(measures.num_steps)
 
 
-def fits(results: Results) -> bool:
-    """Return whether there are results, all of postures that evolve."""
-    return run_measures.planned_by(results, PostureEs)
-
-
-def is_sweep(results: Results) -> bool:
-    """Return whether there are several such conditions to compare."""
-    return fits(results) and len(results.main) > 1
+def is_sweep(main: Conditions) -> bool:
+    """Return whether there are several conditions to compare."""
+    return len(main) > 1
 
 
 def shown_task(obstructed: Conditions) -> Conditions:
@@ -60,39 +54,29 @@ def ends(condition: ConditionResults) -> str:
 def beside_empty(results: Results, confidence: float) -> tuple[tuple[str, ...], ...]:
     """Return a row per task that has an empty scene as its control: shares, test, cycles."""
     pairs = measures.with_empty_scenes(results.main)
-    tested = [
-        inference.fisher_exact(run_measures.success(c), run_measures.success(e)) for c, e in pairs
-    ]
+    shares = [(run_measures.success(c), run_measures.success(e)) for c, e in pairs]
     return tuple(
         (
-            c.label,
-            *(run_measures.success(one).with_interval(confidence) for one in (c, e)),
+            pair[0].label,
+            *(share.with_interval(confidence) for share in both),
             markdown.p_value(p),
-            *(markdown.spread(inference.spread(measures.cycles(one))) for one in (c, e)),
+            *(markdown.spread(inference.spread(measures.cycles(one))) for one in pair),
         )
-        for (c, e), p in zip(pairs, inference.holm(tested), strict=True)
+        for pair, both, p in zip(pairs, shares, inference.fisher_family(shares), strict=True)
     )
 
 
-def releases(obstructed: Conditions) -> list[tuple[str, ...]]:
-    """Return a row per condition that lets go of an object."""
-    letting_go = filter(measures.lets_go, obstructed)
-    return [_release_row(c) for c in letting_go if measures.releases(c)]
-
-
-def _release_row(condition: ConditionResults) -> tuple[str, ...]:
-    """Return gap and tilt of the objects of a condition: medians and the worst."""
-    found, unit = measures.releases(condition), condition.length_unit
-    gaps, tilts = (np.array([getattr(one, name) for one in found]) for name in ("gap", "tilt"))
-    deepest, highest = max(0.0, -float(gaps.min())), max(0.0, float(gaps.max()))
-    return (
-        condition.label,
-        str(len(found)),
-        f"{markdown.number(float(f'{deepest:.2g}'))} {unit}",
-        f"{markdown.number(float(f'{highest:.2g}'))} {unit}",
-        f"{np.median(tilts) / DEGREE:.2f}°",
-        f"{tilts.max() / DEGREE:.2f}°",
-    )
+def releases(obstructed: Conditions) -> Iterator[tuple[str, ...]]:
+    """Yield gap and tilt of the objects that a condition lets go of: medians and the worst."""
+    for condition in obstructed:
+        if found := measures.releases(condition):
+            gaps, tilts = np.array([(one.gap, one.tilt) for one in found]).T
+            deepest, highest = (
+                f"{markdown.number(float(f'{max(0.0, value):.2g}'))} {condition.length_unit}"
+                for value in (-gaps.min(), gaps.max())
+            )
+            median, worst = (f"{t / DEGREE:.2f}°" for t in (np.median(tilts), tilts.max()))
+            yield condition.label, str(len(found)), deepest, highest, median, worst
 
 
 def phased(main: Conditions) -> tuple[ConditionResults, ...]:
@@ -113,7 +97,7 @@ def phase_rows(phased: Conditions, confidence: float) -> Iterator[tuple[object, 
 
 def collision_models(main: Conditions) -> Iterator[tuple[str, str]]:
     """Yield a row on the collision model of every robot."""
-    for c in measures.by_robot(main):
+    for c in measures.robots(main):
         bodies = measures.problem(c).bodies
         pairs = bodies.sorted_pairs
         text = (
@@ -123,11 +107,6 @@ def collision_models(main: Conditions) -> Iterator[tuple[str, str]]:
             f"{len(pairs.always)} always touch, {len(pairs.never)} never do"
         )
         yield f"{c.label}: the model of collisions", text
-
-
-def robots(obstructed: Conditions) -> Conditions:
-    """Return one condition per robot."""
-    return measures.by_robot(obstructed)
 
 
 def titled_robots(robots: Conditions) -> list[tuple[str, ConditionResults]]:
@@ -155,7 +134,7 @@ def shown_paths(obstructed: Conditions) -> list[ShownPath]:
 
 def manoeuvres(results: Results, phased: Conditions) -> list[tuple[list[ShownPath], str]]:
     """Return the runs whose phases are drawn one by one, each with the end of its figure's stem."""
-    several = [c for c in phased if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
+    several = [c for c in phased if len(c.scenario.phases) > 1]
     ends = [f"_{results.position(c.label) + 1}" if len(several) > 1 else "" for c in several]
     shown = [[ShownPath(c.label, c, measures.shown_replicate(c), True)] for c in several]
     return list(zip(shown, ends, strict=True))
@@ -176,26 +155,15 @@ def goal_measures(main: Conditions) -> list[Measure]:
 def share_rows(results: Results, confidence: float) -> Iterator[tuple[str, ...]]:
     """Yield success, verdicts and oversized steps of every condition."""
     for first, *others in run_measures.grouped(results.with_data, measures.scene):
-        met, touching = (
-            [
-                "–",
-                *map(
-                    markdown.p_value,
-                    inference.holm(
-                        [inference.fisher_exact(count(first), count(c)) for c in others]
-                    ),
-                ),
-            ]
-            for count in (run_measures.success, measures.refuted)
-        )
-        for c, p_met, p_touching in zip((first, *others), met, touching, strict=True):
-            goal_met, refuted = (
-                run_measures.success(c).with_interval(confidence),
-                measures.refuted(c),
-            )
+        counts = run_measures.success, measures.refuted
+        p_values = [
+            inference.fisher_family([(count(first), count(c)) for c in others]) for count in counts
+        ]
+        told = [("–", "–"), *(map(markdown.p_value, own) for own in zip(*p_values, strict=True))]
+        for c, (p_met, p_touching) in zip((first, *others), told, strict=True):
+            met, refuted = (count(c).with_interval(confidence) for count in counts)
             beyond = markdown.spread(inference.spread(c.column("term_oversized_steps")))
-            told = goal_met, p_met, refuted.with_interval(confidence), p_touching, beyond
-            yield c.label, *told
+            yield c.label, met, p_met, refuted, p_touching, beyond
 
 
 def scopes(results: Results) -> Tasks:
@@ -213,7 +181,7 @@ def parents(results: Results) -> Tasks:
 
 def sizes(results: Results) -> Tasks:
     """Return the tasks whose populations differ in size."""
-    return measures.tasks(results, "num_offspring") if fits(results) else Tasks()
+    return measures.tasks(results, "num_offspring")
 
 
 def floor_rows(main: Conditions, scopes: Tasks) -> list[tuple[str, ...]]:
@@ -243,18 +211,13 @@ def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...
             shares = (
                 count(c).with_interval(level) for count in (run_measures.success, measures.refuted)
             )
-            efforts = (_expected(c, metric, settings) for metric in METRICS)
-            yield task.name, f"{value:g}", *shares, *efforts
-
-
-def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
-    """Return the expected running time with its interval."""
-    if not condition.solved:
-        return "∞"
-    runs = METRICS[metric](condition), run_measures.solved(condition)
-    interval = inference.expected_interval(*runs, settings.confidence, settings.num_resamples)
-    expected, low, high = (
-        markdown.number(float(f"{SCALES[metric] * value:.3g}"))
-        for value in (inference.expected_effort(*runs), *interval)
-    )
-    return f"{expected} [{low}, {high}]"
+            efforts = []  # expected running times with their intervals
+            for metric, scale in SCALES.items() if c.solved else ():
+                runs = METRICS[metric](c), run_measures.solved(c)
+                interval = inference.expected_interval(*runs, level, settings.num_resamples)
+                expected, low, high = (
+                    markdown.number(float(f"{scale * value:.3g}"))
+                    for value in (inference.expected_effort(*runs), *interval)
+                )
+                efforts.append(f"{expected} [{low}, {high}]")
+            yield task.name, f"{value:g}", *shares, *(efforts or ["∞"] * len(SCALES))

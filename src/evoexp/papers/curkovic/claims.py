@@ -1,8 +1,8 @@
 """The claims of Curkovic et al. 2013 on methods and motions, and under assumed numbers."""
 
+import itertools
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,27 +20,14 @@ from evoexp.report.statistics.judging import Judge
 
 Rows = tuple[Comparison, ...]
 Conditions = Sequence[ConditionResults]
-PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
+PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))  # with a hall, and without
 EFFORT = "evaluations to a team whose cost is the threshold"
 METHOD, PLAIN, ELITES = "V", "I", "15 elites"
 KEPT = "least distance of an end-effector from another robot's links"
 
 
-def method_pairs() -> tuple[tuple[str, str], ...]:
-    """Return the methods with a hall, each with its twin without."""
-    return PAIRS
-
-
-class MatchedPairs(NamedTuple):
-    """Comparisons of methods with a hall and their twins without."""
-
-    costs: Rows  # best costs
-    generations: Rows  # generations to the threshold
-    certified: Rows  # best costs, a refuted motion counting as worse than any
-
-
-def matched_pairs(results: Results, settings: ReportSettings, threshold: float) -> MatchedPairs:
-    """Compare the methods that have a twin."""
+def matched_pairs(results: Results, settings: ReportSettings, threshold: float) -> list[Rows]:
+    """Compare methods with their twins: by cost, generations, and cost with refuted ones worst."""
     by_label = {c.label: c for c in results.with_data}
     pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
     matched = partial(
@@ -48,10 +35,10 @@ def matched_pairs(results: Results, settings: ReportSettings, threshold: float) 
     )
     generations = partial(measures.generations_to, threshold=threshold)
     values = by_column("best_cost"), generations, measures.certified_cost
-    return MatchedPairs(*map(matched, values))
+    return list(map(matched, values))
 
 
-def method_comparisons(matched_pairs: MatchedPairs, threshold: float) -> list[tuple[str, Rows]]:
+def method_comparisons(matched_pairs: list[Rows], threshold: float) -> list[tuple[str, Rows]]:
     """Return (heading, comparisons) of matched pairs."""
     to = markdown.number(threshold)
     titles = "best cost of a team", f"generations to a team below {to}", measures.CERTIFIED
@@ -63,13 +50,14 @@ def method_comparisons(matched_pairs: MatchedPairs, threshold: float) -> list[tu
 
 
 def judge_methods(
-    judge: Judge, results: Results, matched_pairs: MatchedPairs, threshold: float
+    judge: Judge, results: Results, matched_pairs: list[Rows], threshold: float
 ) -> list[Claim]:
     """Judge the claims on methods of co-evolution."""
+    costs, generations, certified = matched_pairs
     judged = {  # measure → the word of the better one, comparisons
-        f"a team of cost ≤ {markdown.number(threshold)}": ("earlier", matched_pairs.generations),
-        "the best cost at the end": ("lower", matched_pairs.costs),
-        measures.CERTIFIED: ("lower", matched_pairs.certified),
+        f"a team of cost ≤ {markdown.number(threshold)}": ("earlier", generations),
+        "the best cost at the end": ("lower", costs),
+        measures.CERTIFIED: ("lower", certified),
     }
     found = [
         judge.on("faster", who="", measure=title, pair=f": {row.quantity}").better(row, word)
@@ -87,25 +75,18 @@ def judge_methods(
     return [*found, judge.on("in_time").every(told, in_time, done, planned)]
 
 
-def conditions_by_radius(results: Results) -> dict[int, list[ConditionResults]]:
-    """Return collision substeps → conditions by growing radius; nothing if no radius differs."""
-    found: dict[int, list[ConditionResults]] = {}
-    for c in sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius)):
-        found.setdefault(c.planner.collision.collision_substeps, []).append(c)
-    several = len({c.planner.collision.tcp_radius for c in results.main}) > 1
-    return found if several else {}
+def radius_conditions(results: Results) -> tuple[ConditionResults, ...]:
+    """Return conditions by collision substeps and growing radius; none if no radius differs."""
+    by_radius = sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius))
+    differ = len({c.planner.collision.tcp_radius for c in by_radius}) > 1
+    return tuple(itertools.chain(*_by_substeps(by_radius))) if differ else ()
 
 
-def radius_conditions(
-    conditions_by_radius: dict[int, list[ConditionResults]],
-) -> tuple[ConditionResults, ...]:
-    """Return these conditions in one row; empty if no radius differs."""
-    return tuple(c for conditions in conditions_by_radius.values() for c in conditions)
+def _by_substeps(conditions: Conditions) -> tuple[tuple[ConditionResults, ...], ...]:
+    return run_measures.grouped(conditions, lambda c: c.planner.collision.collision_substeps)
 
 
-def compared_radii(
-    conditions_by_radius: dict[int, list[ConditionResults]], settings: ReportSettings
-) -> Rows:
+def compared_radii(radius_conditions: Conditions, settings: ReportSettings) -> Rows:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
 
     def named(largest: ConditionResults, smallest: ConditionResults) -> str:
@@ -113,7 +94,7 @@ def compared_radii(
         tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
         return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
 
-    pairs = [(own[-1], own[0]) for own in conditions_by_radius.values() if len(own) > 1]
+    pairs = [(own[-1], own[0]) for own in _by_substeps(radius_conditions) if len(own) > 1]
     return compared(pairs, link_motions.tool_distance, settings, lower_is_better=False, named=named)
 
 
@@ -135,16 +116,11 @@ def judge_motions(judge: Judge, results: Results, compared_radii: Rows) -> list[
     found = list[Claim]()
     for c in results.main:
         scene, where = _scene_claim(c)
-        certified = run_measures.certified(c).having
-        for who, holds, judged in (
-            ("the paper's model", c.solved, c.done),
-            ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
-        ):
-            hearing = judge.on(
-                "free_motion", condition=c.label, scene=scene, judge=who, where=where
-            )
-            told = f"{markdown.share(holds, judged)} runs"
-            found.append(hearing.every(told, holds, judged, c.planned))
+        words = {"condition": c.label, "scene": scene, "where": where}
+        hearing = judge.on("free_motion", judge="the paper's model", **words)
+        told = f"{markdown.share(c.solved, c.done)} runs"
+        found.append(hearing.every(told, c.solved, c.done, c.planned))
+        found.append(_whole_motion_free(judge, c, words))
     found += [
         judge.on("larger_radius", pair=row.quantity).better(row, "larger") for row in compared_radii
     ]
@@ -172,9 +148,9 @@ def enveloped(condition: ConditionResults) -> bool:
 
 
 def motion_checks(results: Results) -> tuple[tuple[str, str], ...]:
-    """Return the rows on defects, bodies that stick out, and the length of the chromosome."""
+    """Return the rows on bodies that stick out, and on the length of the chromosome."""
     first = results.with_data[0]
-    checks = [measures.rates_check(results, defect) for defect in measures.DEFECTS]
+    checks = []
     if enveloped(first):
         models = {c.label: c.planner.collision for c in results.with_data}
         sticks = [name for name, model in models.items() if model.tcp_radius < model.half_width]
@@ -250,14 +226,12 @@ def _against(
 
 def assumed_free(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that the whole motion is free, under assumed numbers."""
-    certified = run_measures.certified(condition).having
-    judged = condition.done - condition.verdicts.undecided
-    hearing = judge.on(
-        "free_motion",
-        condition="Figs. 8, 9",
-        scene="a collision-free motion of two robots in each other's way",
-        judge="the exact verdict on the whole motion",
-        where="section 4, Figs. 8, 9",
-    )
-    told = f"{markdown.share(certified, judged)} runs"
-    return hearing.every(told, certified, judged, condition.planned)
+    scene = "a collision-free motion of two robots in each other's way"
+    words = {"condition": "Figs. 8, 9", "scene": scene, "where": "section 4, Figs. 8, 9"}
+    return _whole_motion_free(judge, condition, words)
+
+
+def _whole_motion_free(judge: Judge, c: ConditionResults, words: dict[str, str]) -> Claim:
+    free, judged = run_measures.certified(c).having, c.done - c.verdicts.undecided
+    hearing = judge.on("free_motion", judge="the exact verdict on the whole motion", **words)
+    return hearing.every(f"{markdown.share(free, judged)} runs", free, judged, c.planned)

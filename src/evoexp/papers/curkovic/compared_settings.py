@@ -1,6 +1,6 @@
 """Settings of Curkovic et al. 2013 side by side: families, measures, claims, defects."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,15 +18,12 @@ from evoexp.report.statistics.comparisons import Comparison, Family, FamilyCompa
 from evoexp.report.statistics.inference import spread
 from evoexp.report.statistics.judging import Judge
 
-COLLIDES = f"solved motion {measures.REFUTED}"  # says nothing about convergence
+# says nothing about convergence
+COLLIDES = "solved motion collides between its configurations (exact verdict)"
 MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
 READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetric"}
 NAMES = {"quantity": "defect", "having": "failing", "total": "solved"}  # of shares, of defects
-SHORT = {
-    measures.REFUTED: "collide in between",
-    measures.LEAVES: "leave [0, π]",
-    measures.TOO_FAST: "too fast (Eq. 2)",
-}
+SHORT = ("collide in between", "leave [0, π]", "too fast (Eq. 2)")  # names of `measures.Defects`
 
 
 def families(results: Results) -> tuple[Family, ...]:
@@ -83,61 +80,36 @@ def _without_substeps(condition: ConditionResults) -> str:
 
 def of_sweep(
     judge: Judge, results: Results, compared: Sequence[FamilyComparison]
-) -> tuple[Claim, ...]:
-    """Return the claims that a sweep can judge, chosen by the settings that differ."""
-    claims_of: Callable[[Judge, Results, Sequence[FamilyComparison]], list[Claim]]
-    varied = _varied(results)
-    if varied == {"ga.hall_depth"}:
-        claims_of = _depth
-    elif varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}:
-        claims_of = _mutation
-    else:
-        return ()
-    return tuple(claims_of(judge, results, _converging(compared)))
+) -> Iterator[Claim]:
+    """Judge the claims that a sweep can judge, chosen by the settings that differ."""
+    settings = [c.planner.canonical() for c in results.with_data]
+    flat = [
+        {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in settings
+    ]
+    varied = {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
+    is_rate = varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}
+    for one in _converging(compared):
+        if varied == {"ga.hall_depth"}:
+            first, *others = results.with_data
+            own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
+            best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
+            evidence = (
+                f"median {markdown.number(own)}; best of the others {best.label}: "
+                f"{markdown.number(median)}; {_outcomes(first, one.rows, judge.significance)}"
+            )
+            hearing = judge.on("depth", depth=first.label, measure=one.measure.name)
+            yield hearing.best(evidence, one.rows, own <= min(medians))
+        elif is_rate and one.rows:
+            first = one.family.pairs[0][0]
+            reading = READINGS[first.planner.ga.mutation_direction]
+            words = {"who": "", "measure": one.measure.name, "reading": reading}
+            evidence = _outcomes(first, one.rows, judge.significance)
+            yield judge.on("falling_rate", **words).better_than_all(evidence, one.rows)
 
 
 def _converging(found: Sequence[FamilyComparison]) -> list[FamilyComparison]:
     """Return the comparisons in quantities that say how fast or how far a method converges."""
     return [one for one in found if one.measure.name != COLLIDES]
-
-
-def _varied(results: Results) -> set[str]:
-    """Return the settings of the planner in which conditions differ, `ga.…` among them."""
-    given = [c.planner.canonical() for c in results.with_data]
-    flat = [
-        {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in given
-    ]
-    return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
-
-
-def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
-    first, *others = results.with_data
-    judged = []
-    for one in found:
-        own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
-        best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
-        evidence = (
-            f"median {markdown.number(own)}; best of the others {best.label}: "
-            f"{markdown.number(median)}; {_outcomes(first, one.rows, judge.significance)}"
-        )
-        hearing = judge.on("depth", depth=first.label, measure=one.measure.name)
-        judged.append(hearing.best(evidence, one.rows, own <= min(medians)))
-    return judged
-
-
-def _mutation(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
-    judged = []
-    for one in (one for one in found if one.rows):
-        first = one.family.pairs[0][0]
-        hearing = judge.on(
-            "falling_rate",
-            who="",
-            measure=one.measure.name,
-            reading=READINGS[first.planner.ga.mutation_direction],
-        )
-        evidence = _outcomes(first, one.rows, judge.significance)
-        judged.append(hearing.better_than_all(evidence, one.rows))
-    return judged
 
 
 def _outcomes(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
@@ -163,16 +135,14 @@ def converging_rows(compared: Sequence[FamilyComparison]) -> dict[str, tuple[Com
     return comparisons.rows_by_name(_converging(compared))
 
 
-def slowest(condition: ConditionResults) -> float:
-    """Return the CPU time of the slowest run [s]."""
-    return float(condition.column("cpu_s").max())
-
-
 def rates_table(results: Results, confidence: float) -> pd.DataFrame:
     """Return the shares of solved motions that have a defect; without curves only one varies."""
-    shown = list(SHORT)[: None if curved(results) else 1]
-    found = [(position, c, measures.rates(c)) for position, c in enumerate(results.with_data)]
-    rows = [(SHORT[name], k, c.label, rates[name]) for k, c, rates in found for name in shown]
+    shown = SHORT if curved(results) else SHORT[:1]
+    rows = [
+        (name, position, c.label, defect)
+        for position, c in enumerate(results.with_data)
+        for name, defect in zip(shown, measures.defects(c), strict=False)
+    ]
     table = shares.shares_table(rows, {}, confidence).rename(columns=NAMES)
     order = ["defect", "position", "condition", "failing", "solved", "lower", "upper"]
     return table[order].assign(share=table["share"].fillna(0.0))

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import grouped
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics import judging
 from evoexp.report.statistics.comparisons import Family, Measure, by_column, compared
 from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, quantile
@@ -59,14 +60,28 @@ class Share(NamedTuple):
 
 def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
     """Group conditions that differ in hall and elites only; groups that lack one are left out."""
-    found = grouped(
-        conditions,
-        lambda c: [
-            getattr(c.planner.ga, name)
-            for name in ("mutation_direction", "mutation_rate", "mutation_decay")
-        ],
-    )
-    return tuple(corner for own in found if (corner := _corner(own)) is not None)
+
+    def key(condition: ConditionResults) -> tuple[object, ...]:
+        ga = condition.planner.ga
+        return ga.mutation_direction, ga.mutation_rate, ga.mutation_decay
+
+    found = []
+    for own in grouped(conditions, key):
+        plain = [c for c in own if not c.planner.ga.hall_depth]
+        nothing = [c for c in plain if not c.planner.ga.num_elites]
+        elites = [c for c in plain if c.planner.ga.num_elites]
+        elites.sort(key=lambda c: int(c.planner.ga.num_elites))
+        halls = [c for c in own if c.planner.ga.hall_depth]
+        usual = [
+            c for c in halls if not c.planner.ga.hall_frozen and c.planner.ga.hall_memory is None
+        ]
+        genomes = [c for c in usual if c.planner.ga.hall_distinct == "genome"]
+        indices = [c for c in usual if c.planner.ga.hall_distinct == "index"]
+        if nothing and elites and genomes:
+            name, by_index = genomes[0].label.rpartition(", ")[0], next(iter(indices), None)
+            kept = nothing[0], tuple(elites), genomes[0], by_index
+            found.append(Corner(name, *kept, tuple(c for c in halls if c not in usual)))
+    return tuple(found)
 
 
 def share(
@@ -111,11 +126,15 @@ def medians(column: Callable[[ConditionResults], FloatArray]) -> Statistic:
     return statistic
 
 
-def log_effort(threshold: float) -> Statistic:
-    """Return the statistic "logarithm of the expected running time to a team of that cost"."""
+def gains(threshold: float) -> tuple[Gain, ...]:
+    """Return the quantities in which gains are shared out."""
+    best, done = by_column("best_cost"), attrgetter("done")
+    to = f"evaluations to a team of cost ≤ {markdown.number(threshold)}"
+    effort = partial(measures.evaluations_to, threshold=threshold)
 
-    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
-        first = measures.evaluations_to(condition, threshold)
+    def log_effort(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
+        """Return the logarithm of the expected running time to a team of that cost."""
+        first = effort(condition)
         reached = np.isfinite(first)
         spent = np.where(reached, first, condition.column("evaluations"))
         total, having = spent[draws].sum(axis=1), reached[draws].sum(axis=1)
@@ -123,19 +142,12 @@ def log_effort(threshold: float) -> Statistic:
         np.divide(total, having, out=found, where=having > 0)
         return np.asarray(np.log(found))
 
-    return statistic
-
-
-def gain_measures(threshold: float, told: str) -> tuple[Gain, ...]:
-    """Return the quantities in which gains are shared out."""
-    best, to = by_column("best_cost"), f"evaluations to a team of cost ≤ {told}"
-    effort = partial(measures.evaluations_to, threshold=threshold)
     return (
-        Gain("best cost", "best cost", medians(best), _done, Measure("best cost", best)),
+        Gain("best cost", "best cost", medians(best), done, Measure("best cost", best)),
         Gain(
             f"{to} (expected running time)",
             EFFORT,
-            log_effort(threshold),
+            log_effort,
             lambda c: int(np.isfinite(effort(c)).sum()),
             Measure(to, effort),
         ),
@@ -143,7 +155,7 @@ def gain_measures(threshold: float, told: str) -> tuple[Gain, ...]:
             measures.CERTIFIED,
             "cost, refuted as worst",
             medians(measures.certified_cost),
-            _done,
+            done,
             Measure(measures.CERTIFIED, measures.certified_cost),
         ),
         Gain(
@@ -155,32 +167,10 @@ def gain_measures(threshold: float, told: str) -> tuple[Gain, ...]:
     )
 
 
-def _done(condition: ConditionResults) -> int:
-    return condition.done
-
-
 def not_refuted(condition: ConditionResults) -> FloatArray:
     """Return each run's best cost, (done,); NaN where its motion is refuted."""
     found = measures.certified_cost(condition)
     return np.where(np.isfinite(found), found, np.nan)
-
-
-def _corner(own: Sequence[ConditionResults]) -> Corner | None:
-    plain = [c for c in own if not c.planner.ga.hall_depth]
-    halls = [c for c in own if c.planner.ga.hall_depth]
-    nothing = [c for c in plain if not c.planner.ga.num_elites]
-    elites = sorted(
-        (c for c in plain if c.planner.ga.num_elites), key=lambda c: int(c.planner.ga.num_elites)
-    )
-    usual = [c for c in halls if not c.planner.ga.hall_frozen and c.planner.ga.hall_memory is None]
-    genomes = [c for c in usual if c.planner.ga.hall_distinct == "genome"]
-    indices = [c for c in usual if c.planner.ga.hall_distinct == "index"]
-    if not (nothing and elites and genomes):
-        return None
-    name = genomes[0].label.rpartition(", ")[0]
-    others = tuple(c for c in halls if c not in usual)
-    by_index = indices[0] if indices else None
-    return Corner(name, nothing[0], tuple(elites), genomes[0], by_index, others)
 
 
 def of_all_runs(measure: Gain, condition: ConditionResults) -> float:
@@ -203,16 +193,6 @@ def _shares(nothing: FloatArray, some: FloatArray, full: FloatArray) -> FloatArr
 Shares = Callable[[Corner, Gain, ConditionResults, ConditionResults], Share]
 
 
-def has_corners(results: Results) -> bool:
-    """Return whether there are all conditions that the question needs."""
-    return measures.fits(results) and bool(corners(results.with_data))
-
-
-def gains(threshold: float) -> tuple[Gain, ...]:
-    """Return the quantities in which gains are shared out."""
-    return gain_measures(threshold, markdown.number(threshold))
-
-
 def judged_gains(gains: tuple[Gain, ...]) -> list[Measure]:
     """Return the quantities by which claims are judged."""
     return [gain.judged for gain in gains if gain.judged is not None]
@@ -226,11 +206,6 @@ def hall_shares(settings: ReportSettings) -> Shares:
 def corner_families(corners: Sequence[Corner]) -> list[Family]:
     """Return the hall of distinct genomes against all else of a reading and rate."""
     return [Family.of((c.hall, c.nothing, *c.elites, *c.halls[1:], *c.others)) for c in corners]
-
-
-def _value(gain: Gain, condition: ConditionResults) -> str:
-    found = of_all_runs(gain, condition)
-    return markdown.number(float(np.rint(np.exp(found))) if gain.short == EFFORT else found)
 
 
 def told_share(share: Share) -> str:
@@ -257,11 +232,14 @@ def elitism_rows(
 ) -> Iterator[tuple[str, ...]]:
     """Yield quantities, shares by elitism, and the runs behind them."""
     for corner, gain in itertools.product(corners, gains):
-        for hall, kept in zip(corner.halls, ("genome", "index"), strict=False):
+        for hall, distinct in zip(corner.halls, ("genome", "index"), strict=False):
             found = [hall_shares(corner, gain, elites, hall) for elites in corner.elites]
-            values = (_value(gain, c) for c in (corner.nothing, *corner.elites, hall))
+            values = [of_all_runs(gain, c) for c in (corner.nothing, *corner.elites, hall)]
+            if gain.short == EFFORT:
+                values = np.rint(np.exp(values)).tolist()
             counts = ", ".join(map(str, found[-1].n))
-            yield corner.name, gain.name, kept, *values, *map(told_share, found), counts
+            told = *map(markdown.number, values), *map(told_share, found)
+            yield corner.name, gain.name, distinct, *told, counts
 
 
 def short_label(elites: ConditionResults) -> str:

@@ -1,11 +1,12 @@
 """Quantities that all pages on Curkovic et al. 2013 show: effort to a threshold, known defects."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.pages import markdown
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import counted, search_seconds, solved
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -13,12 +14,7 @@ from evoexp.report.statistics import inference
 from evoexp.report.statistics.inference import Proportion, quantile
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
-REFUTED = "collides between its configurations (exact verdict)"
-LEAVES = "executed curve leaves [0, π]"
-TOO_FAST = "a link is faster than Eq. 2 allows"
-DEFECTS = (REFUTED, LEAVES, TOO_FAST)
 CERTIFIED = "best cost, a refuted motion counting as worse than any"
-BOUND = "Lower bound of a team's cost: straight end-effector paths, least turns of the links"
 
 
 def fits(results: Results) -> bool:
@@ -58,20 +54,15 @@ def expected_evaluations(condition: ConditionResults, threshold: float) -> float
     )
 
 
-def expected_seconds(condition: ConditionResults, threshold: float) -> float:
-    """Return the expected running time in seconds, at the median run's price of an evaluation."""
-    price = quantile(search_seconds(condition) / condition.column("evaluations"), 0.5)
-    return expected_evaluations(condition, threshold) * price
-
-
 def expected_effort(condition: ConditionResults, threshold: float) -> FloatArray:
     """Return the expected running time to a cost in whole evaluations, (1,)."""
     return np.rint([expected_evaluations(condition, threshold)])
 
 
 def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:
-    """Return the expected running time to a cost, (1,) [s]."""
-    return np.array([expected_seconds(condition, threshold)])
+    """Return the expected running time to a cost at the median price of an evaluation, (1,) [s]."""
+    price = quantile(search_seconds(condition) / condition.column("evaluations"), 0.5)
+    return np.array([expected_evaluations(condition, threshold) * price])
 
 
 def bound(first: ConditionResults) -> float:
@@ -84,11 +75,6 @@ def threshold(bound: float, settings: ReportSettings) -> float:
     return settings.threshold_ratio * bound
 
 
-def several(results: Results) -> bool:
-    """Return whether there are several conditions of co-evolving robots to compare."""
-    return fits(results) and len(results.with_data) > 1
-
-
 def one_scene(results: Results) -> bool:
     """Return whether all conditions share robots and scene."""
     return len({(c.robot, c.scenario) for c in results.with_data}) == 1
@@ -97,16 +83,6 @@ def one_scene(results: Results) -> bool:
 def free_at_first(condition: ConditionResults) -> int:
     """Count the runs whose first generation holds a collision-free team."""
     return int((condition.column("first_feasible_generation") == 0).sum())
-
-
-def method_defects(results: Results) -> list[tuple[str, str]]:
-    """Return the rows on the defects that straight motions can have."""
-    return [rates_check(results, defect) for defect in (REFUTED, TOO_FAST)]
-
-
-def all_defects(results: Results) -> list[tuple[str, str]]:
-    """Return the rows on all known defects."""
-    return [rates_check(results, defect) for defect in DEFECTS]
 
 
 def refuted(condition: ConditionResults) -> FloatArray:
@@ -131,16 +107,24 @@ def exemplar(condition: ConditionResults) -> int:
     return int(condition.summaries.index[int(np.argmin(costs))])
 
 
-def rates(condition: ConditionResults) -> dict[str, Proportion]:
+class Defects(NamedTuple):
+    """Counts of the solved motions that have each of the known defects."""
+
+    refuted: Proportion  # bodies collide between the configurations
+    leaving: Proportion  # the executed curve leaves the range of a joint
+    too_fast: Proportion  # a link is faster than Eq. 2 allows
+
+
+def defects(condition: ConditionResults) -> Defects:
     """Count the solved motions that have each of the known defects."""
     columns = [str(name) for name in condition.summaries if "term_out_of_range" in str(name)]
     beyond = [np.zeros(condition.done), *(condition.column(name) for name in columns)]
-    found = {
-        REFUTED: refuted(condition) == 1.0,
-        LEAVES: np.max(beyond, axis=0) > ROUNDING,
-        TOO_FAST: times_over_limit(condition) > 1.0,
-    }
-    return {name: counted(has[solved(condition)]) for name, has in found.items()}
+    having = (
+        refuted(condition) == 1.0,
+        np.max(beyond, axis=0) > ROUNDING,
+        times_over_limit(condition) > 1.0,
+    )
+    return Defects(*(counted(each[solved(condition)]) for each in having))
 
 
 def times_over_limit(condition: ConditionResults) -> FloatArray:
@@ -148,13 +132,6 @@ def times_over_limit(condition: ConditionResults) -> FloatArray:
     prepared = condition.prepared
     solutions = [condition.solutions[int(k)] for k in condition.summaries.index]
     return np.array([link_motions.times_over_limit(prepared, solution) for solution in solutions])
-
-
-def rates_check(results: Results, defect: str) -> tuple[str, str]:
-    """Return a check of one defect in all conditions: "I: 9 of 20; II: …"."""
-    found = ((c.label, rates(c)[defect]) for c in results.with_data)
-    told = "; ".join(f"{label}: {markdown.share(*rate)}" for label, rate in found)
-    return f"Solved motions that fail: {defect}", told
 
 
 def _first(condition: ConditionResults, threshold: float, column: str) -> FloatArray:

@@ -34,7 +34,7 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Cl
     """
     pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
     shares = [(measures.below(c, printed.bound), printed.proportion) for c, printed in pairs]
-    p_values = inference.holm([inference.fisher_exact(own, theirs) for own, theirs in shares])
+    p_values = inference.fisher_family(shares)
     # Bonferroni: all intervals together have the level
     level, each = judge.level, 1.0 - (1.0 - judge.level) / max(1, len(pairs))
     claims = []
@@ -132,20 +132,31 @@ def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
     Controls draw uniformly where the algorithm evolves: sub-path by sub-path under the same loop,
     or both sub-paths at once.
     """
+    groups = run_measures.grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner))
     pairs = [
         (own, best_control(controls))
         for own in results.with_data
-        if not own.is_control and (controls := _controls(results, own))
+        if not own.is_control
+        for group in groups
+        if own in group and (controls := [c for c in group if c.is_control])
     ]
-    p_values = inference.holm(
-        [
-            inference.fisher_exact(run_measures.success(own), run_measures.success(control))
-            for own, control in pairs
-        ]
-    )
-    for (own, control), p_adjusted in zip(pairs, p_values, strict=True):
-        yield more_solutions(judge, own, control, p_adjusted)
-        yield _less_effort(judge, own, control)
+    shares = [(run_measures.success(own), run_measures.success(control)) for own, control in pairs]
+    for pair, p_adjusted in zip(pairs, inference.fisher_family(shares), strict=True):
+        yield more_solutions(judge, *pair, p_adjusted)
+        # fewer evaluations per solution
+        first, second = run_measures.on_common_seeds(*pair, by_column("evaluations"))
+        expected = [inference.expected_effort(*each) for each in (first, second)]
+        low, high = inference.effort_ratio(first, second, judge.level, judge.settings.num_resamples)
+        ratio = expected[0] / expected[1] if np.isfinite(expected[0]) else np.inf
+        told = " against ".join(f"{value:.0f}" for value in expected).replace("inf", "∞")
+        own, control = (c.label for c in pair)
+        evidence = (
+            f"expected running time {told} evaluations ({control}); ratio {ratio:.3g} "
+            f"[{low:.3g}, {high:.3g}] ({100 * judge.level:g} % bootstrap interval over seeds)"
+        )
+        hearing = judge.on("less_effort", who=f"{own}: ", control=f", {control}")
+        holds = None if low <= 1.0 <= high else high < 1.0
+        yield hearing.own(evidence, f"{len(first[0])} pairs", holds)
 
 
 def best_control(controls: Sequence[ConditionResults]) -> ConditionResults:
@@ -178,22 +189,6 @@ def more_solutions(
     return hearing.greater(evidence, one, two, p_adjusted)
 
 
-def _less_effort(judge: Judge, own: ConditionResults, control: ConditionResults) -> Claim:
-    """Judge that the algorithm takes fewer evaluations per solution than a control."""
-    first, second = run_measures.on_common_seeds(own, control, by_column("evaluations"))
-    expected = [inference.expected_effort(*each) for each in (first, second)]
-    low, high = inference.effort_ratio(first, second, judge.level, judge.settings.num_resamples)
-    ratio = expected[0] / expected[1] if np.isfinite(expected[0]) else np.inf
-    told = " against ".join(f"{value:.0f}" for value in expected).replace("inf", "∞")
-    evidence = (
-        f"expected running time {told} evaluations ({control.label}); ratio {ratio:.3g} "
-        f"[{low:.3g}, {high:.3g}] ({100 * judge.level:g} % bootstrap interval over seeds)"
-    )
-    hearing = judge.on("less_effort", who=f"{own.label}: ", control=f", {control.label}")
-    holds = None if low <= 1.0 <= high else high < 1.0
-    return hearing.own(evidence, f"{len(first[0])} pairs", holds)
-
-
 def solved_within(own: ConditionResults, control: ConditionResults) -> Proportion:
     """Count the control's runs that are solved within the algorithm's median effort.
 
@@ -201,14 +196,6 @@ def solved_within(own: ConditionResults, control: ConditionResults) -> Proportio
     """
     most = np.median(measures.effort(own))
     return run_measures.counted(run_measures.solved(control) & (measures.effort(control) <= most))
-
-
-def _controls(results: Results, own: ConditionResults) -> list[ConditionResults]:
-    """Return the controls that stand beside this very planner in the same scene."""
-    same = own.robot, own.scenario, own.planner
-    return [
-        c for c in results.with_data if c.is_control and (c.robot, c.scenario, c.planner) == same
-    ]
 
 
 def groups_but_for(results: Results, *path: str) -> list[Group]:
@@ -308,8 +295,8 @@ def positions(judge: Judge, results: Results, refuted: Counts) -> Iterator[Claim
             coarse, *finer = sorted(group, key=lambda c: int(c.planner.collision.num_positions))
             pairs += [(coarse, fine) for fine in finer]
     # contacts of either condition, and the tests of all pairs as one family
-    counts = [tuple(refuted(c).anywhere for c in pair) for pair in pairs]
-    p_values = inference.holm([inference.fisher_exact(one, two) for one, two in counts])
+    counts = [(refuted(coarse).anywhere, refuted(fine).anywhere) for coarse, fine in pairs]
+    p_values = inference.fisher_family(counts)
     for (coarse, fine), (one, two), p in zip(pairs, counts, p_values, strict=True):
         told = f"{_shares(judge, two, one)}; adjusted (Holm) {markdown.p_value(p)}"
         yield judge.on("fewer_contacts", who=_against(fine, coarse)).greater(told, one, two, p)

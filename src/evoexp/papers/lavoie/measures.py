@@ -8,7 +8,6 @@ import numpy as np
 from evoexp.paths.motion import Motion
 from evoexp.planners.proofs import judge_motion
 from evoexp.planners.reaching_tasks import Problem
-from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
 from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -47,16 +46,6 @@ PRINTED = (
 )
 
 
-def fits(results: Results) -> bool:
-    """Return whether there are results, all of arms that go by a via point into a box."""
-    return run_measures.planned_by(results, RedundantGa)
-
-
-def is_sweep(results: Results) -> bool:
-    """Return whether there are several such conditions to compare."""
-    return fits(results) and len(results.with_data) > 1
-
-
 def arms(results: Results) -> tuple[Family, ...]:
     """Return the first condition of each arm against its others; arms differ in joints."""
     return tuple(map(Family.of, run_measures.grouped(results.with_data, run_measures.num_joints)))
@@ -65,11 +54,6 @@ def arms(results: Results) -> tuple[Family, ...]:
 def printed(condition: ConditionResults) -> list[Percentage]:
     """Return the percentages that the paper prints for an arm of so many joints."""
     return [one for one in PRINTED if one.joints == run_measures.num_joints(condition)]
-
-
-def printed_points(condition: ConditionResults) -> list[tuple[float, Proportion]]:
-    """Return (bound, share) of the percentages that the paper prints for the arm."""
-    return [(one.bound, one.proportion) for one in printed(condition)]
 
 
 def below(condition: ConditionResults, bound: float) -> Proportion:
@@ -110,16 +94,6 @@ def touches(condition: ConditionResults) -> np.ndarray:
     return condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=bool)
 
 
-def refuted_paths(condition: ConditionResults) -> np.ndarray:
-    """Return which sub-paths of each run's motion the exact verdict refutes, (done, 2)."""
-    refuted = np.zeros((condition.done, 2), dtype=bool)
-    for replicate, verdict in motion_geometry.refuted(condition).items():
-        row = condition.summaries.index.get_loc(replicate)
-        for instant, _ in contacts(condition, replicate, verdict):
-            refuted[row, int(instant >= 1.0)] = True
-    return refuted
-
-
 class RefutedMotions(NamedTuple):
     """Counts of a condition's accepted motions that touch an obstacle."""
 
@@ -130,10 +104,14 @@ class RefutedMotions(NamedTuple):
 
 def refuted(condition: ConditionResults) -> RefutedMotions:
     """Count the solved runs whose motion the exact verdict refutes, by sub-path."""
-    paths = refuted_paths(condition)[run_measures.solved(condition)]
-    return RefutedMotions(
-        run_measures.counted(paths.any(axis=1)), *map(run_measures.counted, paths.T)
-    )
+    touching = np.zeros((condition.done, 2), dtype=bool)  # by sub-path
+    for replicate, verdict in motion_geometry.refuted(condition).items():
+        row = condition.summaries.index.get_loc(replicate)
+        for instant, _ in contacts(condition, replicate, verdict):
+            touching[row, int(instant >= 1.0)] = True
+    paths = touching[run_measures.solved(condition)]
+    counted = run_measures.counted
+    return RefutedMotions(counted(paths.any(axis=1)), *map(counted, paths.T))
 
 
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
@@ -161,9 +139,8 @@ def weak_evidence(results: Results, confidence: float) -> Iterator[tuple[str, st
     The more settings agree, the less agreement says about any of them. Nothing is counted where
     conditions are controls or blind, or differ in the places of their tests.
     """
-    if any(c.is_control or c.planner.collision.blind for c in results.with_data):
-        return
-    if paths_differ(results):
+    is_other = any(c.is_control or c.planner.collision.blind for c in results.with_data)
+    if is_other or paths_differ(results):
         return
     for own in run_measures.grouped(results.with_data, run_measures.num_joints):
         for one in (one for one in printed(own[0]) if one.bound == BOUND):
@@ -210,11 +187,8 @@ def share_rows(
         found = refuted(c)
         told = {"touch an obstacle": found.anywhere, "on SP1": found.sp1, "on SP2": found.sp2}
         if not paths_differ(results):
-            told = {
-                f"error below {BOUND:g}": below(c, BOUND),
-                "with a solution": run_measures.success(c),
-                "touch an obstacle": found.anywhere,
-            }
+            near = {f"error below {BOUND:g}": below(c, BOUND)}
+            told = near | {"with a solution": run_measures.success(c)} | dict([*told.items()][:1])
         rows += [(name, position, c.label, proportion) for name, proportion in told.items()]
     return rows
 

@@ -15,7 +15,7 @@ from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons, judging
 from evoexp.report.statistics.claim_rules import Rules
 from evoexp.report.statistics.comparisons import Comparison, Family, Measure
-from evoexp.report.statistics.inference import fisher_exact, holm, spread
+from evoexp.report.statistics.inference import fisher_family, spread
 from evoexp.report.statistics.judging import Judge
 
 PRINTED = "as printed"  # label of the printed setting among the ablations
@@ -150,7 +150,7 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
     parts = [other for other in others if other.label in PARTS]
     counts = {c.label: measures.refuted(c) for c in (printed, *parts)}
     own = counts[printed.label]
-    p_values = holm([fisher_exact(own, counts[part.label]) for part in parts])
+    p_values = fisher_family([(own, counts[part.label]) for part in parts])
     claims = []
     for part, p_value in zip(parts, p_values, strict=True):
         other = counts[part.label]

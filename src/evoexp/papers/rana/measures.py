@@ -10,7 +10,7 @@ from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray, generations
 from evoexp.report.pages import markdown
-from evoexp.report.results.run_measures import grouped, planned_by
+from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons
 from evoexp.report.statistics.comparisons import Comparison, FamilyComparison
@@ -71,20 +71,14 @@ def who(results: Results, condition: ConditionResults) -> str:
 
 
 def fits(results: Results) -> bool:
-    """Return whether the paper's figures can draw all conditions."""
-    return bool(results.with_data) and all(map(can_be_drawn, results.with_data))
-
-
-def can_be_drawn(condition: ConditionResults) -> bool:
-    """Return whether the paper's figures can draw a condition.
-
-    They draw several arms of two joints in a plane, or of three joints or more in space.
-    """
-    problem = condition.prepared.problem
-    if not isinstance(problem, Problem) or problem.assembly.num_arms < 2:
-        return False
-    joints = 2 if problem.assembly.table.planar else 3
-    return all(stop - first >= joints for first, stop in problem.arm_slices)
+    """Return whether all have several arms of two joints in a plane, or of three in space."""
+    for problem in (c.prepared.problem for c in results.with_data):
+        if not isinstance(problem, Problem) or problem.assembly.num_arms < 2:
+            return False
+        joints = 2 if problem.assembly.table.planar else 3
+        if any(stop - first < joints for first, stop in problem.arm_slices):
+            return False
+    return bool(results.with_data)
 
 
 def planar(condition: ConditionResults) -> bool:
@@ -121,11 +115,6 @@ def _scenes(results: Results) -> list[tuple[Results, str]]:
     ]
     drawn = [(scene, own[0]) for scene, own in found if own]
     return [(scene, suffix if len(drawn) > 1 else "") for scene, suffix in drawn]
-
-
-def length_ratio(condition: ConditionResults) -> float:
-    """Return the median length of paths over that of the straight line [-]."""
-    return condition.spread("term_path_length_ratio").median
 
 
 def straight_terms(condition: ConditionResults) -> dict[str, float]:
@@ -181,11 +170,6 @@ def colliding(condition: ConditionResults) -> Proportion:
     return Proportion(condition.done - condition.solved, condition.done)
 
 
-def varies_via_points(results: Results) -> bool:
-    """Return whether all conditions are of the paper's planner."""
-    return planned_by(results, ViaPointGa)
-
-
 def length(condition: ConditionResults) -> FloatArray:
     """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
@@ -221,41 +205,38 @@ def crossover_distances(conditions: Sequence[ConditionResults]) -> list[Conditio
 
 
 def _changing(conditions: Sequence[ConditionResults], name: str) -> list[ConditionResults]:
-    first, *others = conditions
-    if not isinstance(first.planner, ViaPointGa) or first.is_control:
-        return []
-    return [other for other in others if _changes(first, other, name)]
-
-
-def _changes(first: ConditionResults, other: ConditionResults, name: str) -> bool:
-    """Return whether this setting, and no other, differs from the first condition's."""
-    if other.is_control or not isinstance(other.planner, ViaPointGa):
-        return False
-    value = getattr(first.planner, name)
-    same = bool(other.planner.model_copy(update={name: value}) == first.planner)
-    return same and bool(getattr(other.planner, name) != value)
+    """Return the conditions that differ from the first one in this setting, and no other."""
+    of_paper = [c for c in conditions if isinstance(c.planner, ViaPointGa) and not c.is_control]
+    first = conditions[0].planner
+    return [
+        c
+        for c in of_paper
+        if conditions[0] in of_paper
+        and getattr(c.planner, name) != getattr(first, name)
+        and c.planner.model_copy(update={name: getattr(first, name)}) == first
+    ]
 
 
 def cost_difference(other: ConditionResults, compared: tuple[FamilyComparison, ...]) -> str:
     """Return how far the costs of a condition are from those of the first one, in words."""
-    return _difference(other, {"best cost": comparisons.rows_by_name(compared)["best cost"]})
+    return _difference(other, compared, {"best cost": "best cost"})
 
 
 def reading_difference(other: ConditionResults, compared: tuple[FamilyComparison, ...]) -> str:
     """Return how far cost and evenness of a condition are from those of the first one."""
-    rows = comparisons.rows_by_name(compared)
-    return _difference(
-        other, {"best cost": rows["best cost"], "unevenness C3 + C4": rows[EVENNESS]}
-    )
+    return _difference(other, compared, {"best cost": "best cost", EVENNESS: "unevenness C3 + C4"})
 
 
-def _difference(other: ConditionResults, tables: dict[str, Sequence[Comparison]]) -> str:
+def _difference(
+    other: ConditionResults, compared: tuple[FamilyComparison, ...], names: dict[str, str]
+) -> str:
     """Return the differences of the first condition from another one in words."""
+    rows = comparisons.rows_by_name(compared)
     told = [
-        f"the median of {name} differs by {markdown.number(row.median_difference)}, "
+        f"the median of {shown} differs by {markdown.number(row.median_difference)}, "
         f"p = {markdown.p_value(row.better.p_value)}"
-        for name, rows in tables.items()
-        for row in rows
+        for name, shown in names.items()
+        for row in rows[name]
         if row.quantity == other.label
     ]
     return "; ".join(told) or "nothing to compare"
@@ -280,29 +261,16 @@ def kept_apart(condition: ConditionResults) -> dict[int, float]:
     for generation in generations(planner.evolve(problem, condition.condition.rng(0))):
         if generation.index in GENERATIONS:
             strings = generation.population[:, :, : planner.ga.population_size]
-            found[generation.index] = _share_apart(
-                strings, problem.arm_slices, planner.crossover_distance, draw
-            )
+            num_points, individuals = strings.shape[1:]
+            apart = np.zeros(PAIRS, dtype=bool)
+            if num_points >= 3 and individuals >= 2:
+                one = draw.integers(individuals, size=PAIRS)
+                two = (one + draw.integers(1, individuals, size=PAIRS)) % individuals
+                for first, stop in problem.arm_slices:
+                    site = draw.integers(1, num_points - 1, size=PAIRS)  # 1 … N − 1
+                    gap = strings[first:stop, site, one] - strings[first:stop, site, two]
+                    apart |= np.linalg.norm(gap, axis=0) >= planner.crossover_distance
+            found[generation.index] = float(np.mean(apart))
         if generation.index >= max(GENERATIONS):
             break
     return found
-
-
-def _share_apart(
-    strings: FloatArray, arm_slices: np.ndarray, distance: float, rng: np.random.Generator
-) -> float:
-    """Return the share of pairs of strings (nq, N + 1, individuals) [deg] that are not crossed.
-
-    They are not closer than the distance [deg] at the site of an arm at least.
-    """
-    num_points, individuals = strings.shape[1:]
-    if num_points < 3 or individuals < 2:
-        return 0.0
-    one = rng.integers(individuals, size=PAIRS)
-    two = (one + rng.integers(1, individuals, size=PAIRS)) % individuals
-    apart = np.zeros(PAIRS, dtype=bool)
-    for first, stop in arm_slices:
-        site = rng.integers(1, num_points - 1, size=PAIRS)  # 1 … N − 1
-        gap = strings[first:stop, site, one] - strings[first:stop, site, two]
-        apart |= np.linalg.norm(gap, axis=0) >= distance
-    return float(np.mean(apart))

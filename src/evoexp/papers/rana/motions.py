@@ -1,11 +1,10 @@
 """Motions of strings of via-points, their straight lines, and how they are drawn as paths."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import pinocchio as pin
 from matplotlib.lines import Line2D
 
 from evoexp.collision.certifier.verdict import certify
@@ -13,7 +12,7 @@ from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, style
-from evoexp.report.results import motion_geometry
+from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.stored_results import ConditionResults
 
 STRAIGHT, OTHERS = "straight line", "replicate"
@@ -60,10 +59,6 @@ def paths_table(
     """Return one table of the replicates' solutions and of the straight line.
 
     Of more than `MOST_PATHS` replicates the first ones are in it, and the best one.
-
-    Returns:
-        The columns of `table_of`, series (best, replicate, straight line) and replicate (−1: none).
-        If replicates are left out, a series "replicate of N" tells how many there are.
     """
     solutions, best_replicate = condition.solutions, condition.best_replicate
     shown = [k for n, k in enumerate(solutions) if n < MOST_PATHS or k == best_replicate]
@@ -120,15 +115,6 @@ def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, f
     return {name: kind for name, kind in kinds.items() if kind[0].any()}
 
 
-def obstacle_distance(found: Problem) -> motion_geometry.BodyDistance:
-    """Return the exact distances between links and obstacles."""
-    geometry, scene = found.scene.geometry.copy(), found.scene
-    geometry.removeAllCollisionPairs()
-    for one, two in scene.pairs[obstacle_pairs(found.assembly, scene)]:
-        geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
-    return motion_geometry.BodyDistance(scene.model, geometry)
-
-
 def approaches(condition: ConditionResults) -> pd.DataFrame:
     """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
 
@@ -157,13 +143,12 @@ def colliding_after(condition: ConditionResults, relaxed: bool) -> int:
     own, found = condition.planner, problem(condition)
     step = own.relaxation_step if relaxed else 0.0
     operator = own.model_copy(update={"redistribution": True, "relaxation_step": step})
-    solved = condition.summaries.index[condition.summaries["solved"].to_numpy(dtype=bool)]
-    strings: Iterable[FloatArray] = (
+    strings = [
         motion_geometry.configurations(condition.prepared, condition.solutions[int(k)])
-        for k in solved
-    )
-    if not len(solved):
+        for k in condition.summaries.index[run_measures.solved(condition)]
+    ]
+    if not strings:
         return 0
     rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
-    improved = operator.improve(found, np.stack(list(strings), axis=2), rng)
+    improved = operator.improve(found, np.stack(strings, axis=2), rng)
     return int(np.count_nonzero(~own.cost(found, improved).feasible))

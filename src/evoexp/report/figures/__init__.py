@@ -1,6 +1,7 @@
 """Figures: from results to a tidy table, from that table to a matplotlib Figure; no file access.
 
-Here are the small steps over tidy tables that they share.
+The columns of each table stand in `page.yaml`, with its figure. Here are the small steps over tidy
+tables that they share.
 """
 
 from collections.abc import Iterator

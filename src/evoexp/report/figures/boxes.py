@@ -1,6 +1,6 @@
 """Tukey's boxes with the points behind them; infinite values can have a place of their own."""
 
-from typing import Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,6 +11,7 @@ from evoexp.report.statistics.inference import quantile
 JITTER = 0.16  # [rows] half the width over which points are spread
 POINTS = 50  # up to so many finite values every one is shown
 FENCE = 1.5  # [interquartile ranges] how far whiskers may reach
+DOT: dict[str, Any] = {"ms": 2.6, "mec": "none", "alpha": 0.5}
 
 
 def draw_box(
@@ -18,16 +19,14 @@ def draw_box(
     position: float,
     values: FloatArray,
     colour: str,
-    orientation: Literal["horizontal", "vertical"] = "horizontal",
     never: float | None = None,
 ) -> None:
-    """Draw median, quartiles and whiskers, and points.
+    """Draw median, quartiles and whiskers, and points, along the horizontal axis.
 
     Args:
         axes: To draw on.
         position: Of the box along the axis of conditions.
         values: (n,); inf: a run that never got there.
-        orientation: Direction in which values grow.
         never: Where infinite values are drawn: the box is that of all runs, and median, quartile or
             whisker may lie there. None: they are left out.
     """
@@ -48,22 +47,15 @@ def draw_box(
     axes.bxp(
         [box | {"fliers": drawn[beyond] if many else []}],
         positions=[position],
-        orientation=orientation,
+        orientation="horizontal",
         widths=0.55,
         manage_ticks=False,
         boxprops={"color": colour},
         whiskerprops={"color": colour},
         capprops={"color": colour},
         medianprops={"color": colour, "linewidth": 2.0},
-        flierprops={
-            "marker": "o",
-            "markersize": 2.6,
-            "markerfacecolor": colour,
-            "markeredgecolor": "none",
-            "alpha": 0.5,
-        },
+        flierprops={"marker": "o", "mfc": colour, **DOT},
     )
     if not many:
         beside = position + JITTER * (2.0 * ((np.arange(len(drawn)) * 0.618034) % 1.0) - 1.0)
-        x, y = (drawn, beside) if orientation == "horizontal" else (beside, drawn)
-        axes.plot(x, y, "o", color=colour, markersize=2.6, alpha=0.5, mec="none")
+        axes.plot(drawn, beside, "o", color=colour, **DOT)

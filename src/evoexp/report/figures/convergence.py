@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.report.figures import groups, style
+from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import quantiles
 
@@ -20,14 +20,16 @@ DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
 def cost_table(results: Results) -> pd.DataFrame:
-    """Return median and quartiles of best and average costs, per condition and generation.
-
-    Returns:
-        Columns condition, position, quantity, generation, evaluations, median, lower, upper,
-        replicates; a reference has one row.
-    """
+    """Return median and quartiles of best and average costs, per condition and generation."""
+    # references have no generations, and one row each
+    beside: dict[str, Any] = {"quantity": REFERENCE, "generation": 0, "evaluations": 0.0}
+    references = (
+        _condition(results, c, None).iloc[:1].assign(**beside)
+        for c in results.references
+        if c not in results.evolved and np.isfinite(c.column("best_cost")).all()
+    )
     parts = [_condition(results, condition, None) for condition in results.evolved]
-    return pd.concat([*parts, *_references(results)], ignore_index=True)
+    return pd.concat([*parts, *references], ignore_index=True)
 
 
 def fitness_table(results: Results) -> pd.DataFrame:
@@ -38,21 +40,14 @@ def fitness_table(results: Results) -> pd.DataFrame:
 
 def draw_cost(table: pd.DataFrame) -> Figure:
     """Draw best and average cost against generations."""
-    figure, (axes,) = style.row_of_panels(3.4, 1)
+    figure, (axes,) = style.panels(3.4)
     beside = table["quantity"] == REFERENCE
     _curves(axes, table[~beside])
-    for position, label, cost in table.loc[beside, ["position", "condition", "median"]].itertuples(
-        index=False
-    ):
-        axes.axhline(
-            cost,
-            color=style.condition_colour(position),
-            linestyle=DASH_DOTTED,
-            linewidth=1.0,
-            label=label,
-        )
+    for row in records(table[beside]):
+        look: dict[str, Any] = {"color": style.condition_colour(row.position), "linewidth": 1.0}
+        axes.axhline(row.median, linestyle=DASH_DOTTED, label=row.condition, **look)
     axes.set_ylabel("cost")
-    style.legend_below(figure, axes, 2)
+    style.legend_below(figure, [axes], 2)
     return figure
 
 
@@ -65,14 +60,14 @@ def draw_best(table: pd.DataFrame) -> Figure:
     best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
     positions = sorted(best["position"].unique())
     if len(positions) <= len(style.CONDITION_COLOURS):
-        figure, (axes,) = style.row_of_panels(4.4, 1)
+        figure, (axes,) = style.panels(4.4)
         _best_curves(axes, best, {k: style.condition_colour(k) for k in positions})
-        style.legend_below(figure, axes, 3)
+        style.legend_below(figure, [axes], 3)
         return figure
     first, *others = positions
     named = [[first, *others[k : k + NAMED]] for k in range(0, len(others), NAMED)]
     colours = style.CONDITION_COLOURS
-    figure, panels = style.lines_of_panels(3.6, len(named), 2, 0.0)
+    figure, panels = style.panels(3.6, len(named), 2, 0.0)
     for axes, own in zip(panels, named, strict=True):
         axes.sharex(panels[0])
         axes.sharey(panels[0])
@@ -98,7 +93,7 @@ def _best_curves(axes: Axes, best: pd.DataFrame, named: Mapping[int, str]) -> No
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw best and average fitness over the whole range, and the best fitness enlarged."""
-    figure, (whole, close) = style.row_of_panels(4.1, 2)
+    figure, (whole, close) = style.panels(4.1, 2)
     best = table[table["quantity"] == NAMES["best_cost"]]
     for axes, shown, title in (
         (whole, table, "a  whole range"),
@@ -112,7 +107,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
         near = float(last.min()) - 2.0 * (float(last.max() - last.min()) + 5.0)
         low, high = max(float(finite["lower"].min()), near), float(finite["upper"].max())
         close.set_ylim(low - 0.05 * (high - low) - 0.5, high + 0.05 * (high - low) + 0.5)
-    style.legend_below(figure, whole, 2)
+    style.legend_below(figure, [whole], 2)
     return figure
 
 
@@ -146,16 +141,6 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
     return pd.concat(parts, ignore_index=True)
 
 
-def _references(results: Results) -> list[pd.DataFrame]:
-    """Return the costs of references, which have no generations, one row each."""
-    beside: dict[str, Any] = {"quantity": REFERENCE, "generation": 0, "evaluations": 0.0}
-    return [
-        _condition(results, c, None).iloc[:1].assign(**beside)
-        for c in results.references
-        if c not in results.evolved and np.isfinite(c.column("best_cost")).all()
-    ]
-
-
 def _curves(axes: Axes, table: pd.DataFrame) -> None:
     """Draw medians as lines (the average dashed) and quartiles as bands."""
     across = _across(table)
@@ -167,30 +152,12 @@ def _curves(axes: Axes, table: pd.DataFrame) -> None:
                 continue
             kind = "-" if column == "best_cost" else (0, (3, 1.5))
             label = f"{condition}, {NAMES[column]} ({_counts(curve)})"
-            axes.fill_between(
-                curve[across], curve["lower"], curve["upper"], color=colour, alpha=0.18, linewidth=0
-            )
+            marks.band(axes, curve[across], curve["lower"], curve["upper"], colour)
             axes.plot(curve[across], curve["median"], linestyle=kind, color=colour, label=label)
     axes.set(xlim=(0, max(1, int(table[across].max()))), xlabel=across)
-    if across == "generation":
-        _evaluations_above(axes, table)
-
-
-def _across(table: pd.DataFrame) -> str:
-    """Return the common axis: generations if they cost all conditions the same, or evaluations."""
-    spent = table.groupby("generation")["evaluations"].nunique()
-    return "generation" if spent.max() == 1 else "evaluations"
-
-
-def _counts(curve: pd.DataFrame) -> str:
-    low, high = int(curve["replicates"].min()), int(curve["replicates"].max())
-    return f"n = {low}" if low == high else f"n = {low}…{high}"
-
-
-def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
-    """Add evaluations as a second scale above."""
+    # evaluations as a second scale above
     steps = table.groupby("generation")["evaluations"].first()
-    if len(steps) < 2:
+    if across != "generation" or len(steps) < 2:
         return
     slope = float(steps.iloc[-1] - steps.iloc[0]) / float(steps.index[-1] - steps.index[0])
     offset = float(steps.iloc[0])
@@ -204,3 +171,14 @@ def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
     above = axes.secondary_xaxis("top", functions=(forward, backward))
     above.set_xlabel("evaluations")
     above.xaxis.set_major_locator(style.few_ticks())
+
+
+def _across(table: pd.DataFrame) -> str:
+    """Return the common axis: generations if they cost all conditions the same, or evaluations."""
+    spent = table.groupby("generation")["evaluations"].nunique()
+    return "generation" if spent.max() == 1 else "evaluations"
+
+
+def _counts(curve: pd.DataFrame) -> str:
+    low, high = int(curve["replicates"].min()), int(curve["replicates"].max())
+    return f"n = {low}" if low == high else f"n = {low}…{high}"

@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results.stored_results import Results
@@ -25,30 +23,13 @@ OPEN: dict[str, Any] = {"markerfacecolor": "white"}  # the look of what is not s
 
 
 def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
-    """Return quantities of every finished replicate.
-
-    Args:
-        results: With data.
-        quantities: Name with unit → its values of a condition, (done,); inf: never.
-
-    Returns:
-        Columns quantity, position, condition, replicate, value, failed (replicates of the
-        condition).
-    """
-    parts = [
-        pd.DataFrame(
-            {
-                "quantity": name,
-                "position": position,
-                "condition": c.label,
-                "replicate": c.summaries.index,
-                "value": values(c),
-                "failed": c.failed,
-            }
-        )
-        for name, values in quantities.items()
-        for position, c in enumerate(results.with_data)
-    ]
+    """Return quantities (name with unit → values (done,), inf: never) of every replicate."""
+    parts = []
+    for name, values in quantities.items():
+        for position, c in enumerate(results.with_data):
+            columns = {"quantity": name, "position": position, "condition": c.label}
+            runs = {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}
+            parts.append(pd.DataFrame(columns | runs))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -60,10 +41,16 @@ def draw_values(table: pd.DataFrame) -> Figure:
     """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
-    figure, panels = style.row_of_panels(0.32 * len(labels) + 1.1, len(quantities), sharey=True)
+    figure, panels = style.panels(0.32 * len(labels) + 1.1, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
-        never = _place_of_never(rows["value"].to_numpy())
+        every = rows["value"].to_numpy()
+        finite, never = every[np.isfinite(every)], None
+        if np.isposinf(every).any():  # infinity is drawn beyond all finite values
+            never = 1.0
+            if len(finite):
+                high, span = float(finite.max()), float(np.ptp(finite))
+                never = high + BEYOND * (span or abs(high) or 1.0)
         for position, own in groups(rows, "position"):
             values, colour = own["value"].to_numpy(), style.row_colour(position, len(labels))
             draw_box(axes, position, values, colour, never=never)
@@ -76,8 +63,15 @@ def draw_values(table: pd.DataFrame) -> Figure:
         axes.margins(x=0.06)
         axes.xaxis.set_major_locator(style.few_ticks())
         style.shorten_thousands(axes.xaxis)
-        if never is not None:
-            _name_never(axes, never)
+        if never is not None:  # named on the axis, and parted from the finite values by a line
+            low, high = axes.get_xlim()
+            between = never - 0.5 * BEYOND / (1.0 + BEYOND) * (never - low)
+            axes.axvline(between, color=style.FAINT, linewidth=0.7, linestyle=(0, (1, 2)))
+            greatest = never - CLEAR * (never - low)
+            ticks = [tick for tick in axes.get_xticks() if low <= tick <= greatest]
+            words = axes.xaxis.get_major_formatter().format_ticks(ticks)
+            axes.set_xticks([*ticks, never], [*words, "never"])
+            axes.set_xlim(low, high)
     counts = (
         table[table["quantity"] == quantities[0]]
         .groupby("position")
@@ -92,52 +86,12 @@ def draw_values(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _place_of_never(values: FloatArray) -> float | None:
-    """Return where infinity is drawn: beyond all finite values; None if all are finite."""
-    finite = values[np.isfinite(values)]
-    if not np.isposinf(values).any():
-        return None
-    if not len(finite):
-        return 1.0
-    low, high = float(finite.min()), float(finite.max())
-    return high + BEYOND * ((high - low) or abs(high) or 1.0)
-
-
-def _name_never(axes: Axes, never: float) -> None:
-    """Part infinity from the finite values by a line, and name it on the axis."""
-    low, high = axes.get_xlim()
-    between = never - 0.5 * BEYOND / (1.0 + BEYOND) * (never - low)
-    axes.axvline(between, color=style.FAINT, linewidth=0.7, linestyle=(0, (1, 2)))
-    greatest = never - CLEAR * (never - low)
-    ticks = [tick for tick in axes.get_xticks() if low <= tick <= greatest]
-    words = axes.xaxis.get_major_formatter().format_ticks(ticks)
-    axes.set_xticks([*ticks, never], [*words, "never"])
-    axes.set_xlim(low, high)
-
-
 def effects_table(
     comparisons: Mapping[str, Sequence[Comparison]], significance: float
 ) -> pd.DataFrame:
-    """Return how often the first condition is better.
-
-    Args:
-        comparisons: Name of a quantity → the first condition against each other one.
-        significance: Below this adjusted p-value a difference counts.
-
-    Returns:
-        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, runs (of the
-        first), runs_other, significance.
-    """
+    """Return how often the first condition is better than each other one, by quantity."""
     rows = [
-        (
-            name,
-            c.quantity,
-            c.better.a12,
-            *c.better.interval,
-            c.p_adjusted,
-            c.num_first,
-            c.num_second,
-        )
+        (name, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, *c.sizes)
         for name, found in comparisons.items()
         for c in found
     ]
@@ -149,7 +103,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     """Draw A12 with its interval, one row per other condition, one panel per quantity."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = list(dict.fromkeys(table["condition"]))
-    figure, panels = style.row_of_panels(0.3 * len(labels) + 1.2, len(quantities), sharey=True)
+    figure, panels = style.panels(0.3 * len(labels) + 1.2, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
         y = np.array([labels.index(label) for label in rows["condition"]])

@@ -25,12 +25,7 @@ NOTE: dict[str, Any] = {"ha": "center", "va": "center", "color": style.NEUTRAL, 
 def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> pd.DataFrame:
     """Return the share of (problem, target, run) that each planner has reached, over effort.
 
-    Args:
-        runs: Of each planner on each problem.
-        axis: Efforts (points,); None: from before the first answer of these runs to their end.
-
-    Returns:
-        Columns planner, collision_queries, share, targets.
+    The axis of efforts (points,) begins before the first answer of these runs unless it is given.
     """
     reached: dict[str, list[float]] = {}
     for own in runs:
@@ -60,11 +55,7 @@ def _axis(runs: Sequence[PlannerRuns]) -> FloatArray:
 
 
 def problem_share_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
-    """Return the share of (target, run) that each planner has reached, problem by problem.
-
-    Returns:
-        Columns problem, planner, collision_queries, share, targets.
-    """
+    """Return the share of (target, run) that each planner has reached, problem by problem."""
     parts, axis = [], _axis(runs)
     for name in problem_order(runs):
         table = share_table([own for own in runs if own.problem.name == name], axis)
@@ -74,11 +65,7 @@ def problem_share_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
 
 
 def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
-    """Return median and quartiles over runs of the best proven length so far, of one problem.
-
-    Returns:
-        Columns planner, collision_queries, median, lower, upper.
-    """
+    """Return median and quartiles over runs of the best proven length so far, of one problem."""
     parts = []
     for own in runs:
         table, most = own.table, max(float(own.spent.max()), 2.0)
@@ -101,7 +88,7 @@ def problem_order(runs: Iterable[PlannerRuns]) -> list[str]:
 
 def draw_shares(table: pd.DataFrame) -> Figure:
     """Draw the shares of targets reached."""
-    figure, (axes,) = style.row_of_panels(3.6, 1)
+    figure, (axes,) = style.panels(3.6)
     _draw_share_curves(axes, table, list(table["planner"].unique()))
     axes.set(xlabel="collision queries", ylabel="share of targets")
     name_curves(figure, axes, 4)
@@ -112,7 +99,7 @@ def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
     """Draw the shares of targets reached in one panel per problem."""
     planners, problems = (list(table[name].unique()) for name in ("planner", "problem"))
     shown = problems[:MAX_PANELS]
-    figure, panels = style.lines_of_panels(1.75, len(shown), PER_LINE, 0.5)
+    figure, panels = style.panels(1.75, len(shown), PER_LINE, 0.5)
     for axes, problem in zip(panels, shown, strict=True):
         own = table[table["problem"] == problem]
         _draw_share_curves(axes, own, planners)
@@ -125,7 +112,7 @@ def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
             axes.tick_params(labelleft=False)
         if style.ends_column(axes, panels):
             axes.set_xlabel("collision queries")
-    style.legend_of_all(figure, panels, 4)
+    style.legend_below(figure, panels, 4)
     return figure
 
 
@@ -149,7 +136,7 @@ def _draw_share_curves(axes: Axes, table: pd.DataFrame, planners: Sequence[str])
 
 def draw_lengths(table: pd.DataFrame) -> Figure:
     """Draw the best proven length so far of one problem."""
-    figure, (axes,) = style.row_of_panels(3.6, 1)
+    figure, (axes,) = style.panels(3.6)
     for k, planner in enumerate(table["planner"].unique()):
         curve = table[table["planner"] == planner]
         shown, look = curve.replace([np.inf], np.nan), style.curve_look(k)

@@ -83,7 +83,7 @@ def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
     """
     curves: list[tuple[Any, str]] = list(zip(*axes.get_legend_handles_labels(), strict=True))
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:
-        style.legend_below(figure, axes, columns)
+        style.legend_below(figure, [axes], columns)
         return
     ends: list[tuple[float, CurveEnd]] = []
     for curve, name in curves:

@@ -3,7 +3,6 @@
 import textwrap
 from itertools import pairwise
 
-from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Text
@@ -28,7 +27,21 @@ def fit_texts(figure: Figure) -> bool:
         for text in part.texts:
             fitted |= _break(text, part.bbox.x1 - text.get_window_extent().x0)
     for axes in figure.axes:
-        fitted |= _fit_title(axes, figure)
+        # titles that would reach into the next panel, or out of the figure
+        titles = {axes.get_title(where) for where in ("left", "center", "right")} - {""}
+        # a title may go up to the next panel beside its own
+        box, ends = axes.get_window_extent(), [figure.bbox.x1]
+        for other in figure.axes:
+            near = other.get_window_extent()
+            if near.x0 >= box.x1 - 1.0 and near.y1 > box.y0 and near.y0 < box.y1:
+                ends.append(near.x0 if other.get_subplotspec() else box.x1)  # bar: numbers above
+        end = min(ends) - GAP
+        for title in axes.get_children():
+            if isinstance(title, Text) and title.get_text() in titles:
+                at_left = title.get_horizontalalignment() == "left"
+                fitted |= _break(
+                    title, end - title.get_window_extent().x0 if at_left else box.width
+                )
         if axes.name != "3d":
             box = axes.get_window_extent()
             fitted |= _break(axes.xaxis.label, box.width)
@@ -57,28 +70,6 @@ def _touch(axis: Axis) -> bool:
     labels = [label for label in axis.get_ticklabels() if label.get_text() and label.get_visible()]
     boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
     return any(one.x1 + GAP > other.x0 for one, other in pairwise(boxes))
-
-
-def _fit_title(axes: Axes, figure: Figure) -> bool:
-    """Break the titles of a panel that would reach into the next panel, or out of the figure."""
-    fitted = False
-    titles = {axes.get_title(where) for where in ("left", "center", "right")} - {""}
-    box, end = axes.get_window_extent(), _end(axes, figure)
-    for title in axes.get_children():
-        if isinstance(title, Text) and title.get_text() in titles:
-            is_left = title.get_horizontalalignment() == "left"
-            fitted |= _break(title, end - title.get_window_extent().x0 if is_left else box.width)
-    return fitted
-
-
-def _end(axes: Axes, figure: Figure) -> float:
-    """Return how far a title may go to the right: up to the next panel beside it [pixel]."""
-    own, ends = axes.get_window_extent(), [figure.bbox.x1]
-    for other in figure.axes:
-        box = other.get_window_extent()
-        if box.x0 >= own.x1 - 1.0 and box.y1 > own.y0 and box.y0 < own.y1:
-            ends.append(box.x0 if other.get_subplotspec() else own.x1)  # a bar has numbers above
-    return min(ends) - GAP
 
 
 def _break(text: Text, room: float, *, is_upright: bool = False) -> bool:

@@ -22,20 +22,11 @@ DARK = 0.46  # [-] luminance below which a cell is dark
 def matrix_table(
     compared_pairs: Sequence[tuple[tuple[str, str], Comparison]], significance: float
 ) -> pd.DataFrame:
-    """Return how often one condition of each pair is better, seen from either side.
-
-    Args:
-        compared_pairs: Labels (first, second), and their comparison.
-        significance: Below this adjusted p-value a difference counts.
-
-    Returns:
-        Columns condition, other, a12 (of the condition being better), lower, upper, p_adjusted,
-        runs (of the condition), runs_other, significance.
-    """
+    """Return how often one condition of each labelled pair is better, seen from either side."""
     found = []
     for (first, second), row in compared_pairs:
         low, high = row.better.interval
-        a12, p, one, two = row.better.a12, row.p_adjusted, row.num_first, row.num_second
+        a12, p, (one, two) = row.better.a12, row.p_adjusted, row.sizes
         found.append((first, second, a12, low, high, p, one, two))
         found.append((second, first, 1.0 - a12, 1.0 - high, 1.0 - low, p, two, one))
     names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]

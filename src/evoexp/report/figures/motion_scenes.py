@@ -20,6 +20,7 @@ from evoexp.report.figures.motion_tables import POSE, SIZE
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
+STANDING = {"obstacle": OBSTACLE, "object": OBJECT}  # colours of bodies that are no robot's
 LINE = 0.012  # [-] of the picture's radius: half the width of links without thickness
 FLOOR = 1.1  # [-] of the picture's radius: half the edge of the part of a half-space that is drawn
 
@@ -109,14 +110,6 @@ def _surface(row: Any, radius: float, middle: FloatArray) -> FloatArray:
     return surfaces.placed(surfaces.triangles_of(row.kind, size, corners), pose)
 
 
-def _look(row: Any) -> tuple[Any, float]:
-    """Return colour and opacity of a body."""
-    alpha = OPACITY[row.element]
-    if row.element in ("obstacle", "object"):
-        return (OBSTACLE if row.element == "obstacle" else OBJECT), alpha
-    return style.arm_colour(int(row.arm)), alpha
-
-
 def _room(table: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest corner of a picture: of bodies, and of obstacles near them."""
     solid = table[table["kind"].notna() & (table["kind"] != "half_space")]
@@ -143,72 +136,45 @@ def _panel(
     planar: bool,
     room: pd.DataFrame | None = None,
 ) -> None:
+    """Draw a scene as seen along z, or in space, as large as the bodies of some rows."""
     low, high = _room(rows if room is None else room)
-    draw = _flat if planar else _deep
-    axes = draw(figure, place, rows, low, high)
-    axes.set_title(title, fontsize=8)
-
-
-def _flat(
-    figure: Figure,
-    place: tuple[int, int, int],
-    rows: pd.DataFrame,
-    low: FloatArray,
-    high: FloatArray,
-) -> Any:
-    """Draw a scene as seen along z."""
-    axes = figure.add_subplot(*place)
-    pad = 0.05 * float((high - low)[:2].max())
-    style.operational_axes(axes, rows["length_unit"].iloc[0])
-    axes.set_xlim(low[0] - pad, high[0] + pad)
-    axes.set_ylim(low[1] - pad, high[1] + pad)
-    middle, radius = 0.5 * (low + high), float(np.sqrt(((high - low) ** 2).sum())) / 2.0
-    for row in records(rows[rows["kind"].notna()]):
-        if row.kind == "half_space" and abs(row.qx) + abs(row.qy) < 1e-6:
-            continue  # a floor seen from above
-        colour, alpha = _look(row)
-        seen = surfaces.outline_from_above(_surface(row, radius, middle))
-        axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.8)
-    _lines(axes, rows, ["x", "y"])
-    return axes
-
-
-def _deep(
-    figure: Figure,
-    place: tuple[int, int, int],
-    rows: pd.DataFrame,
-    low: FloatArray,
-    high: FloatArray,
-) -> Any:
-    """Draw a scene in space: all surfaces in one collection, which sorts them by depth."""
     spans, unit = high - low, rows["length_unit"].iloc[0]
-    pad = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
-    look: dict[str, Any] = {"zoom": 1.05, "label_pads": (-7, -7, -7), "ticks": (3, 3)}
-    axes = surfaces.space(figure, place, low, high, pad, unit, view=VIEW, pale=True, **look)
-    middle, radius = 0.5 * (low + high), float(np.sqrt(((high - low) ** 2).sum())) / 2.0
-    found, colours = [], []
-    for row in records(rows[rows["kind"].notna()]):
-        triangles = _surface(row, radius, middle)
-        found.append(triangles)
-        colours.append(surfaces.shaded(triangles, *_look(row)))
-    surface = Poly3DCollection(
-        np.concatenate(found), facecolors=np.concatenate(colours), linewidth=0
-    )
-    surface.set_rasterized(True)  # tens of thousands of triangles
-    axes.add_collection3d(surface)
-    _lines(axes, rows, ["x", "y", "z"])
-    return axes
-
-
-def _lines(axes: Any, rows: pd.DataFrame, columns: list[str]) -> None:
-    """Draw the ways of tools, and targets."""
+    middle, radius = 0.5 * (low + high), float(np.sqrt((spans**2).sum())) / 2.0
+    bodies = [
+        (row, _surface(row, radius, middle), colour, OPACITY[row.element])
+        for row in records(rows[rows["kind"].notna()])
+        for colour in (STANDING.get(row.element) or style.arm_colour(int(row.arm)),)
+    ]
+    axes: Any
+    if planar:
+        axes, wide = figure.add_subplot(*place), 0.05 * float(spans[:2].max())
+        style.operational_axes(axes, unit)
+        axes.set_xlim(low[0] - wide, high[0] + wide)
+        axes.set_ylim(low[1] - wide, high[1] + wide)
+        for row, triangles, colour, alpha in bodies:
+            if row.kind == "half_space" and abs(row.qx) + abs(row.qy) < 1e-6:
+                continue  # a floor seen from above
+            seen = surfaces.outline_from_above(triangles)
+            axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.8)
+    else:  # all surfaces in one collection, which sorts them by depth
+        pad = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
+        view: dict[str, Any] = {"view": VIEW, "zoom": 1.05, "label_pads": (-7, -7, -7)}
+        axes = surfaces.space(figure, place, low, high, pad, unit, ticks=(3, 3), pale=True, **view)
+        colours = np.concatenate([surfaces.shaded(*body[1:]) for body in bodies])
+        triangles = np.concatenate([body[1] for body in bodies])
+        surface = Poly3DCollection(triangles, facecolors=colours, linewidth=0)
+        surface.set_rasterized(True)  # tens of thousands of triangles
+        axes.add_collection3d(surface)
+    # ways of tools, and targets
+    columns = ["x", "y"] if planar else ["x", "y", "z"]
     for arm, way in groups(rows[rows["element"] == "way"], "arm"):
-        values = [way[name] for name in columns]
-        axes.plot(*values, color=style.arm_colour(int(arm)), linewidth=1.0, linestyle=":", zorder=9)
+        look: dict[str, Any] = {"color": style.arm_colour(int(arm)), "linewidth": 1.0}
+        axes.plot(*(way[name] for name in columns), linestyle=":", zorder=9, **look)
     targets = rows[rows["element"] == "target"]
     if len(targets):
-        values = [targets[name] for name in columns]
-        axes.plot(*values, "*", color=style.FORBIDDEN, markersize=7, linestyle="none", zorder=10)
+        stars: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 7, "zorder": 10}
+        axes.plot(*(targets[name] for name in columns), "*", linestyle="none", **stars)
+    axes.set_title(title, fontsize=8)
 
 
 def _key(figure: Figure, table: pd.DataFrame) -> None:

@@ -27,9 +27,6 @@ def scenes_table(shown: Sequence[tuple[str, Recording]]) -> pd.DataFrame:
 
     Args:
         shown: (title, motion).
-
-    Returns:
-        `COLUMNS`, planar, length_unit. A row of element `way` is a tool's place at an instant.
     """
     tables = []
     for panel, (title, recording) in enumerate(shown):
@@ -63,15 +60,19 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.Da
 
     Args:
         shown: (title, motion, covers as rows (Pinocchio's joint, start, end, radius)).
-
-    Returns:
-        As `scenes_table`; panels come in pairs.
     """
     tables = []
     for k, (title, recording, covers) in enumerate(shown):
         bodies = [row for row in _bodies(recording, 0, "body") if row["element"] == "body"]
         frames = recording.poses.world[0]
-        own = [_cover(frames, *cover) for cover in covers]
+        own = []
+        for joint, start, end, radius in covers:  # spheres, or capsules between two points
+            place = pin.XYZQUATToSE3(frames[joint - 1]) if joint > 0 else pin.SE3.Identity()
+            pose, length = surfaces.capsule(start, end)
+            drawn = Outline("sphere", (float(radius),))
+            if length:
+                drawn = Outline("capsule", (float(radius), length))
+            own.append(_row("cover", "", 1, drawn, np.asarray(pin.SE3ToXYZQUAT(place * pose))))
         names = f"{title}: {len(bodies)} exact bodies", f"{len(own)} covers that the search tests"
         tables.append(_table(bodies, 2 * k, names[0], recording))
         tables.append(_table(own, 2 * k + 1, names[1], recording))
@@ -79,11 +80,7 @@ def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.Da
 
 
 def joints_table(recording: Recording) -> pd.DataFrame:
-    """Return all joints over a motion, with the robot's limits, infinite where there is none.
-
-    Returns:
-        Columns joint, unit (deg or length), instant, value, low, high.
-    """
+    """Return all joints over a motion, with the robot's limits, infinite where there is none."""
     model, tables = recording.parts[0].scene.model, []
     limits = np.array([model.lowerPositionLimit, model.upperPositionLimit], dtype=np.float64).T
     limits = np.where(np.abs(limits) < NO_LIMIT, limits, np.copysign(np.inf, limits))
@@ -146,21 +143,6 @@ def _row(element: str, name: str, arm: int, drawn: Outline, pose: FloatArray) ->
         **dict(zip(POSE, pose, strict=True)),
         "corners": text,
     }
-
-
-def _cover(
-    frames: FloatArray, joint: int, start: FloatArray, end: FloatArray, radius: float
-) -> dict[str, Any]:
-    """Return the row of a sphere, or of a capsule between two points, in a joint's frame."""
-    place = pin.XYZQUATToSE3(frames[joint - 1]) if joint > 0 else pin.SE3.Identity()
-    along = np.asarray(end) - np.asarray(start)
-    length = float(np.sqrt((along**2).sum()))
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along) if length else None
-    own = pin.SE3(np.eye(3) if turn is None else turn.matrix(), 0.5 * (np.asarray(start) + end))
-    drawn = Outline(
-        "capsule" if length else "sphere", (float(radius), length) if length else (float(radius),)
-    )
-    return _row("cover", "", 1, drawn, np.asarray(pin.SE3ToXYZQUAT(place * own)))
 
 
 def _pose(recording: Recording, shape: Shape, tick: int) -> FloatArray:

@@ -1,8 +1,9 @@
 """Planners over many problems: performance profiles, and mean ranks with a critical difference."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import style
@@ -22,11 +23,7 @@ ABOVE = 0.62  # [inch] of the bar of the critical difference and the axis' numbe
 
 
 def profiles_table(found: Standing) -> pd.DataFrame:
-    """Return the performance profile of each planner, at every ratio at which one rises.
-
-    Returns:
-        Columns planner, ratio, share (of problems), problems.
-    """
+    """Return the performance profile of each planner, at every ratio at which one rises."""
     ratios = effort_ratios(found.efforts)
     steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
     axis = np.append(steps, max(END * steps[-1], 2.0))
@@ -40,7 +37,7 @@ def profiles_table(found: Standing) -> pd.DataFrame:
 
 def draw_profiles(table: pd.DataFrame) -> Figure:
     """Draw performance profiles."""
-    figure, (axes,) = style.row_of_panels(3.4, 1)
+    figure, (axes,) = style.panels(3.4)
     for k, planner in enumerate(table["planner"].unique()):
         curve = table[table["planner"] == planner]
         axes.step(
@@ -55,11 +52,7 @@ def draw_profiles(table: pd.DataFrame) -> Figure:
 
 
 def critical_difference_table(found: Standing, significance: float) -> pd.DataFrame:
-    """Return mean ranks, best first, with the critical difference.
-
-    Returns:
-        Columns planner, mean_rank, problems, friedman_p, critical_difference.
-    """
+    """Return mean ranks, best first, with the critical difference."""
     table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
     table["problems"] = len(found.problems)
     table["friedman_p"] = friedman(found.lengths).p_value
@@ -79,7 +72,22 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
     axes = figure.add_subplot()
     axes.set(xlim=(1.0 - 0.45 * (count - 1), count + 0.45 * (count - 1)), ylim=(-foot, ABOVE))
     axes.axis("off")
-    _scale(axes, count, difference, is_narrow=figure.get_figwidth() < style.WIDTH)
+    # the axis of mean ranks, and the critical difference above it
+    is_narrow = figure.get_figwidth() < style.WIDTH
+    words: dict[str, Any] = {"fontsize": 6.0 if is_narrow else 7.5}  # [pt]
+    line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0}
+    axes.plot([1.0, count], [0.0, 0.0], **line)
+    for tick in range(1, count + 1):
+        axes.plot([tick, tick], [0.0, 0.06], **line)
+        if tick % 2 or not is_narrow:
+            axes.text(tick, 0.09, str(tick), ha="center", va="bottom", **words)
+    axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", **words)
+    axes.plot([1.0, 1.0 + difference], [0.4, 0.4], **line)
+    for end in (1.0, 1.0 + difference):
+        axes.plot([end, end], [0.36, 0.44], **line)
+    text = f"critical difference {difference:.2f}"
+    axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", **words)
+    # bars that join planners, and their names
     for k, (first, last) in enumerate(groups):
         ends = ranks[first] - 0.008 * count, ranks[last] + 0.008 * count
         y = -BAR * (k + 1)
@@ -94,19 +102,3 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
         text = f"{name}  {rank:.2f} " if on_left else f" {rank:.2f}  {name}"
         axes.text(end, y, text, ha="right" if on_left else "left", va="center")
     return figure
-
-
-def _scale(axes: Axes, count: int, difference: float, *, is_narrow: bool) -> None:
-    """Draw the axis of mean ranks, and the critical difference above it."""
-    size = 6.0 if is_narrow else 7.5  # [pt]
-    axes.plot([1.0, count], [0.0, 0.0], color=style.NEUTRAL, linewidth=1.0)
-    for rank in range(1, count + 1):
-        axes.plot([rank, rank], [0.0, 0.06], color=style.NEUTRAL, linewidth=1.0)
-        if rank % 2 or not is_narrow:
-            axes.text(rank, 0.09, str(rank), ha="center", va="bottom", fontsize=size)
-    axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", fontsize=size)
-    axes.plot([1.0, 1.0 + difference], [0.4, 0.4], color=style.NEUTRAL, linewidth=1.0)
-    for end in (1.0, 1.0 + difference):
-        axes.plot([end, end], [0.36, 0.44], color=style.NEUTRAL, linewidth=1.0)
-    text = f"critical difference {difference:.2f}"
-    axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", fontsize=size)

@@ -43,7 +43,7 @@ def draw_robustness(table: pd.DataFrame) -> Figure:
     """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
-    figure, panels = style.row_of_panels(0.24 * len(labels) + 1.5, len(quantities), sharey=True)
+    figure, panels = style.panels(0.24 * len(labels) + 1.5, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
         numbers = rows[["median", "lower", "upper"]].to_numpy(np.float64)

@@ -20,15 +20,9 @@ def shares_table(
     printed: Mapping[str, float],
     confidence: float,
 ) -> pd.DataFrame:
-    """Return shares of runs.
+    """Return shares of runs with Wilson's intervals, and those that a paper prints, by quantity.
 
-    Args:
-        rows: (quantity, position, condition, how many).
-        printed: Quantity → the share that a paper prints for it.
-        confidence: Level of Wilson's intervals.
-
-    Returns:
-        Columns quantity, position, condition, having, total, share, lower, upper, printed.
+    The rows are (quantity, position, condition, how many).
     """
     names = ["quantity", "position", "condition", "having", "total", "share", "lower", "upper"]
     table = pd.DataFrame(
@@ -45,7 +39,7 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}
-    figure, panels = style.row_of_panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
+    figure, panels = style.panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
     ranges = _ranges(table)
     for axes, quantity in zip(panels, quantities, strict=True):
         every = table[table["quantity"] == quantity]

@@ -81,7 +81,7 @@ def drawn(
     """Draw a figure in evoexp's style, whatever the user's own settings are.
 
     Args:
-        draw: Gives the figure; called anew where a name is no formula, though it looks like one.
+        draw: Gives the figure; called anew where a name with a $ begins no formula.
         formats: File formats.
         dpi: Resolution of raster formats [1/inch].
         look: Width and style.
@@ -92,30 +92,14 @@ def drawn(
     Raises:
         SettingError: If the style file is none of matplotlib's.
     """
-    try:
-        return _drawn(draw, formats, dpi, look)
-    except ValueError:  # a name with a $ that begins no formula
-        return _drawn(draw, formats, dpi, look, formulas=False)
-
-
-def _drawn(
-    draw: Callable[[], Figure],
-    formats: Sequence[str],
-    dpi: int,
-    look: Look,
-    *,
-    formulas: bool = True,
-) -> dict[str, bytes]:
+    images = {}
     with _looking(look):
-        mpl.rcParams["text.parse_math"] = formulas
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
-        figure, images = draw(), {}
-        FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
-        if engine := figure.get_layout_engine():  # arranged once, for all formats
-            engine.execute(figure)
-            if fit_texts(figure):  # what is broken into lines takes room from the others
-                engine.execute(figure)
-        figure.set_layout_engine(None)  # with "none" every file would be drawn twice
+        try:
+            figure = _arranged(draw())
+        except ValueError:  # a name with a $ that begins no formula
+            mpl.rcParams["text.parse_math"] = False
+            figure = _arranged(draw())
         for kind in formats:
             buffer = io.BytesIO()
             figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
@@ -123,6 +107,17 @@ def _drawn(
     if "svg" in images:
         images["svg"] = images["svg"].replace(_FONT, _FONTS)
     return images
+
+
+def _arranged(figure: Figure) -> Figure:
+    """Arrange a figure once, for all formats."""
+    FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+        if fit_texts(figure):  # what is broken into lines takes room from the others
+            engine.execute(figure)
+    figure.set_layout_engine(None)  # with "none" every file would be drawn twice
+    return figure
 
 
 @contextlib.contextmanager
@@ -150,33 +145,25 @@ def figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width * scale.width, height * scale.height), layout="constrained")
 
 
-def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
-    """Return a figure of some height [inch], and its panels side by side.
-
-    In a column half as many stand side by side, the others below them.
-    """
-    return lines_of_panels(height, count, count, 0.0, sharey=sharey)
-
-
-def lines_of_panels(
-    height: float, count: int, per_line: int, foot: float, *, sharey: bool = False
+def panels(
+    height: float, count: int = 1, per_line: int = 0, foot: float = 0.0, *, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with some panels, and the panels, line by line.
 
     Args:
         height: Of a line [inch].
         count: Number of panels.
-        per_line: Panels side by side at most; half as many in a column.
+        per_line: Panels side by side at most, 0: all; half as many in a figure for a column.
         foot: Height below the panels, for a legend [inch].
     """
-    columns = min(count, per_line)
+    columns = min(count, per_line or count)
     columns = columns if _scale.get() is _SCALES["page"] else -(-columns // 2)
     lines = -(-count // columns)
     found = figure(height * lines + foot)
-    panels = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
-    for unused in panels[count:]:
+    places = list(found.subplots(lines, columns, squeeze=False, sharey=sharey).flat)
+    for unused in places[count:]:
         unused.remove()
-    return found, panels[:count]
+    return found, places[:count]
 
 
 def begins_line(axes: Axes) -> bool:
@@ -282,35 +269,6 @@ def draw_arm(
     axes.plot(x[-1], y[-1], "o", color=colour, alpha=alpha, markersize=4, zorder=4)
 
 
-def configuration_axes(axes: Axes, arm: int) -> None:
-    """Set up axes as an arm's plane of joint angles [deg]."""
-    x, y = (f"{joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
-    axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
-    axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
-
-
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """Put the legend of some axes under the whole figure."""
-    _put_below(figure, *axes.get_legend_handles_labels(), columns)
-
-
-def _put_below(
-    figure: Figure | SubFigure, handles: Sequence[Artist], labels: Sequence[str], columns: int
-) -> None:
-    """Put a legend under the whole figure, in as many columns as are wanted and as fit.
-
-    Names that are wider than the figure are written smaller.
-    """
-    count, look = max(columns, 1), dict[str, Any](loc="outside lower center")
-    legend = figure.legend(handles, labels, ncols=count, **look)
-    size = float(legend.get_texts()[0].get_fontsize()) if labels else SMALLEST_TEXT
-    while legend.get_window_extent().width > figure.bbox.width and size > SMALLEST_TEXT:
-        size *= 1.0 if count > 1 else 0.95
-        count = max(count - 1, 1)
-        legend.remove()
-        legend = figure.legend(handles, labels, ncols=count, fontsize=size, **look)
-
-
 def key(label: str, **look: Any) -> Line2D:
     """Return an entry of a legend: a line or marker that is drawn nowhere else."""
     return Line2D([], [], label=label, **look)
@@ -324,14 +282,24 @@ def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D
 def keys_below(
     figure: Figure | SubFigure, keys: Sequence[Artist], columns: int | None = None
 ) -> None:
-    """Put a legend of given entries under the whole figure, in one line if no columns are given."""
-    _put_below(figure, keys, [str(one.get_label()) for one in keys], columns or len(keys))
+    """Put a legend under the whole figure, in as many columns as are wanted (None: all) and fit.
+
+    Names that are wider than the figure are written smaller.
+    """
+    count, look = max(columns or len(keys), 1), dict[str, Any](loc="outside lower center")
+    legend = figure.legend(handles=keys, ncols=count, **look)
+    size = float(legend.get_texts()[0].get_fontsize()) if keys else SMALLEST_TEXT
+    while legend.get_window_extent().width > figure.bbox.width and size > SMALLEST_TEXT:
+        size *= 1.0 if count > 1 else 0.95
+        count = max(count - 1, 1)
+        legend.remove()
+        legend = figure.legend(handles=keys, ncols=count, fontsize=size, **look)
 
 
-def legend_of_all(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
-    """Put one legend of the labels of all panels under the whole figure, each label once."""
-    handles: dict[str, Any] = {}
+def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
+    """Put one legend of the labels of some panels under the whole figure, each label once."""
+    handles: dict[str, Artist] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    _put_below(figure, list(handles.values()), list(handles), columns)
+    keys_below(figure, list(handles.values()), columns)

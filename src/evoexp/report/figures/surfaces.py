@@ -1,9 +1,10 @@
 """Surfaces of drawn bodies as triangles, shaded, for figures in space and in the plane."""
 
-from functools import cache
+import itertools
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -32,8 +33,11 @@ def corners_of(outline: Outline) -> FloatArray | None:
     points = np.unique(outline.points, axis=0)
     if len(points) <= MOST_CORNERS:
         return points
-    farthest = (points @ _directions(MOST_CORNERS).T).argmax(axis=0)
-    return np.asarray(points[np.unique(farthest)])
+    k = np.arange(MOST_CORNERS) + 0.5
+    height, turn = 1.0 - 2.0 * k / MOST_CORNERS, np.pi * (1.0 + np.sqrt(5.0)) * k
+    wide = np.sqrt(1.0 - height**2)
+    directions = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), height])
+    return np.asarray(points[np.unique((points @ directions.T).argmax(axis=0))])
 
 
 def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> FloatArray:
@@ -46,7 +50,7 @@ def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> Flo
     if kind == "mesh" and corners is not None:
         return _hull(corners)
     if kind == "box":
-        return _hull(0.5 * size * _cube())
+        return _hull(0.5 * size * np.array(list(itertools.product((-1.0, 1.0), repeat=3))))
     if kind in ("sphere", "ellipsoid"):
         half = size if kind == "ellipsoid" else np.full(3, size[0])
         return _turned(*_round_ends(1.0, 0.0)) * half
@@ -55,6 +59,15 @@ def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> Flo
         return _turned(*_round_ends(radius, middle))
     tip = radius if kind == "cylinder" else 0.0
     return _turned(np.array([0.0, tip, radius, 0.0]), np.array([middle, middle, -middle, -middle]))
+
+
+def capsule(start: FloatArray, end: FloatArray) -> tuple[pin.SE3, float]:
+    """Return pose and length of a capsule between two points (3,); of a sphere it is 0."""
+    along = np.asarray(end) - np.asarray(start)
+    length = float(np.sqrt((along**2).sum()))
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along) if length else None
+    middle = 0.5 * (np.asarray(start) + end)
+    return pin.SE3(np.eye(3) if turn is None else turn.matrix(), middle), length
 
 
 def placed(triangles: FloatArray, pose: FloatArray) -> FloatArray:
@@ -87,20 +100,6 @@ def outline_from_above(triangles: FloatArray) -> FloatArray:
     return np.vstack([around, around[:1]])
 
 
-@cache
-def _directions(count: int) -> FloatArray:
-    """Return directions spread evenly over a sphere, (count, 3)."""
-    k = np.arange(count) + 0.5
-    height, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
-    wide = np.sqrt(1.0 - height**2)
-    return np.column_stack([wide * np.cos(turn), wide * np.sin(turn), height])
-
-
-@cache
-def _cube() -> FloatArray:
-    return np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
-
-
 def _hull(points: FloatArray) -> FloatArray:
     """Return the hull's triangles, each counter-clockwise as seen from outside; none if flat."""
     try:
@@ -124,14 +123,8 @@ def _round_ends(radius: float, half: float) -> tuple[FloatArray, FloatArray]:
 def _turned(radii: FloatArray, heights: FloatArray) -> FloatArray:
     """Return the triangles of an outline turned around z, given from its upper end on."""
     turn = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    rings = np.stack(
-        [
-            np.outer(radii, np.cos(turn)),
-            np.outer(radii, np.sin(turn)),
-            np.outer(heights, np.ones(AROUND + 1)),
-        ],
-        axis=-1,
-    )
+    x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
+    rings = np.stack([x, y, np.outer(heights, np.ones(AROUND + 1))], axis=-1)
     a, b = rings[:-1, :-1], rings[1:, :-1]
     c, d = rings[1:, 1:], rings[:-1, 1:]
     found = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)])

@@ -6,7 +6,6 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import groups, marks, records, style
@@ -25,12 +24,7 @@ ORDINAL, PALEST = "viridis", 0.8  # colours of values that have an order, the pa
 
 
 def grid_table(sweep: Sweep, values: Values) -> pd.DataFrame:
-    """Return median and quartiles of a quantity of each combination.
-
-    Returns:
-        Columns panel, x, y (names of the values of the last two settings; y is empty where one
-        setting is swept), column, row (their places), median, lower, upper, runs.
-    """
+    """Return median and quartiles of a quantity of each combination."""
     found, last = [], len(sweep.settings) - 1
     levels = [sweep.levels(k) for k in range(len(sweep.settings))]
     for each in sweep.conditions:
@@ -57,7 +51,7 @@ def draw_grid(table: pd.DataFrame, name: str) -> Figure:
 def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
     panels = list(dict.fromkeys(table["panel"]))[:MOST_PANELS]
     rows = int(table["row"].max()) + 1
-    figure, axes_of = style.lines_of_panels(0.42 * rows + 1.15, len(panels), PER_LINE, 0.0)
+    figure, axes_of = style.panels(0.42 * rows + 1.15, len(panels), PER_LINE, 0.0)
     finite = table.loc[np.isfinite(table["median"]), "median"]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     image = None
@@ -69,8 +63,12 @@ def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
         finite_cells = np.where(np.isfinite(shown), shown, np.nan)
         limits: dict[str, Any] = {"vmin": low, "vmax": high if high > low else low + 1.0}
         image = axes.imshow(finite_cells, cmap="viridis_r", aspect="auto", **limits)
-        for cell in records(own):
-            _write_cell(axes, image, cell)
+        for cell in records(own):  # the median, white in dark cells
+            known = bool(np.isfinite(cell.median))
+            text = f"{cell.median:.4g}" if known else "∞"
+            is_dark = known and np.dot(LUMINANCE, image.to_rgba(cell.median)[:3]) < DARK
+            look: dict[str, Any] = {"color": "white" if is_dark else "black", "fontsize": 7.5}
+            axes.annotate(text, (cell.column, cell.row), ha="center", va="center", **look)
         ticks = own.drop_duplicates("column").sort_values("column")
         axes.set_xticks(ticks["column"], ticks["x"])
         ticks = own.drop_duplicates("row").sort_values("row")
@@ -85,16 +83,8 @@ def _draw_maps(table: pd.DataFrame, name: str) -> Figure:
     return figure
 
 
-def _write_cell(axes: Axes, image: Any, cell: Any) -> None:
-    """Write the median into a cell, white in dark ones."""
-    text = f"{cell.median:.4g}" if np.isfinite(cell.median) else "∞"
-    is_dark = np.isfinite(cell.median) and np.dot(LUMINANCE, image.to_rgba(cell.median)[:3]) < DARK
-    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 7.5}
-    axes.annotate(text, (cell.column, cell.row), color="white" if is_dark else "black", **look)
-
-
 def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
-    figure, (axes,) = style.row_of_panels(3.2, 1)
+    figure, (axes,) = style.panels(3.2)
     panels = list(dict.fromkeys(table["panel"]))
     ends = []
     for k, panel in enumerate(panels):
@@ -131,7 +121,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     """Draw the median differences with their intervals, one panel per swept condition."""
     bases = list(dict.fromkeys(table["base"]))[:MOST_PANELS]
     rows = max(int((table["base"] == base).sum()) for base in bases)
-    figure, panels = style.lines_of_panels(0.26 * rows + 1.0, len(bases), PER_LINE, 0.0)
+    figure, panels = style.panels(0.26 * rows + 1.0, len(bases), PER_LINE, 0.0)
     for axes, base in zip(panels, bases, strict=True):
         own = table[table["base"] == base].reset_index(drop=True)
         finite = own[np.isfinite(own[["difference", "low", "high"]]).all(axis=1)]
@@ -154,23 +144,19 @@ def facets(sweep: Sweep) -> list[tuple[str, str]]:
 
 
 def convergence_table(results: Results, sweep: Sweep) -> pd.DataFrame:
-    """Return the best cost so far of each combination.
-
-    Returns:
-        Columns of `convergence.cost_table`, base and facet (the panel), setting, value and level
-        (name, value and its place among the values of the last setting).
-    """
+    """Return the best cost so far of each combination."""
     table = cost_table(results)
     best = table[table["quantity"] == NAMES["best_cost"]]
     of = {each.results.label: each for each in sweep.conditions}
     levels = sweep.levels(len(sweep.settings) - 1)
-    labels = best[best["condition"].isin(of.keys())]["condition"]
-    return best.loc[labels.index].assign(
-        base=labels.map({label: each.base for label, each in of.items()}),
-        facet=labels.map({label: labelled(sweep, each.values[:-1]) for label, each in of.items()}),
+    best = best[best["condition"].isin(of.keys())]
+    swept = [of[label] for label in best["condition"]]
+    return best.assign(
+        base=[each.base for each in swept],
+        facet=[labelled(sweep, each.values[:-1]) for each in swept],
         setting=sweep.settings[-1],
-        value=labels.map({label: each.values[-1] for label, each in of.items()}),
-        level=labels.map({label: levels.index(each.values[-1]) for label, each in of.items()}),
+        value=[each.values[-1] for each in swept],
+        level=[levels.index(each.values[-1]) for each in swept],
     )
 
 
@@ -180,7 +166,7 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
     panels = list(dict.fromkeys(zip(shown["base"], shown["facet"], strict=True)))[:MOST_PANELS]
     beside = len({facet for _, facet in panels})
     per_line = beside if 1 < beside <= PER_LINE else min(PER_LINE, len(panels))
-    figure, axes_of = style.lines_of_panels(2.35, len(panels), per_line, 0.3)
+    figure, axes_of = style.panels(2.35, len(panels), per_line, 0.3)
     count = int(shown["level"].max()) + 1
     colours = [mpl.colors.to_hex(c) for c in mpl.colormaps[ORDINAL](np.linspace(0, PALEST, count))]
     for axes, (base, facet) in zip(axes_of, panels, strict=True):
@@ -191,7 +177,15 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
             last = curve.iloc[-1]
             place = float(last["evaluations"]), float(last["median"])
             ends.append(CurveEnd(*place, str(last["value"]), colours[level]))
-        axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=_limits(of_base))
+        # costs from the lowest end to the highest one of the settled curves
+        known: list[float] = []
+        for _, curve in groups(of_base, "condition"):
+            medians = curve["median"].to_numpy(np.float64)
+            known += [medians[-1], medians[int(SETTLED * len(medians))]]
+        settled = [value for value in known if np.isfinite(value)]
+        low, high = (min(settled), max(settled)) if settled else (0.0, 1.0)
+        room = 0.05 * (high - low) or 1.0
+        axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=(low - room, high + room))
         axes.set_title("\n".join(word for word in (base, facet) if word))
         axes.set_xlabel("evaluations" if style.ends_column(axes, axes_of) else "")
         axes.set_ylabel("best cost so far" if style.begins_line(axes) else "")
@@ -201,15 +195,3 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
     setting = table["setting"].iloc[0]
     style.keys_below(figure, [style.key(f"medians; at the ends of curves: {setting}", lw=0)])
     return figure
-
-
-def _limits(curves: pd.DataFrame) -> tuple[float, float]:
-    """Return the limits of costs: from the lowest end to the highest cost of the settled curves."""
-    known: list[float] = []
-    for _, curve in groups(curves, "condition"):
-        medians = curve["median"].to_numpy(np.float64)
-        known += [medians[-1], medians[int(SETTLED * len(medians))]]
-    finite = [value for value in known if np.isfinite(value)]
-    low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
-    room = 0.05 * (high - low) or 1.0
-    return low - room, high + room

@@ -72,7 +72,8 @@ def build(
     entry = file.entries["pages"][name]
     bound = {"results": results, "settings": settings, "rules": file.rules, "page": entry}
     scope = Scope(file.functions, {**bound, "paper": file.name, **values})
-    if "fits" in entry and not scope.value(entry["fits"]):
+    fits = entry.get("fits", ())
+    if not all(map(scope.value, [fits] if isinstance(fits, str) else fits)):
         other = entry.get("otherwise", GENERIC)
         return build(own_pages() if other == GENERIC else file, other, results, settings)
     if "headlines" not in entry:
@@ -171,8 +172,7 @@ class PageBuilder:
             if isinstance(each, str):
                 yield from self.scope[each]
             elif "controls" in each:
-                measures = [measure(self.scope, *row) for row in each["controls"]]
-                own = [(one.name, one.lower_is_better, one.values) for one in measures]
+                own = [measure(self.scope, *row) for row in each["controls"]]
                 yield from compared_with_controls(
                     self.scope["results"], self.scope["settings"], own
                 )

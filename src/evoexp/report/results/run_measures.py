@@ -1,6 +1,7 @@
 """Quantities of single runs, counts of runs and groups of conditions that several papers share."""
 
-from collections.abc import Callable, Iterable
+import collections
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,10 @@ from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Proportion
 
 
-def planned_by(results: Results, planner: type) -> bool:
-    """Return whether there are results, all of one type of planner, controls included."""
-    found = results.with_data
-    return bool(found) and all(isinstance(c.planner, planner) for c in found)
+def planned(results: Results) -> Mapping[str, bool]:
+    """Return name of a planner → whether all results are of it, controls included."""
+    names = {str(c.planner.component) for c in results.with_data}
+    return collections.defaultdict(bool, {name: len(names) == 1 for name in names})
 
 
 def solved(condition: ConditionResults) -> np.ndarray:

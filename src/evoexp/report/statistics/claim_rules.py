@@ -31,12 +31,13 @@ The evidence holds the numbers alone; the rule stands in a column of its own. Ev
 on more than numbers is given as a text instead.
 """
 
+import collections
 import functools
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import yaml
 
@@ -68,17 +69,15 @@ class Rule(NamedTuple):
         Raises:
             KeyError: If a word is missing.
         """
-        return self._filled({**self._limit_words, **words})
+        return self._filled(words)
 
     def unjudged(self) -> "Rule":
         """Return the rule with its limits filled in, and "…" for words that a judge would give."""
-        return self._filled(_Blanks(self._limit_words))
+        return self._filled(collections.defaultdict(lambda: "…"))
 
-    @property
-    def _limit_words(self) -> dict[str, object]:
-        return {name: f"{limit:g}" for name, limit in self.limits.items()}
-
-    def _filled(self, words: Mapping[str, object]) -> "Rule":
+    def _filled(self, words: dict[str, object]) -> "Rule":
+        for name, limit in self.limits.items():
+            words.setdefault(name, f"{limit:g}")
         texts = (self.claim, self.source, self.reproduced, self.contradicted)
         claim, source, reproduced, contradicted = (text.format_map(words) for text in texts)
         return self._replace(
@@ -92,13 +91,6 @@ class Rule(NamedTuple):
         return f"reproduced if {self.reproduced}{against}"
 
 
-class _Blanks(dict[str, object]):
-    """Words of a rule, with "…" for each that is not known."""
-
-    def __missing__(self, word: str) -> str:
-        return "…"
-
-
 Rules = Mapping[str, Rule]
 NO_RULES: Rules = MappingProxyType({})
 
@@ -110,8 +102,27 @@ def read_rules(path: Path) -> Rules:
     Raises:
         ValueError: If an entry lacks a key, has an unknown key, or another kind than `KINDS`.
     """
-    entries = yaml.safe_load(path.read_text(encoding="utf-8"))
-    return MappingProxyType({name: _rule(name, entry) for name, entry in entries.items()})
+    rules = {}
+    for name, entry in yaml.safe_load(path.read_text(encoding="utf-8")).items():
+        missing = {"claim", "source", "kind", "experiments"} - entry.keys()
+        unknown = entry.keys() - ({*Rule._fields} - {"name"})
+        if missing or unknown or entry["kind"] not in KINDS:
+            raise ValueError(
+                f"{name}: must have claim, source, experiments, a kind out of {', '.join(KINDS)}; "
+                f"missing: {sorted(missing)}, unknown: {sorted(unknown)}, kind: {entry.get('kind')}"
+            )
+        own = "reproduced" in entry
+        if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
+            must = f"a rule of kind {OWN}, and no other, says when it is reproduced"
+            raise ValueError(f"{name}: {must}")
+        words = dict(zip(("reproduced", "contradicted"), KINDS[entry["kind"]], strict=True))
+        data = {
+            "source": str(entry["source"]),
+            "limits": MappingProxyType(dict(entry.get("limits", {}))),
+            "experiments": tuple(entry["experiments"]),
+        }
+        rules[name] = Rule(name=name, **{**words, **entry, **data})
+    return MappingProxyType(rules)
 
 
 def registered_rules(registration: Registration) -> Rules:
@@ -120,28 +131,3 @@ def registered_rules(registration: Registration) -> Rules:
         return cast(Rules, registration.load())
     with resources.as_file(registration.file) as path:
         return read_rules(path)
-
-
-def _rule(name: str, entry: dict[str, Any]) -> Rule:
-    missing = {"claim", "source", "kind", "experiments"} - entry.keys()
-    unknown = entry.keys() - ({*Rule._fields} - {"name"})
-    if missing or unknown or entry["kind"] not in KINDS:
-        raise ValueError(
-            f"{name}: must have claim, source, experiments, a kind out of {', '.join(KINDS)}; "
-            f"missing: {sorted(missing)}, unknown: {sorted(unknown)}, kind: {entry.get('kind')}"
-        )
-    own = "reproduced" in entry
-    if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
-        raise ValueError(f"{name}: a rule of kind {OWN}, and no other, says when it is reproduced")
-    reproduced, contradicted = KINDS[entry["kind"]]
-    return Rule(
-        name,
-        entry["claim"],
-        str(entry["source"]),
-        entry["kind"],
-        entry.get("reproduced", reproduced),
-        entry.get("contradicted", contradicted),
-        MappingProxyType(dict(entry.get("limits", {}))),
-        tuple(entry["experiments"]),
-        entry.get("evidence", ""),
-    )

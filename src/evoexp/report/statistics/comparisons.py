@@ -1,6 +1,7 @@
 """Compares conditions, pair by pair: their runs are independent samples."""
 
-from collections.abc import Callable, Iterable, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,7 @@ class Comparison(NamedTuple):
     """One quantity of the runs of two conditions."""
 
     quantity: str  # its name, or that of the pair in a table of one quantity
-    num_first: int  # runs of the first that have the quantity
-    num_second: int  # the same of the second
+    sizes: tuple[int, int]  # runs of the first, and of the second, that have the quantity
     median_difference: float  # the first's median minus the second's
     better: Effect  # a12 of the first being better than the second
     # of `better`, by Holm over all that are compared; before `adjusted` it is the plain p-value
@@ -35,8 +35,7 @@ class Comparison(NamedTuple):
     @property
     def num_runs(self) -> str:
         """In words: "20", or "20 and 18"."""
-        counts = dict.fromkeys((self.num_first, self.num_second))
-        return " and ".join(map(str, counts))
+        return " and ".join(map(str, dict.fromkeys(self.sizes)))
 
     def says(self, significance: float) -> int:
         """Return 1 if the first is significantly better, −1 if significantly worse, else 0."""
@@ -48,8 +47,7 @@ class Comparison(NamedTuple):
         The level of a single test is that which Holm leaves it.
         """
         level = significance * (self.better.p_value / self.p_adjusted if self.p_adjusted else 1.0)
-        least = max(self.num_first, self.num_second) + 1
-        return max(float(least), runs_for_effect(self.better.a12, level))
+        return max(max(self.sizes) + 1.0, runs_for_effect(self.better.a12, level))
 
 
 class Measure(NamedTuple):
@@ -86,21 +84,12 @@ def compare_families(
     families: Iterable[Family], measures: Iterable[Measure], settings: ReportSettings
 ) -> tuple[FamilyComparison, ...]:
     """Compare every family in every quantity."""
-    own = tuple(families)
-    return tuple(
-        FamilyComparison(
-            measure,
-            family,
-            compared(
-                family.pairs,
-                measure.values,
-                settings,
-                lower_is_better=measure.lower_is_better,
-            ),
-        )
-        for measure in measures
-        for family in own
-    )
+    found, own = [], tuple(families)
+    for measure, family in itertools.product(measures, own):
+        rows = (_row(measure, pair, pair[1].label, settings) for pair in family.pairs)
+        known = adjusted(row for row in rows if row is not None)
+        found.append(FamilyComparison(measure, family, tuple(known)))
+    return tuple(found)
 
 
 def headed(found: Iterable[FamilyComparison]) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
@@ -129,11 +118,10 @@ def compare(
     """Compare a quantity of two conditions, (n,) and (m,) without NaN."""
     sign = -1.0 if lower_is_better else 1.0
     better = effect(sign * first, sign * second, confidence)
-    medians = quantile(first, 0.5), quantile(second, 0.5)
-    difference = (
-        0.0 if medians[0] == medians[1] else medians[0] - medians[1]
-    )  # both may be infinite
-    return Comparison(quantity, len(first), len(second), difference, better, better.p_value)
+    one, two = quantile(first, 0.5), quantile(second, 0.5)
+    difference = 0.0 if one == two else one - two  # both may be infinite
+    sizes = len(first), len(second)
+    return Comparison(quantity, sizes, difference, better, better.p_value)
 
 
 def adjusted(comparisons: Iterable[Comparison]) -> list[Comparison]:
@@ -144,24 +132,19 @@ def adjusted(comparisons: Iterable[Comparison]) -> list[Comparison]:
 
 
 def compared_with_controls(
-    results: Results, settings: ReportSettings, compared: Sequence[tuple[str, bool, Values]]
-) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    results: Results, settings: ReportSettings, measures: Sequence[Measure]
+) -> Iterator[tuple[str, tuple[Comparison, ...]]]:
     """Compare every condition with its controls: those that wrap the same planner.
 
-    Args:
-        settings: Levels.
-        compared: (quantity, whether lower is better, its values).
-
-    Returns:
+    Yields:
         (heading, one comparison per quantity), p-values adjusted over the quantities.
     """
-    found = (
-        (f"{first.label} against {second.label}", _compared(first, second, compared, settings))
-        for first in results.evolved
-        for second in results.evolved
-        if not first.is_control and second.is_control and beside(first.condition, second.condition)
-    )
-    return tuple((heading, tuple(adjusted(rows))) for heading, rows in found if rows)
+    for first, second in itertools.product(results.evolved, repeat=2):
+        is_pair = not first.is_control and second.is_control
+        if is_pair and beside(first.condition, second.condition):
+            rows = [_row(each, (first, second), each.name, settings) for each in measures]
+            if known := [row for row in rows if row is not None]:
+                yield f"{first.label} against {second.label}", tuple(adjusted(known))
 
 
 def beside(first: Condition, control: Condition) -> bool:
@@ -189,24 +172,14 @@ def compared(
     Returns:
         One comparison per pair, p-values adjusted over the pairs.
     """
-    rows = (
-        row
-        for a, b in pairs
-        for row in _compared(a, b, [(named(a, b), lower_is_better, values)], settings)
-    )
-    return tuple(adjusted(rows))
+    measure = Measure("", values, lower_is_better=lower_is_better)
+    rows = (_row(measure, pair, named(*pair), settings) for pair in pairs)
+    return tuple(adjusted(row for row in rows if row is not None))
 
 
-def _compared(
-    first: ConditionResults,
-    second: ConditionResults,
-    quantities: Sequence[tuple[str, bool, Values]],
-    settings: ReportSettings,
-) -> list[Comparison]:
-    """Compare quantities of all runs that have them; none where one condition has no such run."""
-    found = []
-    for name, lower_is_better, values in quantities:
-        x, y = (own[~np.isnan(own)] for own in (values(first), values(second)))
-        if len(x) and len(y):
-            found.append(compare(name, x, y, lower_is_better, settings.confidence))
-    return found
+def _row(measure: Measure, pair: Pair, name: str, settings: ReportSettings) -> Comparison | None:
+    """Compare the runs of a pair that have a quantity; None where one condition has no such run."""
+    x, y = (own[~np.isnan(own)] for own in map(measure.values, pair))
+    if not len(x) or not len(y):
+        return None
+    return compare(name, x, y, measure.lower_is_better, settings.confidence)

@@ -7,7 +7,7 @@ nothing here takes a mean.
 import functools
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -145,6 +145,11 @@ def fisher_exact(one: Proportion, two: Proportion) -> float:
     return float(stats.fisher_exact(table).pvalue)
 
 
+def fisher_family(pairs: Iterable[tuple[Proportion, Proportion]]) -> list[float]:
+    """Return the p-values of Fisher's exact tests of several pairs, adjusted by Holm over them."""
+    return holm([fisher_exact(*pair) for pair in pairs])
+
+
 def runs_for_effect(a12: float, significance: float) -> float:
     """Return the runs of each sample that show this A12 with the usual power (Noether 1987)."""
     beyond = float(stats.norm.isf(0.5 * significance) + stats.norm.ppf(POWER))
@@ -201,13 +206,20 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
     if smallest == 0:
         return Effect(a12, Interval(a12, a12), 1.0)
     # squared standard errors of A12, from the places of either sample in the other
-    errors = [_squared_error(*samples) for samples in ((x, y), (y, x))]
-    least_p = _separated_p_value(len(x), len(y))
+    errors = [
+        float(np.var(_placements(a, b), ddof=1)) / (len(a) * len(b) ** 2) if len(a) > 1 else 0.0
+        for a, b in ((x, y), (y, x))
+    ]
+    # separated samples: two of all ways to choose the first one's ranks; of thousands of runs there
+    # are more ways than a float can count, so here is their logarithm, the same in either order
+    n, m = len(x), len(y)
+    ways = math.lgamma(n + m + 1) - (math.lgamma(n + 1) + math.lgamma(m + 1))
+    least_p = min(1.0, max(2.0 * math.exp(-ways), sys.float_info.min))
     if smallest == 1 or sum(errors) == 0.0:
         p_value = least_p if a12 in (0.0, 1.0) else 1.0
-        return Effect(a12, _newcombe_interval(a12, len(x), len(y), confidence), p_value)
+        return Effect(a12, _newcombe_interval(a12, n, m, confidence), p_value)
     error = math.sqrt(sum(errors))
-    degrees = sum(errors) ** 2 / (errors[0] ** 2 / (len(x) - 1) + errors[1] ** 2 / (len(y) - 1))
+    degrees = sum(errors) ** 2 / (errors[0] ** 2 / (n - 1) + errors[1] ** 2 / (m - 1))
     # symmetric in log(a12 / (1 - a12)): near 0 and 1 the plain interval holds A12 too seldom
     half = special.stdtrit(degrees, 0.5 + 0.5 * confidence) * error / (a12 * (1.0 - a12))
     low, high = special.expit(special.logit(a12) + half * np.array([-1.0, 1.0]))
@@ -216,22 +228,6 @@ def effect(x: FloatArray, y: FloatArray, confidence: float) -> Effect:
     else:
         p_value = 2.0 * float(special.stdtr(degrees, -abs(a12 - 0.5) / error))
     return Effect(a12, Interval(float(low), float(high)), max(p_value, least_p))
-
-
-def _separated_p_value(n: int, m: int) -> float:
-    """Return the p-value of separated samples: two of all ways to choose the first one's ranks.
-
-    Of thousands of runs there are more ways than a float can count.
-    """
-    # their logarithm, the same in either order
-    ways = math.lgamma(n + m + 1) - (math.lgamma(n + 1) + math.lgamma(m + 1))
-    return min(1.0, max(2.0 * math.exp(-ways), sys.float_info.min))
-
-
-def _squared_error(x: FloatArray, y: FloatArray) -> float:
-    if len(x) < 2:
-        return 0.0
-    return float(np.var(_placements(x, y), ddof=1)) / (len(x) * len(y) ** 2)
 
 
 def _newcombe_interval(a12: float, n: int, m: int, confidence: float) -> Interval:

@@ -157,7 +157,7 @@ class Hearing(NamedTuple):
 
 def _runs(rows: Sequence[Comparison]) -> str:
     """Return the numbers of runs that were compared: "20", or "18 to 20"."""
-    counts = sorted({count for row in rows for count in (row.num_first, row.num_second)})
+    counts = sorted({count for row in rows for count in row.sizes})
     return " to ".join(map(str, counts if len(counts) < 2 else (counts[0], counts[-1]))) or "0"
 
 

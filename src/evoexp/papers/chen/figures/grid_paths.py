@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from evoexp.papers.chen.path_claims import Group, boxes, gaps, median_path, paths
+from evoexp.papers.chen.path_claims import Group, above_known, median_path, paths
 from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
@@ -43,15 +43,11 @@ def known_lines(group: Group) -> list[Line]:
 
 
 def paths_table(panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]]) -> pd.DataFrame:
-    """Return obstacles and paths of all workspaces.
-
-    Args:
-        panels: (title, a condition of the workspace, lines in the order in which they are drawn).
-    """
+    """Return obstacles and paths of (title, a condition of the workspace, lines in order)."""
     rows: list[tuple[object, ...]] = []
     for title, c, lines in panels:
         head = title, c.length_unit
-        for number, (x0, y0, x1, y1) in enumerate(boxes(c)):
+        for number, (x0, y0, x1, y1) in enumerate(c.scenario.obstacles):
             rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
         for number, line in enumerate(lines):
             same = (*head, line.kind, line.text, number, line.share)
@@ -100,7 +96,7 @@ def _lines(panels: list[Axes], table: pd.DataFrame) -> Iterator[tuple[Axes, str,
 
 def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
     """Return a figure with one workspace per panel, its obstacles and its ends drawn."""
-    figure, panels = style.row_of_panels(height, table["panel"].nunique(), sharey=True)
+    figure, panels = style.panels(height, table["panel"].nunique(), sharey=True)
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
         for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
             draw_obstacle(axes, corners["x"], corners["y"])
@@ -131,7 +127,7 @@ def places_table(shown: Sequence[Group]) -> pd.DataFrame:
 
 def draw_places(table: pd.DataFrame) -> Figure:
     """Draw one bar per unsafeness and condition."""
-    figure, (axes,) = style.row_of_panels(2.7, 1)
+    figure, (axes,) = style.panels(2.7)
     values = sorted(set(table.loc[table["nodes"] > 0.0, "unsafeness"]))
     count = table["position"].nunique()
     width = 0.8 / count
@@ -145,7 +141,7 @@ def draw_places(table: pd.DataFrame) -> Figure:
         xlabel="unsafeness Sᵢ of a node (1: far from everything)", ylabel="nodes per path, mean"
     )
     axes.grid(visible=False, axis="x")
-    style.legend_below(figure, axes, min(count, 4))
+    style.legend_below(figure, [axes], min(count, 4))
     return figure
 
 
@@ -169,29 +165,25 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
 
 def draw_costs(table: pd.DataFrame) -> Figure:
     """Draw one panel per weighting."""
-    figure, panels = style.row_of_panels(2.7, table["panel"].nunique())
+    figure, panels = style.panels(2.7, table["panel"].nunique())
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
         evolved, known = rows[rows["position"] >= 0], rows[rows["position"] < 0]
         for (position, quantity), line in groups(evolved, ["position", "quantity"]):
-            _curve(axes, line, style.condition_colour(int(position)), dashed=quantity == AVERAGE)
+            label, x, median = str(line["condition"].iloc[0]), line["generation"], line["median"]
+            colour = style.condition_colour(int(position))
+            look: dict[str, Any] = {"label": label}
+            if quantity == AVERAGE:
+                look = {"label": f"{label}, average", "linestyle": "--", "linewidth": 0.9}
+            else:
+                marks.band(axes, x, line["lower"], line["upper"], colour)
+            axes.plot(x, median, color=colour, **look)
         for (kind, line), pattern in zip(groups(known, "quantity"), (":", "-."), strict=False):
             at = float(line["median"].iloc[0])
             axes.axhline(at, color=style.NEUTRAL, linewidth=1.0, linestyle=pattern, label=str(kind))
         axes.set(title=str(name), xlabel="generation")
     panels[0].set_ylabel("cost C(P)")
-    style.legend_below(figure, panels[0], 3)
+    style.legend_below(figure, [panels[0]], 3)
     return figure
-
-
-def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None:
-    """Draw a median, and its quartiles unless it is dashed."""
-    label, x, median = str(line["condition"].iloc[0]), line["generation"], line["median"]
-    if dashed:
-        look: dict[str, Any] = {"linestyle": "--", "linewidth": 0.9}
-        axes.plot(x, median, label=f"{label}, average", color=colour, **look)
-    else:
-        axes.plot(x, median, color=colour, label=label)
-        marks.band(axes, x, line["lower"], line["upper"], colour)
 
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
@@ -203,7 +195,7 @@ def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
                 "position": position,
                 "condition": _name(c, group),
                 "replicate": c.summaries.index,
-                "gap_percent": gaps(c, group.optimum),
+                "gap_percent": above_known(c, group.optimum),
                 "bound_percent": 100.0 * (group.bound / group.optimum - 1.0),
             }
         )
@@ -215,7 +207,7 @@ def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
     """Draw the share of runs whose gap is at most x, one panel per weighting."""
-    figure, panels = style.row_of_panels(2.5, table["panel"].nunique(), sharey=True)
+    figure, panels = style.panels(2.5, table["panel"].nunique(), sharey=True)
     most = 1.03 * float(table["gap_percent"].max())
     limits = min(float(table["bound_percent"].min()), -0.03 * most), most  # of all panels
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
@@ -229,7 +221,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
         axes.axvline(rows["bound_percent"].iloc[0], linestyle="-.", label=BOUND, **look)
         axes.set(title=str(name), xlabel="cost above best known [%]", xlim=limits)
     panels[0].set_ylabel("share of runs [%]")
-    style.legend_below(figure, panels[0], 3)
+    style.legend_below(figure, [panels[0]], 3)
     return figure
 
 

@@ -1,7 +1,6 @@
 """Chen & Zalzala 1995, both searches joined: a safe path and a docking posture as one motion."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
-from evoexp.planners.two_stage.planner import Problem, TwoStage
-from evoexp.records import FloatArray
+from evoexp.planners.two_stage.planner import Problem
 from evoexp.report.figures import groups, style
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import PlayedRun
-from evoexp.report.results.run_measures import median_replicate, planned_by
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.run_measures import median_replicate
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.inference import Proportion
 
 PATH, TRAVEL, DOCKED = "path", "travel posture", "docking posture"
@@ -38,13 +36,21 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
         told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
         robot = c.robot
         scenario = c.scenario
-        arm = partial(_joints, c.problem(Problem).scene.model, robot.link_lengths[-1])
+        model = c.problem(Problem).scene.model
+        arms = []  # joints and end of both postures, (4, 2): x, and height
+        for posture in q[-2:]:
+            data = model.createData()
+            pin.forwardKinematics(model, data, posture)
+            points = [data.oMi[k].translation for k in range(3, model.njoints)]
+            tip = np.array([robot.link_lengths[-1], 0.0, 0.0])
+            points.append(data.oMi[model.njoints - 1].act(tip))
+            arms.append([(float(x), float(z)) for x, _, z in points])
         reach, above = scenario.docking.target
         kinds = [
             *((OBSTACLE, k, [box[:2], box[2:]]) for k, box in enumerate(scenario.grid.obstacles)),
             (PATH, 0, q[:-1, :2].tolist()),
-            (TRAVEL, 0, arm(q[-2])),
-            (DOCKED, 0, arm(q[-1])),
+            (TRAVEL, 0, arms[0]),
+            (DOCKED, 0, arms[1]),
             (BODY, 0, [(robot.body_radius, robot.body_height)]),
             (TARGET, 0, [(scenario.task_origin[0] + reach, robot.body_height + above)]),
             (FORCE, 0, [scenario.docking.force]),
@@ -54,40 +60,27 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
 
 
-def _joints(model: pin.Model, last: float, q: FloatArray) -> list[list[float]]:
-    """Return the arm's joints and its end, (4, 2): x, and height."""
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    points = [data.oMi[k].translation for k in range(3, model.njoints)]
-    points.append(data.oMi[model.njoints - 1].act(np.array([last, 0.0, 0.0])))
-    return [[float(x), float(z)] for x, _, z in points]
-
-
 def draw_missions(table: pd.DataFrame) -> Figure:
     """Draw one row per motion: from above, and from the side."""
     count = table["row"].nunique()
     figure = style.figure(3.1 * count + 0.3)
     panels = figure.subplots(count, 2, squeeze=False)
     for (above, side), (name, rows) in zip(panels, groups(table, "row"), strict=True):
-        _draw_above(above, rows)
-        _draw_side(side, rows)
         label, _, told = str(name).partition(", ")
+        # from above: obstacles and the platform's way
+        for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
+            draw_obstacle(above, corners["a"], corners["b"])
+        path = rows.loc[rows["kind"] == PATH, ["a", "b"]].to_numpy()
+        above.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
+        above.plot(*path[0], "o", markersize=4, **MARK)
+        above.plot(*path[-1], "*", markersize=8, label="docking place", **MARK)
+        style.operational_axes(above, str(rows["unit"].iloc[0]))
+        above.margins(0.08)
         above.set_title(f"{label}: from above")
+        _draw_side(side, rows)
         side.set_title(told)
-    style.legend_of_all(figure, panels[0], 3)
+    style.legend_below(figure, panels[0], 3)
     return figure
-
-
-def _draw_above(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw obstacles and the platform's way."""
-    for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
-        draw_obstacle(axes, corners["a"], corners["b"])
-    path = rows.loc[rows["kind"] == PATH, ["a", "b"]].to_numpy()
-    axes.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
-    axes.plot(*path[0], "o", markersize=4, **MARK)
-    axes.plot(*path[-1], "*", markersize=8, label="docking place", **MARK)
-    style.operational_axes(axes, str(rows["unit"].iloc[0]))
-    axes.margins(0.08)
 
 
 def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
@@ -110,11 +103,6 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
         xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]", adjustable="datalim", aspect="equal"
     )
     axes.margins(0.1)
-
-
-def fits_missions(results: Results) -> bool:
-    """Return whether there are results, all of two searches in one."""
-    return planned_by(results, TwoStage)
 
 
 def median_missions(conditions: Sequence[ConditionResults]) -> list[PlayedRun]:

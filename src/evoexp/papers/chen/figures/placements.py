@@ -4,14 +4,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import MultipleLocator
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
-from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.statistics.inference import quantiles
 
@@ -79,7 +77,7 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: the best so far against generations, the optimum as a line."""
-    figure, places = style.lines_of_panels(2.5, table["panel"].nunique(), 3, 0.6)
+    figure, places = style.panels(2.5, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         optimum, quantity = rows[["optimum", "quantity"]].iloc[0]
         for method, own in groups(rows, "method"):
@@ -100,7 +98,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
             ylabel=f"{quantity} [-]",
             title=rows["case"].iloc[0],
         )
-    style.legend_below(figure, places[0], 4)
+    style.legend_below(figure, [places[0]], 4)
     return figure
 
 
@@ -127,7 +125,7 @@ def gaps_table(cases: list[Case]) -> pd.DataFrame:
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
     """Draw shares of runs, or starts, whose gap is smaller than x, one panel per criterion."""
-    figure, places = style.lines_of_panels(2.5, table["panel"].nunique(), 3, 0.6)
+    figure, places = style.panels(2.5, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         for (_, method), own in groups(rows, ["at", "method"]):
             x = np.sort(np.maximum(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP))
@@ -147,7 +145,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
             ylabel="share with a smaller gap",
             title=rows["case"].iloc[0],
         )
-    style.legend_of_all(figure, places, 3)
+    style.legend_below(figure, places, 3)
     return figure
 
 
@@ -201,14 +199,25 @@ def draw_postures(table: pd.DataFrame) -> Figure:
         values = table[[axis, f"{axis}_end"]].to_numpy()
         margin = 0.07 * float(np.ptp(values)) + 0.05
         limits[f"{axis}lim"] = values.min() - margin, values.max() + margin
-    figure, places = style.lines_of_panels(2.6, table["panel"].nunique(), 3, 0.6)
+    figure, places = style.panels(2.6, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         style.operational_axes(axes, "unit")
         axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
         for posture, look in zip(POSTURE_NAMES, POSTURE_LOOKS, strict=True):
             own = rows[rows["posture"] == posture]
-            if len(own):
-                _draw_posture(axes, own, posture, *look)
+            if not len(own):
+                continue
+            links, (colour, width) = own[own["element"] == "link"], look
+            x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
+            dots: dict[str, Any] = {"ms": 3.0, "mfc": "white", "zorder": 5}
+            axes.plot(x, y, "o-", color=colour, linewidth=width, label=posture, **dots)
+            for row in records(own[own["element"] == "platform"]):
+                height = row.y_end - row.y
+                ends = f"round,pad=0,rounding_size={0.499 * height}"
+                edge: dict[str, Any] = {"fill": False, "edgecolor": colour, "lw": 0.6 * width}
+                corner, length = (row.x, row.y), row.x_end - row.x
+                box = FancyBboxPatch(corner, length, height, boxstyle=ends, zorder=4, **edge)
+                axes.add_patch(box)
         obstacles = rows[rows["element"] == "obstacle"]
         if len(obstacles):
             axes.plot(obstacles["x"], obstacles["y"], "X", label="obstacle", **OBSTACLE)
@@ -217,21 +226,8 @@ def draw_postures(table: pd.DataFrame) -> Figure:
             axes.plot([], [], color=ARROW["color"], label="force F")
         axes.set(title=rows["case"].iloc[0], **limits)
         axes.xaxis.set_major_locator(style.few_ticks())
-    style.legend_of_all(figure, places, 5)
+    style.legend_below(figure, places, 5)
     return figure
-
-
-def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width: float) -> None:
-    """Draw the links and the platform of a posture."""
-    links = rows[rows["element"] == "link"]
-    x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
-    axes.plot(x, y, "o-", color=colour, linewidth=width, ms=3.0, mfc="white", label=label, zorder=5)
-    for row in records(rows[rows["element"] == "platform"]):
-        height = row.y_end - row.y
-        ends = f"round,pad=0,rounding_size={0.499 * height}"
-        look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": 0.6 * width}
-        corner, length = (row.x, row.y), row.x_end - row.x
-        axes.add_patch(FancyBboxPatch(corner, length, height, boxstyle=ends, zorder=4, **look))
 
 
 # --------------------------------------------------------------------------------------- landscapes
@@ -244,28 +240,23 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
         assert case.landscape is not None
         one, two, cost = (case.landscape.array(name) for name in ("theta_1", "theta_2", "cost"))
         grid = np.stack(np.meshgrid(one, two, indexing="ij"), axis=-1).reshape(-1, 2)
+        points, minima = {}, case.minima  # element → marked points θ1, θ2 [deg], (points, 2)
+        if case.plain is not None:
+            points[RUN] = np.array([case.plain.solutions[k] for k in sorted(case.plain.solutions)])
+        if len(minima):
+            best = minima[:, 2] <= minima[0, 2] * (1.0 + 1e-9)
+            points |= {OPTIMUM: minima[best, :2], MINIMUM: minima[~best, :2]}
+        if case.printed.angles is not None:
+            points[PAPER] = np.array([case.printed.angles])
         marked = {
             element: (angles, np.array([case.measured(pair)["cost"] for pair in angles]))
-            for element, angles in _points(case).items()
+            for element, angles in points.items()
             if len(angles)
         }
         for element, (angles, costs) in ({GRID: (grid, cost.ravel())} | marked).items():
             columns = panel, case.name, element, angles[:, 0], angles[:, 1], costs
             parts.append(pd.DataFrame(dict(zip(LANDSCAPE_COLUMNS, columns, strict=True))))
     return rounded(pd.concat(parts, ignore_index=True))
-
-
-def _points(case: Case) -> dict[str, FloatArray]:
-    """Return the marked points θ1, θ2 [deg] by element, (points, 2) each."""
-    points, minima = {}, case.minima
-    if case.plain is not None:
-        points[RUN] = np.array([case.plain.solutions[k] for k in sorted(case.plain.solutions)])
-    if len(minima):
-        best = minima[:, 2] <= minima[0, 2] * (1.0 + 1e-9)
-        points |= {OPTIMUM: minima[best, :2], MINIMUM: minima[~best, :2]}
-    if case.printed.angles is not None:
-        points[PAPER] = np.array([case.printed.angles])
-    return points
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:
@@ -279,8 +270,23 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
         grid = rows[rows["element"] == GRID]
         wide = grid.pivot(index="theta_2_deg", columns="theta_1_deg", values="cost")
         for axes, widest in zip((whole, close), TICKS, strict=True):
-            _draw_costs(figure, axes, wide, widest)
-            _draw_points(axes, rows)
+            # costs in colours, up to a multiple of the least one
+            costs, least = wide.to_numpy(), float(np.nanmin(wide))
+            shades: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest"}
+            norm = LogNorm(vmin=least, vmax=least * widest)
+            places_of = wide.columns, wide.index
+            image = axes.pcolormesh(*places_of, costs, norm=norm, rasterized=True, **shades)
+            bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8, label=LABEL)
+            ticks = [least * tick for tick in TICKS[widest]]
+            bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+            bar.minorticks_off()
+            for element, look in LOOKS.items():  # the marked points
+                names = ["theta_1_deg", "theta_2_deg"]
+                x, y = rows.loc[rows["element"] == element, names].to_numpy().T
+                if len(x):
+                    axes.plot(x, y, linestyle="none", label=element, **look)
+            axes.set(xlabel="θ₁ [deg]", ylabel="θ₂ [deg]", aspect="equal")
+            axes.grid(False)
         whole.set(
             xlim=(wide.columns.min(), wide.columns.max()),
             ylim=(wide.index.min(), wide.index.max()),
@@ -292,27 +298,5 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
         for axis, name in (("x", "theta_1_deg"), ("y", "theta_2_deg")) if len(best) else ():
             close.set(**{f"{axis}lim": (best[name].min() - 15.0, best[name].max() + 15.0)})
         close.set_title("around the best", fontweight="normal")
-    style.legend_below(figure, places[0, 0], 4)
+    style.legend_below(figure, [places[0, 0]], 4)
     return figure
-
-
-def _draw_costs(figure: Figure, axes: Axes, wide: pd.DataFrame, widest: float) -> None:
-    """Draw the costs in colours, up to a multiple of the least one, and their colour bar."""
-    costs, least = wide.to_numpy(), float(np.nanmin(wide))
-    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
-    norm = LogNorm(vmin=least, vmax=least * widest)
-    image = axes.pcolormesh(wide.columns, wide.index, costs, norm=norm, **look)
-    bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8, label=LABEL)
-    ticks = [least * tick for tick in TICKS[widest]]
-    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
-    bar.minorticks_off()
-
-
-def _draw_points(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw the marked points of a criterion."""
-    for element, look in LOOKS.items():
-        x, y = rows.loc[rows["element"] == element, ["theta_1_deg", "theta_2_deg"]].to_numpy().T
-        if len(x):
-            axes.plot(x, y, linestyle="none", label=element, **look)
-    axes.set(xlabel="θ₁ [deg]", ylabel="θ₂ [deg]", aspect="equal")
-    axes.grid(False)

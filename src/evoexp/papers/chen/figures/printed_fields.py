@@ -107,7 +107,7 @@ def draw_fields(table: pd.DataFrame) -> Figure:
 
 def draw_maps(table: pd.DataFrame) -> Figure:
     """Draw fields as shaded maps: columns field, x, y, value (NaN where no path can be)."""
-    figure, panels = style.row_of_panels(3.4, table["field"].nunique())
+    figure, panels = style.panels(3.4, table["field"].nunique())
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
         wide = rows.pivot_table(index="y", columns="x", values="value", dropna=False)
         image = wide.to_numpy(dtype=np.float64)
@@ -171,24 +171,15 @@ def field_references(results: Results) -> tuple[ConditionResults, ...]:
     return tuple(c for c in results.references if isinstance(c.planner, GridPathGa))
 
 
-def printed_fields(
-    field_references: Sequence[ConditionResults],
-) -> list[tuple[ConditionResults, pd.DataFrame]]:
-    """Return the references of the printed map, with all nodes of both fields."""
-    return [(c, _compared(c)) for c in field_references if _fields(c)[0].shape == (16, 16)]
+def printed_fields(field_references: Sequence[ConditionResults]) -> list[ConditionResults]:
+    """Return the references of the printed map."""
+    return [c for c in field_references if _fields(c)[0].shape == (16, 16)]
 
 
-def nodes_table(nodes: pd.DataFrame) -> pd.DataFrame:
-    """Return all nodes of both fields beside the printed ones; see `compare`."""
-    return nodes
-
-
-def single_fields(
-    printed_fields: list[tuple[ConditionResults, pd.DataFrame]],
-) -> list[tuple[str, pd.DataFrame]]:
+def single_fields(printed_fields: list[ConditionResults]) -> list[tuple[str, pd.DataFrame]]:
     """Return the name and the nodes of every field."""
     return [
-        (str(name), rows) for _, nodes in printed_fields for name, rows in groups(nodes, "field")
+        (str(name), rows) for c in printed_fields for name, rows in groups(nodes_table(c), "field")
     ]
 
 
@@ -196,7 +187,7 @@ def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
     return condition.array("goal_field"), condition.array("unsafeness")
 
 
-def _compared(condition: ConditionResults) -> pd.DataFrame:
+def nodes_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all nodes of both fields beside the printed ones; see `compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"

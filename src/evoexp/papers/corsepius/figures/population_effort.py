@@ -35,14 +35,7 @@ def effort_table(
     confidence: float,
     num_resamples: int,
 ) -> pd.DataFrame:
-    """Return shares of runs and expected running times.
-
-    Args:
-        found: Tasks with one condition per value of the setting.
-        shares: Name → how many runs of a condition.
-        effort: Name with unit → effort of each run, (done,).
-        confidence: Level of the intervals: Wilson's of shares, bootstrapped ones of efforts.
-    """
+    """Return shares of runs with Wilson's intervals, and expected running times, by their names."""
     points = [
         (position, task.name, value, c)
         for position, task in enumerate(found)
@@ -106,7 +99,7 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
     quantities, reference = list(dict.fromkeys(table["quantity"])), table["reference"].iloc[0]
     count = table["position"].nunique()
     keys = _keys(table[(table["expected"] > 0.0) & np.isfinite(table["expected"])])
-    figure, panels = style.row_of_panels(3.3, len(quantities), sharey=True)
+    figure, panels = style.panels(3.3, len(quantities), sharey=True)
     for k, (axes, quantity) in enumerate(zip(panels, quantities, strict=True)):
         own = table[table["quantity"] == quantity]
         _draw_series(axes, own[own["expected"] > 0.0], count, float(reference))
@@ -198,13 +191,26 @@ def slope(task: Task) -> float:
 
 def draw_floor(table: pd.DataFrame) -> Figure:
     """Draw residuals with every run, and cycles, against the scope, a colour per kind of goal."""
-    figure, (left, right) = style.row_of_panels(3.4, 2)
+    figure, (left, right) = style.panels(3.4, 2)
     unit, keys = table["length_unit"].iloc[0], []
     for (position, task), own in groups(table, ["position", "task"]):
         colour = style.arm_colour(int(position))
         name = f"{task} (slope {own['slope'].iloc[0]:.2f})"
         keys.append(style.key(name, color=colour, marker="o", markersize=4.5))
-        _draw_floor_of(left, right, own, colour)
+        # every run, beside its scope by a low-discrepancy jitter
+        points = own[own["quantity"] == POINT]
+        beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
+        dots: dict[str, Any] = {"color": colour, "ms": 2.2, "alpha": 0.35, "mec": "none"}
+        left.plot(points["scope"] * beside, points["median"], "o", **dots)
+        # medians and quartiles
+        for axes, quantity in ((right, CYCLES), (left, RESIDUAL)):
+            rows = own[own["quantity"] == quantity].sort_values("scope")
+            x, medians = rows["scope"], rows["median"]
+            axes.plot(x, medians, "o-", color=colour, markersize=4.5, linewidth=1.1)
+            axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.6)
+        # a line proportional to the scope through the middle of the residuals
+        middle = len(rows) // 2
+        left.plot(x, medians.iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)
     keys.append(style.key("proportional to the scope", **PROPORTIONAL))
     scopes = sorted(set(table["scope"]))
     for axes in (left, right):
@@ -215,23 +221,3 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     right.set(ylabel="cycles until it stagnates [-]", title="b  cycles", ylim=(0, None))
     style.keys_below(figure, keys)
     return figure
-
-
-def _draw_floor_of(left: Axes, right: Axes, table: pd.DataFrame, colour: str) -> None:
-    """Draw one kind of goal: every run, medians with quartiles, and a proportional line."""
-    # every run, beside its scope by a low-discrepancy jitter
-    points = table[table["quantity"] == POINT]
-    beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
-    dots: dict[str, Any] = {"color": colour, "ms": 2.2, "alpha": 0.35, "mec": "none"}
-    left.plot(points["scope"] * beside, points["median"], "o", **dots)
-    # medians and quartiles
-    residuals, cycles = (
-        table[table["quantity"] == quantity].sort_values("scope") for quantity in (RESIDUAL, CYCLES)
-    )
-    for axes, own in ((left, residuals), (right, cycles)):
-        x = own["scope"]
-        axes.plot(x, own["median"], "o-", color=colour, markersize=4.5, linewidth=1.1)
-        axes.vlines(x, own["lower"], own["upper"], color=colour, linewidth=1.6)
-    # a proportional line through the middle
-    x, middle = residuals["scope"], len(residuals) // 2
-    left.plot(x, residuals["median"].iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)

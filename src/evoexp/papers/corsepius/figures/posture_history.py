@@ -76,7 +76,7 @@ def draw_history(table: pd.DataFrame) -> Figure:
         panels = [
             (table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)
         ]
-    figure, places = style.lines_of_panels(2.1 if many else 2.4, len(panels), PER_LINE, 0.8)
+    figure, places = style.panels(2.1 if many else 2.4, len(panels), PER_LINE, 0.8)
     drawn: list[Axes] = []
     for axes, (chosen, title, quantity) in zip(places, panels, strict=True):
         rows = table[chosen & (table["quantity"] == quantity)]

@@ -115,8 +115,11 @@ def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> li
     for k, (shape, placement) in enumerate(obstacle_shapes(obstacles)):
         name, held = problem.task.names[k], k == span.stage.situation.held
         for instant in [first, span.last] if held else [span.last]:
-            where = _held_pose(problem, span, postures[instant]) if held else placement
-            found, element = solids.solid(shape, where), HELD if held else OBSTACLE
+            if held:
+                grasp, posture = span.stage.situation.grasp, postures[instant]
+                pose = frame_pose(problem.assembly.table, problem.tool[0], grasp, posture)
+                placement = pin.SE3(pose[:9].reshape(3, 3), pose[9:])
+            found, element = solids.solid(shape, placement), HELD if held else OBSTACLE
             rows += [_row(element, instant, name) | found] if found else []
     return rows
 
@@ -125,13 +128,6 @@ def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any
     """Return a row with a place, or with the two ends of a link."""
     row = {"element": element, "instant": instant, "name": name}
     return row | dict(zip([*PLACE, *PATH], places, strict=False))
-
-
-def _held_pose(problem: Problem, span: Span, posture: FloatArray) -> pin.SE3:
-    """Return the pose of the held object at a posture (nq,) [rad]."""
-    joint, _ = problem.tool
-    pose = frame_pose(problem.assembly.table, joint, span.stage.situation.grasp, posture)
-    return pin.SE3(pose[:9].reshape(3, 3), pose[9:])
 
 
 def _points(rows: pd.DataFrame) -> FloatArray:
@@ -201,7 +197,7 @@ def scope_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_scope(table: pd.DataFrame) -> Figure:
     """Draw the boxes, and the places that the tool can reach."""
-    figure, (left, right) = style.row_of_panels(3.4, 2)
+    figure, (left, right) = style.panels(3.4, 2)
     path, reach, tool = (table[table["element"] == element] for element in (POSTURE, REACH, WAY))
     blue, last = style.arm_colour(0), max(1, len(path) - 1)
     for row in records(path):
@@ -221,7 +217,7 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     _draw_ends(right, tool)
     style.operational_axes(right, table["length_unit"].iloc[0])
     right.set(title="b  the tool, one step from the start", **EQUAL)
-    style.legend_below(figure, right, 6)
+    style.legend_below(figure, [right], 6)
     return figure
 
 

@@ -36,12 +36,8 @@ def stuck_pair(obstructed: Conditions) -> Conditions:
     """Return a task of one phase in which runs get stuck, and with sub-goals, solved; or none."""
     pairs = (
         (stuck, helped)
-        for helped in obstructed
-        for stuck in obstructed
-        if stuck.solved < stuck.done
-        and helped.solved > 0
-        and len(measures.phase_names(stuck)) == 1
-        and measures.only_subgoals_differ(stuck, helped)
+        for stuck, helped in measures.subgoal_pairs(obstructed)
+        if stuck.solved < stuck.done and helped.solved > 0 and len(stuck.scenario.phases) == 1
     )
     return next(pairs, ())
 
@@ -53,17 +49,31 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     postures, by the only phase of the task without sub-goals.
     """
     rows: Rows = []
+    planner, problem = stuck.prepared
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
-        wanted, found = solved(condition) == (series == HELPED), measures.paths(condition)
-        for replicate in condition.summaries.index[wanted]:
-            rows += _way(stuck, series, int(replicate), found[replicate])
+        is_shown, paths = solved(condition) == (series == HELPED), measures.paths(condition)
+        for replicate in condition.summaries.index[is_shown]:
+            path = paths[replicate]
+            judged, places = planner.cost(problem, path.T), tool_places(problem, path)
+            of_run = {"element": TOOL, "series": series, "replicate": int(replicate)}
+            for n, place in enumerate(places):
+                distance = abs(judged.named_terms(n)["goal_distance"])
+                at = dict(zip("xyz", place, strict=True))
+                rows.append(of_run | {"order": n, "value": distance} | at)
     median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
     failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
-    rows += [*_cells(stuck, failed[-1], a, b), *_escape(stuck, failed[-1])]
-    problem = measures.problem(stuck)
-    last, situation = len(problem.phases) - 1, problem.first_situation
-    stage = problem.begin(last, problem.start, situation)
+    rows += _cells(stuck, failed[-1], a, b)
+    # the least cost of random postures in boxes around that posture, and its own cost
+    rng, end = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED)), failed[-1]
+    (own,) = _cost(stuck, end[:, None])
+    for n, half in enumerate(BOXES):
+        low, high = _box(problem, end, half)
+        q = low[:, None] + (high - low)[:, None] * rng.random((len(end), SAMPLES))
+        least_cost = np.fmin.reduce(_cost(stuck, q))  # NaN if none is feasible
+        rows.append({"element": ESCAPE, "order": n, "x": half, "y": own, "value": least_cost})
+    situation = problem.first_situation
+    stage = problem.begin(len(problem.phases) - 1, problem.start, situation)
     goal = dict(zip("xyz", stage.target_position, strict=True))
     rows.append({"element": GOAL, "order": 0} | goal)
     shapes = obstacle_shapes(problem.placed_obstacles(situation))
@@ -81,19 +91,6 @@ def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
     return np.where(np.isinf(cost), np.nan, cost)
 
 
-def _way(condition: ConditionResults, series: str, replicate: int, q: FloatArray) -> Rows:
-    """Return the places of the tool along a path, and its distances to the goal."""
-    planner, problem = condition.prepared
-    judged = planner.cost(problem, q.T)
-    given = {"element": TOOL, "series": series, "replicate": replicate}
-    return [
-        given
-        | {"order": n, "value": abs(judged.named_terms(n)["goal_distance"])}
-        | dict(zip("xyz", place, strict=True))
-        for n, place in enumerate(tool_places(problem, q))
-    ]
-
-
 def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
     """Return the cost over two joints, the others as at the end of the run that is stuck."""
     problem = measures.problem(condition)
@@ -105,18 +102,6 @@ def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows
     same = {"element": CELL, "scope_deg": problem.scope[a] / DEGREE} | ends
     cells = zip(q[a] / DEGREE, q[b] / DEGREE, _cost(condition, q), strict=True)
     return [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
-
-
-def _escape(condition: ConditionResults, end: FloatArray) -> Rows:
-    """Return the least cost of random postures in boxes around a posture, and its own cost."""
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    (own,), rows = _cost(condition, end[:, None]), list[dict[str, object]]()
-    for n, half in enumerate(BOXES):
-        low, high = _box(measures.problem(condition), end, half)
-        q = low[:, None] + (high - low)[:, None] * rng.random((len(end), SAMPLES))
-        least_cost = np.fmin.reduce(_cost(condition, q))  # NaN if none is feasible
-        rows.append({"element": ESCAPE, "order": n, "x": half, "y": own, "value": least_cost})
-    return rows
 
 
 def _box(problem: Problem, q: FloatArray, scopes: float) -> tuple[FloatArray, FloatArray]:
@@ -156,7 +141,18 @@ def draw_trap(table: pd.DataFrame) -> Figure:
         ylim=(0.0, None),
     )
     _draw_landscape(figure, land, cells)
-    _draw_ways_out(escape, escapes)
+    # the least cost in boxes around the posture that is stuck
+    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    escape.axhline(escapes["y"].iloc[0], label="stuck", **look)
+    escape.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
+    escape.set_xscale("log", base=2)
+    escape.xaxis.set_major_formatter("{x:g}")
+    escape.set(
+        xlabel="half the edge of the box [scopes]",
+        ylabel="least cost found in it [-]",
+        title="d  random postures around it",
+        ylim=(0.0, None),
+    )
     keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
     style.keys_below(figure, keys)
     return figure
@@ -176,18 +172,3 @@ def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
     first, second = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
     title = "c  cost around a stuck posture (×), its scope"
     axes.set(xlabel=first, ylabel=second, title=title, facecolor="#c8c8c8")
-
-
-def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
-    """Draw the least cost in boxes around the posture that is stuck."""
-    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
-    axes.axhline(escapes["y"].iloc[0], label="stuck", **look)
-    axes.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
-    axes.set_xscale("log", base=2)
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.set(
-        xlabel="half the edge of the box [scopes]",
-        ylabel="least cost found in it [-]",
-        title="d  random postures around it",
-        ylim=(0.0, None),
-    )

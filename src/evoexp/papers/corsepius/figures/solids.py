@@ -94,11 +94,7 @@ def space(
 
 
 def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
-    """Return bodies and covers of robots at their start.
-
-    Args:
-        shown: (title, a condition of the robot).
-    """
+    """Return bodies and covers of robots at their start, of (title, a condition of the robot)."""
     rows: list[tuple[Any, ...]] = []
     for position, (title, c) in enumerate(shown):
         problem = measures.problem(c)
@@ -111,8 +107,11 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
         ]
         joints = (data.oMi[item.parentJoint] for item in geometry.geometryObjects)
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
-            capsules = zip(cover.start, cover.end, cover.radius, strict=True)
-            own += [(COVER, name, *_capsule(joint, *capsule)) for capsule in capsules]
+            for start, end, radius in zip(cover.start, cover.end, cover.radius, strict=True):
+                pose, length = surfaces.capsule(start, end)
+                middle, turn = joint.act(pose.translation), (joint.rotation @ pose.rotation).ravel()
+                sizes = radius, 0.5 * length, 0.0
+                own.append((COVER, name, ROD if length else BALL, *middle, *turn, *sizes))
         unit = c.length_unit
         rows += [(position, title, *row, bodies.inflation, unit) for row in own]
     return rounded(
@@ -145,14 +144,3 @@ def draw_models(table: pd.DataFrame) -> Figure:
                 draw_solid(axes, row, style.arm_colour(k), alpha)
             axes.set_title(title)
     return figure
-
-
-def _capsule(joint: Any, start: FloatArray, stop: FloatArray, radius: float) -> tuple[Any, ...]:
-    """Return a sphere, or a capsule between two points, given in a joint's frame."""
-    along, middle = np.asarray(stop) - np.asarray(start), 0.5 * (np.asarray(start) + stop)
-    half = 0.5 * float(np.sqrt((along**2).sum()))
-    shape, turn = BALL, np.eye(3)
-    if half > 0.0:
-        axis = np.array([0.0, 0.0, 1.0])
-        shape, turn = ROD, pin.Quaternion.FromTwoVectors(axis, along).matrix()
-    return (shape, *joint.act(middle), *(joint.rotation @ turn).ravel(), radius, half, 0.0)

@@ -22,7 +22,7 @@ def draw_shares(table: pd.DataFrame) -> Figure:
     corners = list(dict.fromkeys(table["corner"]))
     numbers = list(dict.fromkeys(table["elites"]))
     measures = list(dict.fromkeys(table["measure"]))
-    figure, panels = style.row_of_panels(0.42 * len(corners) + 1.6, len(measures), sharey=True)
+    figure, panels = style.panels(0.42 * len(corners) + 1.6, len(measures), sharey=True)
     for axes, measure in zip(panels, measures, strict=True):
         for edge, line in ((0.0, "-"), (ALL, (0, (4, 2)))):
             axes.axvline(edge, color=style.FAINT, linewidth=0.9, linestyle=line, zorder=1)

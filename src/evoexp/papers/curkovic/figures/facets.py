@@ -1,6 +1,5 @@
 """Many conditions in panels of few: the best cost so far, and runs that have reached a cost."""
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from evoexp.report.results.run_measures import grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import quantile
 
-Trait = Callable[[ConditionResults], str]
 MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own
 LEGEND: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (-0.02, -0.2), "ncols": 2}
 LEGEND |= {"fontsize": 6.5}
@@ -28,15 +26,31 @@ def facets(results: Results) -> dict[str, dict[str, ConditionResults]]:
     Returns title of a panel (empty if there is one only) → its conditions by the parts of their
     labels that differ within the panel.
     """
-    traits = [t for t in (_substeps, _direction) if len(set(map(t, results.with_data))) > 1]
-    found = _divided(results, traits)
+
+    def direction(condition: ConditionResults) -> str:
+        return DIRECTIONS[condition.planner.ga.mutation_direction]
+
+    def rate(condition: ConditionResults) -> str:
+        ga = condition.planner.ga
+        return "Eq. 10" if ga.mutation_decay else f"constant rate {ga.mutation_rate:g}"
+
+    def title(condition: ConditionResults) -> str:
+        return ", ".join(trait(condition) for trait in traits)
+
+    traits = [t for t in (_substeps, direction) if len(set(map(t, results.with_data))) > 1]
+    found = grouped(results.with_data, title)
     if max(map(len, found)) > MOST:
-        traits.append(_rate)
-        found = _divided(results, traits)
-    return {
-        ", ".join(trait(own[0]) for trait in traits): dict(zip(_short(own), own, strict=True))
-        for own in found
-    }
+        traits.append(rate)
+        found = grouped(results.with_data, title)
+    divided = {}
+    for own in found:
+        parts = [c.label.split(", ") for c in own]
+        everywhere = set(parts[0]).intersection(*parts[1:]) if len(parts) > 1 else set[str]()
+        names = [
+            ", ".join(p for p in one if p not in everywhere) or ", ".join(one) for one in parts
+        ]
+        divided[title(own[0])] = dict(zip(names, own, strict=True))
+    return divided
 
 
 def facet_table(results: Results, threshold: float) -> pd.DataFrame:
@@ -92,7 +106,7 @@ def draw_effort(table: pd.DataFrame) -> Figure:
 def _panels(table: pd.DataFrame) -> tuple[Figure, list[Axes]]:
     count = table["panel"].nunique()
     names = int(table.groupby("panel")["name"].nunique().max())
-    figure, panels = style.lines_of_panels(2.4 + 0.09 * names, count, 2, 0.0)
+    figure, panels = style.panels(2.4 + 0.09 * names, count, 2)
     for axes in panels[1:]:
         axes.sharex(panels[0])
         axes.sharey(panels[0])
@@ -114,26 +128,6 @@ def _medians(rows: Any, column: str) -> FloatArray:
     return np.array([quantile(own.to_numpy(np.float64), 0.5) for _, own in rows[column]])
 
 
-def _divided(results: Results, traits: Sequence[Trait]) -> tuple[tuple[ConditionResults, ...], ...]:
-    return grouped(results.with_data, lambda c: [trait(c) for trait in traits])
-
-
-def _short(conditions: Sequence[ConditionResults]) -> list[str]:
-    """Return labels without the parts that all of them have."""
-    parts = [c.label.split(", ") for c in conditions]
-    everywhere = set(parts[0]).intersection(*parts[1:]) if len(parts) > 1 else set[str]()
-    return [", ".join(p for p in own if p not in everywhere) or ", ".join(own) for own in parts]
-
-
 def _substeps(condition: ConditionResults) -> str:
     substeps = condition.planner.collision.collision_substeps
     return "configurations only" if substeps == 1 else f"{substeps} substeps"
-
-
-def _direction(condition: ConditionResults) -> str:
-    return DIRECTIONS[condition.planner.ga.mutation_direction]
-
-
-def _rate(condition: ConditionResults) -> str:
-    ga = condition.planner.ga
-    return "Eq. 10" if ga.mutation_decay else f"constant rate {ga.mutation_rate:g}"

@@ -62,7 +62,24 @@ def draw_intersection(table: pd.DataFrame) -> Figure:
         float(np.hypot(rows[v].x_end - rows[v].x, rows[v].y_end - rows[v].y)) for v in VECTORS
     )
     for k, name in enumerate(VECTORS):
-        _vector(axes, rows[name], style.arm_colour(k // 2), k + 1, size)
+        row, colour = rows[name], style.arm_colour(k // 2)
+        look: dict[str, Any] = {"color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
+        arrow = {"arrowstyle": "-|>", **look}
+        axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow)
+        # a line for the limits of the axes
+        axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1)
+        away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
+        name_look: dict[str, Any] = {"va": "center", "color": colour, "weight": "bold"}
+        marks.write(axes, row.element, _middle(row), tuple(away), **name_look)
+        # the angle from +x
+        radius, half = 0.2 * size, np.radians(0.5 * row.angle_deg)
+        faint: dict[str, Any] = {"color": style.FAINT, "linewidth": 0.9, "zorder": 1}
+        axes.plot([row.x, row.x + 1.5 * radius], [row.y, row.y], ":", **faint)
+        arc: dict[str, Any] = {"theta1": 0.0, "theta2": row.angle_deg, "color": colour, "lw": 0.9}
+        axes.add_patch(Arc((row.x, row.y), 2 * radius, 2 * radius, **arc))
+        text = f"φ{str(k + 1).translate(style.SUBSCRIPTS)} = {row.angle_deg:.0f}°"
+        place = row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)
+        axes.annotate(text, place, ha="left", va="center", color=colour, fontsize=7)
     # the distance of the bases, the first joints, and the crossing
     base, point = rows["base"], rows["point"]
     arrow = {"arrowstyle": "<->", "shrinkB": 0}
@@ -79,27 +96,6 @@ def draw_intersection(table: pd.DataFrame) -> Figure:
     axes.margins(0.12)
     figure.supxlabel("O₁P = μ b,  O₂P = ν d;  they cross where both lie in [0, 1]", fontsize=8)
     return figure
-
-
-def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
-    """Draw one link as a vector with its name and its angle from +x."""
-    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow)
-    # a line for the limits of the axes
-    axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1)
-    away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
-    marks.write(
-        axes, row.element, _middle(row), tuple(away), va="center", color=colour, weight="bold"
-    )
-    # the angle from +x
-    radius, half = 0.2 * size, np.radians(0.5 * row.angle_deg)
-    look: dict[str, Any] = {"color": style.FAINT, "linewidth": 0.9, "zorder": 1}
-    axes.plot([row.x, row.x + 1.5 * radius], [row.y, row.y], ":", **look)
-    arc: dict[str, Any] = {"theta1": 0.0, "theta2": row.angle_deg, "color": colour, "lw": 0.9}
-    axes.add_patch(Arc((row.x, row.y), 2 * radius, 2 * radius, **arc))
-    text = f"φ{str(number).translate(style.SUBSCRIPTS)} = {row.angle_deg:.0f}°"
-    place = row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)
-    axes.annotate(text, place, ha="left", va="center", color=colour, fontsize=7)
 
 
 def _middle(row: Any) -> tuple[float, float]:

@@ -1,6 +1,5 @@
 """Best costs of methods side by side (Curkovic et al. 2013, Fig. 6): curves, boxes of all runs."""
 
-from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evoexp.papers.curkovic import measures
+from evoexp.papers.curkovic.claims import PAIRS
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.results.stored_results import Results
@@ -122,18 +122,9 @@ def run_keys() -> list[Line2D]:
 ORDER += ["deviation", "replicates", "refuted"]
 
 
-def methods_table(
-    results: Results, pairs: Sequence[tuple[str, str]], bound: float, threshold: float
-) -> pd.DataFrame:
-    """Return best costs so far per generation, and at the end.
-
-    Args:
-        results: With data.
-        pairs: Labels of matched methods, with hall and without, which share a panel.
-        bound: Lower bound of the cost.
-        threshold: Cost that counts as reached.
-    """
-    panels = {label: k for k, pair in enumerate(pairs) for label in pair}
+def methods_table(results: Results, bound: float, threshold: float) -> pd.DataFrame:
+    """Return best costs so far per generation, and at the end, and two costs to compare with."""
+    panels = {label: k for k, pair in enumerate(PAIRS) for label in pair}
     parts = []
     for position, c in enumerate(results.with_data):
         costs = c.generations.pivot(index="index", columns="replicate", values="best_cost")
@@ -158,7 +149,7 @@ def methods_table(
         own: dict[str, Any] = {
             "position": position,
             "method": c.label,
-            "panel": panels.get(c.label, len(pairs)),
+            "panel": panels.get(c.label, len(PAIRS)),
             "hall": bool(c.planner.ga.hall_depth),
         }
         parts += [part.assign(**own) for part in (curve, final)]
@@ -176,7 +167,18 @@ def draw_methods(table: pd.DataFrame) -> Figure:
     above, below = halves
     row = above.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
     for axes, panel in zip(row, panels, strict=True):
-        _pair(axes, curves[curves["panel"] == panel])
+        pair, names = curves[curves["panel"] == panel], []
+        for _, rows in groups(pair, "position"):
+            colour, kind = (WITH, "-") if rows["hall"].iloc[0] else (WITHOUT, DASHED)
+            names.append(str(rows["method"].iloc[0]))
+            x, mean, deviation = (
+                rows[name].to_numpy(np.float64) for name in ("generation", "value", "deviation")
+            )
+            marks.band(axes, x, mean - deviation, mean + deviation, colour, alpha=0.2)
+            axes.plot(x, mean, color=colour, linestyle=kind)
+        axes.set_xlim(0, max(1.0, float(pair["generation"].max())))
+        axes.set(xlabel="generation", title=" and ".join(names))
+        axes.xaxis.set_major_locator(style.few_ticks())
         _lines(axes, table)
     row[0].set_ylabel("best C₂ + C₃ + C₄ of a team")
     above.suptitle(
@@ -202,23 +204,6 @@ def draw_methods(table: pd.DataFrame) -> Figure:
     ]
     style.keys_below(below, keys, 4)
     return figure
-
-
-def _pair(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw the curves of a matched pair of methods."""
-    names = []
-    for _, rows in groups(table, "position"):
-        hall = bool(rows["hall"].iloc[0])
-        colour, kind = (WITH, "-") if hall else (WITHOUT, DASHED)
-        names.append(str(rows["method"].iloc[0]))
-        x, mean, deviation = (
-            rows[name].to_numpy(np.float64) for name in ("generation", "value", "deviation")
-        )
-        marks.band(axes, x, mean - deviation, mean + deviation, colour, alpha=0.2)
-        axes.plot(x, mean, color=colour, linestyle=kind)
-    axes.set_xlim(0, max(1.0, float(table["generation"].max())))
-    axes.set(xlabel="generation", title=" and ".join(names))
-    axes.xaxis.set_major_locator(style.few_ticks())
 
 
 def _lines(axes: Axes, table: pd.DataFrame) -> None:

@@ -1,10 +1,10 @@
 """Curves along motions: link angles and speeds (Fig. 9, Eq. 2), least distances of bodies."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -53,7 +53,23 @@ def draw_joints(table: pd.DataFrame) -> Figure:
     figure = style.figure(1.9 * len(robots) + 1.0)
     panels = figure.subplots(len(robots), 2, sharex=True, squeeze=False)
     for (angles, turns), robot in zip(panels, robots, strict=True):
-        _robot(angles, turns, table[table["robot"] == robot], style.arm_colour(int(robot)))
+        own, colour = table[table["robot"] == robot], style.arm_colour(int(robot))
+        low, high = float(own["angle_deg"].min()), float(own["angle_deg"].max())
+        for edge in (0.0, HALF_TURN):
+            angles.axhline(edge, color=style.FORBIDDEN, linewidth=0.9, zorder=1)
+        ends = min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0
+        angles.set(ylim=ends, yticks=[0, 60, 120, 180])
+        for link, rows in groups(own, "link"):
+            kind = KINDS[int(link)]
+            angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
+            turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
+            at = rows[rows["at_configuration"]]
+            angles.plot(at["instant"], at["angle_deg"], "o", color=colour, **style.DOTS)
+            limit = float(rows["limit_deg"].iloc[0])
+            turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
+            told = f"link {int(link) + 1}: {limit:.1f}°"
+            marks.beside(turns, limit, told, va="bottom" if link else "top")  # they may be close
+        turns.set_ylim(bottom=0.0)
         angles.set_ylabel(f"robot {robot + 1}: link angle [deg]")
         turns.set_ylabel("turn per step [deg]")
     for axes, title in zip(
@@ -75,63 +91,37 @@ def draw_joints(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
-    low, high = float(table["angle_deg"].min()), float(table["angle_deg"].max())
-    for edge in (0.0, HALF_TURN):
-        angles.axhline(edge, color=style.FORBIDDEN, linewidth=0.9, zorder=1)
-    ends = min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0
-    angles.set(ylim=ends, yticks=[0, 60, 120, 180])
-    for link, rows in groups(table, "link"):
-        kind = KINDS[int(link)]
-        angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
-        turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
-        at = rows[rows["at_configuration"]]
-        angles.plot(at["instant"], at["angle_deg"], "o", color=colour, **style.DOTS)
-        limit = float(rows["limit_deg"].iloc[0])
-        turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
-        # the limits may be close
-        marks.beside(
-            turns, limit, f"link {int(link) + 1}: {limit:.1f}°", va="bottom" if link else "top"
-        )
-    turns.set_ylim(bottom=0.0)
-
-
 def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
     """Return the bodies' least distance: range over all motions, best replicate, straight line."""
     parts = []
     for position, c in enumerate(conditions):
         columns = {"condition": c.label, "position": position}
         counts = {"replicates": c.done, "refuted": len(motion_geometry.refuted(c))}
-        for name, distances in _series(c, samples).items():
-            columns["series"] = name
-            instants = np.arange(len(distances)) / samples
-            parts.append(
-                pd.DataFrame(columns | {"instant": instants, "distance": distances} | counts)
-            )
-    return rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=conditions[0].length_unit
-    )
+        scene = c.problem(Problem).scene
+        distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
+        quick = motion_geometry.distance_measure(scene, distance)
+        sampled = partial(_sampled, c, samples=samples)
+        motions = motion_geometry.extremes(list(c.solutions), sampled, [quick])
+        series = {
+            LOWEST: motions[0].at_lowest,
+            HIGHEST: motions[0].at_highest,
+            BEST: sampled(c.best_replicate),
+            STRAIGHT: sampled(None),
+        }
+        for name, q in series.items():
+            instants = np.arange(q.shape[1]) / samples
+            values = {"series": name, "instant": instants, "distance": distance(q)}
+            parts.append(pd.DataFrame(columns | values | counts))
+    table = rounded(pd.concat(parts, ignore_index=True))
+    return table.assign(length_unit=conditions[0].length_unit)
 
 
-def _series(condition: ConditionResults, samples: int) -> dict[str, FloatArray]:
-    """Return the distances of each series, (instants,) [length unit]."""
-    prepared, solutions = condition.prepared, condition.solutions
-    scene = condition.problem(Problem).scene
-    distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
-    quick = motion_geometry.distance_measure(scene, distance)
-
-    def sampled(solution: FloatArray) -> FloatArray:
-        executed = link_motions.executed(prepared, solution)
-        return DEGREE * link_motions.sampled(executed, samples).q
-
-    (found,) = motion_geometry.extremes(list(solutions), lambda k: sampled(solutions[k]), [quick])
-    series = {
-        LOWEST: found.at_lowest,
-        HIGHEST: found.at_highest,
-        BEST: sampled(solutions[condition.best_replicate]),
-        STRAIGHT: sampled(link_motions.straight(prepared)),
-    }
-    return {name: distance(q) for name, q in series.items()}
+def _sampled(condition: ConditionResults, replicate: int | None, samples: int) -> FloatArray:
+    """Return a replicate's motion, or the straight one, (nq, instants) [rad]."""
+    c = condition
+    solution = link_motions.straight(c.prepared) if replicate is None else c.solutions[replicate]
+    executed = link_motions.executed(c.prepared, solution)
+    return DEGREE * link_motions.sampled(executed, samples).q
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:

@@ -8,7 +8,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.evolution.pareto import pareto_front
-from evoexp.papers.curkovic import measures
 from evoexp.records import FloatArray, FrontRow
 from evoexp.report.figures import groups, marks, rounded, style
 from evoexp.report.pages.page_parts import Quantity
@@ -96,7 +95,7 @@ def front_conditions(results: Results) -> list[tuple[ConditionResults, str]]:
     return [
         (c, f"_{results.position(c.label) + 1}" if several else "")
         for c in results.with_data
-        if measures.fits(results) and fronts(c).get(c.best_replicate)
+        if fronts(c).get(c.best_replicate)
     ]
 
 
@@ -110,34 +109,27 @@ def front_sizes(results: Results) -> Iterator[Quantity]:
     found = {c.label: fronts(c) for c in results.with_data}
     most = max(len(rows) for own in found.values() for rows in own.values())
     for population in range(most):
-        yield Quantity(
-            f"individuals on the front of robot {population + 1}'s population",
-            "–",
-            {label: spread(_sizes(own, population)) for label, own in found.items()},
-        )
+        name = f"individuals on the front of robot {population + 1}'s population"
+        sizes = {label: spread(_sizes(own, population)) for label, own in found.items()}
+        yield Quantity(name, "–", sizes)
 
 
-def _size(front: FrontRow) -> int:
-    return int(pareto_front(np.ascontiguousarray(front.criteria.T)).sum())
-
-
-def _sizes(fronts: Fronts, population: int) -> FloatArray:
-    """Return the number of individuals on the front of a population, (replicates,)."""
-    return np.array(
-        [_size(rows[population]) for rows in fronts.values() if population < len(rows)],
-        dtype=np.float64,
-    )
+def _sizes(fronts: Fronts, population: int | None = None) -> FloatArray:
+    """Return the numbers of individuals on the fronts of a population, or of all, (fronts,)."""
+    sizes = [
+        float(pareto_front(np.ascontiguousarray(front.criteria.T)).sum())
+        for rows in fronts.values()
+        for number, front in enumerate(rows)
+        if population in (None, number)
+    ]
+    return np.array(sizes)
 
 
 def large_fronts(condition: ConditionResults, fronts: Fronts) -> Proportion:
     """Count the fronts that are larger than the hall of fame may be."""
-    return counted(_all_sizes(fronts) > condition.planner.ga.num_hall_teams)
+    return counted(_sizes(fronts) > condition.planner.ga.num_hall_teams)
 
 
 def single_fronts(fronts: Fronts) -> Proportion:
     """Count the fronts of a single point."""
-    return counted(_all_sizes(fronts) == 1)
-
-
-def _all_sizes(fronts: Fronts) -> np.ndarray:
-    return np.array([_size(front) for rows in fronts.values() for front in rows])
+    return counted(_sizes(fronts) == 1)

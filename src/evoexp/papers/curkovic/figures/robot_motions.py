@@ -30,7 +30,20 @@ DASHES: Any = (0, (2, 1))
 def motion_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the trail of the best replicate, and end-effector paths and contacts of all."""
     prepared, best = condition.prepared, condition.best_replicate
-    parts = [_obstacles(condition)]
+    outlines = motion_geometry.obstacle_outlines(obstacle_table(condition.scenario.obstacles))
+    edges = [
+        (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
+        for k, outline in enumerate(outlines)
+        for a, b in itertools.pairwise(outline)
+    ]
+    # the first contacts of bodies in the motions that the exact verdict refutes
+    contacts = []
+    for replicate, (instant, pair) in motion_geometry.refuted(condition).items():
+        solution = condition.solutions[replicate]
+        place = motion_geometry.contact(prepared, solution, instant, pair)
+        contacts.append((CONTACT, replicate, -1, -1, instant, *place, *place, 0.0))
+    names = ["element", "replicate", *LINK]
+    parts = [pd.DataFrame(edges, columns=names)]
     for replicate, solution in condition.solutions.items():
         motion = link_motions.executed(prepared, solution)
         parts.append(
@@ -41,16 +54,21 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
                 _links(prepared, link_motions.sampled(motion, samples)).assign(element=element)
                 for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1))
             ]
-    parts.append(_contacts(condition))
+    parts.append(pd.DataFrame(contacts, columns=names))
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
         best=best, length_unit=condition.length_unit
     )
-    return table[["element", "replicate", *LINK, "best", "length_unit"]]
+    return table[[*names, "best", "length_unit"]]
 
 
 def draw_motion(table: pd.DataFrame) -> Figure:
     """Draw the best replicate's motion as a trail of postures, beside it all end-effectors."""
-    (left, right), (low, high) = _limits(table)
+    limits = []
+    for name in "xy":
+        values = table[[name, f"{name}_end"]].to_numpy()
+        pad = 0.05 * float(np.ptp(values)) + float(table["radius"].max())
+        limits.append((float(values.min()) - pad, float(values.max()) + pad))
+    (left, right), (low, high) = limits
     figure = style.figure(min(4.6, 3.3 * (high - low) / (right - left)) + 1.0)
     trail, paths = figure.subplots(1, 2, sharex=True, sharey=True)
     best, unit = table["best"].iloc[0], table["length_unit"].iloc[0]
@@ -72,7 +90,18 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     trail.set_title(f"a  motion of replicate {best}")
     paths.set_title(f"b  end-effectors, all replicates (n = {path['replicate'].nunique()})")
     trail.set(xlim=(left, right), ylim=(low, high))
-    style.keys_below(figure, _keys(table, len(contacts)), 4)
+    grey, red = style.NEUTRAL, style.FORBIDDEN
+    robots = sorted(path["robot"].unique())
+    keys = [
+        *style.arm_keys(robots, "robot", linewidth=3),
+        style.key("start posture", color=grey, linewidth=2, linestyle=DASHES),
+        style.key("goal posture", color=grey, linewidth=3, marker="o", ms=4),
+        *_end_keys(),
+    ]
+    if len(contacts):
+        told = f"first contact of bodies (refuted: {len(contacts)})"
+        keys.append(marks.point_key(told, "X", 8, color=red, mec="white"))
+    style.keys_below(figure, keys, 4)
     return figure
 
 
@@ -156,28 +185,6 @@ def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFra
     return tips.assign(element=PATH, x=before["x_end"], y=before["y_end"])
 
 
-def _contacts(condition: ConditionResults) -> pd.DataFrame:
-    """Return the first contacts of bodies in the motions that the exact verdict refutes."""
-    rows = []
-    for replicate, (instant, pair) in motion_geometry.refuted(condition).items():
-        x, y = motion_geometry.contact(
-            condition.prepared, condition.solutions[replicate], instant, pair
-        )
-        rows.append((CONTACT, replicate, -1, -1, instant, x, y, x, y, 0.0))
-    return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
-
-
-def _obstacles(condition: ConditionResults) -> pd.DataFrame:
-    """Return the outlines of the obstacles."""
-    table = obstacle_table(condition.scenario.obstacles)
-    rows = [
-        (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
-        for k, outline in enumerate(motion_geometry.obstacle_outlines(table))
-        for a, b in itertools.pairwise(outline)
-    ]
-    return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
-
-
 def _trail(axes: Axes, table: pd.DataFrame) -> None:
     """Draw postures, and at configurations the boundaries of thick links and tools."""
     postures, at = table[table["element"] == POSTURE], table[table["element"] == CONFIGURATION]
@@ -210,32 +217,9 @@ def _ends(axes: Axes, path: pd.DataFrame) -> None:
     axes.plot(x_end, y_end, "x", color=style.NEUTRAL, markersize=7, markeredgewidth=1.8, zorder=6)
 
 
-def _limits(table: pd.DataFrame) -> tuple[tuple[float, float], tuple[float, float]]:
-    found = []
-    for name in "xy":
-        values = table[[name, f"{name}_end"]].to_numpy()
-        pad = 0.05 * float(np.ptp(values)) + float(table["radius"].max())
-        found.append((float(values.min()) - pad, float(values.max()) + pad))
-    return found[0], found[1]
-
-
 def _end_keys() -> list[Line2D]:
     grey = style.NEUTRAL
     return [
         style.key("start of an end-effector", marker="o", mec=grey, mfc="white", linestyle="none"),
         marks.point_key("its goal", "x", 7, color=grey, mew=1.8),
-    ]
-
-
-def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
-    grey, red = style.NEUTRAL, style.FORBIDDEN
-    robots = sorted(table.loc[table["element"] == PATH, "robot"].unique())
-    told = f"first contact of bodies (refuted: {contacts})"
-    contact = marks.point_key(told, "X", 8, color=red, mec="white")
-    return [
-        *style.arm_keys(robots, "robot", linewidth=3),
-        style.key("start posture", color=grey, linewidth=2, linestyle=DASHES),
-        style.key("goal posture", color=grey, linewidth=3, marker="o", ms=4),
-        *_end_keys(),
-        *([contact] if contacts else []),
     ]

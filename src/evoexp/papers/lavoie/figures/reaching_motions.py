@@ -83,16 +83,19 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
     """Return scenes, postures and contacts."""
     parts = []
     for panel, one in enumerate(shown):
-        rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]
-        end = one.condition.length_unit
-        parts += [(panel, one.title, *row, end) for row in rows]
+        unit = one.condition.length_unit
+        rows = [*_scene(one.condition), *_postures(one)]
+        parts += [(panel, one.title, *row, unit) for row in rows]
     return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
     """Draw every scene with its postures, and below each motion a close view of its box."""
     panels = [rows for _, rows in groups(table, "panel")]
-    ratios = [x / y for x, y in map(_span, panels)]
+    spans = [
+        [float(np.ptp(rows[[name, f"{name}_end"]].to_numpy())) for name in "xy"] for rows in panels
+    ]
+    ratios = [wide / high for wide, high in spans]
     moving = bool((table["sub_path"] > 0).any())
     height = min(4.6, 6.1 / sum(ratios))
     figure = style.figure(height + (3.6 if moving else 0.0) + 1.0)
@@ -107,9 +110,28 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
             marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9)
         whole.set_title(rows["title"].iloc[0])
         whole.margins(0.06)
-        for axes in close:
-            _near_the_box(axes, rows)
-    style.keys_below(figure, _keys(table), 3)
+        shown = rows[rows["element"].isin([BOX, TARGET])]
+        for axes in close:  # the surroundings of box and targets only
+            for name in "xy":
+                values = shown[[name, f"{name}_end"]].to_numpy()
+                pad = AROUND * float(np.ptp(values))
+                axes.set(**{f"{name}lim": (float(values.min()) - pad, float(values.max()) + pad)})
+            axes.set_title("around the box", fontweight="normal")
+    moved = sorted(set(table.loc[table["element"] == LINK, "sub_path"]) - {0})
+    point: dict[str, Any] = {"linestyle": "none", "color": "black", "mec": "white", "ms": 9}
+    ends = {k: f"SP{k}, to posture {'AB'[k - 1]}" for k in moved}
+    keys = [
+        style.key("start posture", **START, marker="o", mfc="white", ms=4),
+        *(style.key(name, color=_colour(k), linewidth=2.6) for k, name in ends.items()),
+        Patch(facecolor=style.FAINT, label="ellipses"),
+        style.key("inside of the box", color=style.FAINT, **INSIDE),
+        *(style.key(name, marker=MARKERS[name], **point) for name in TARGETS),
+    ]
+    if (table["element"] == CONTACT).any():
+        cross: dict[str, Any] = {"color": style.FORBIDDEN, "mec": "white"}
+        keys.append(style.key("posture in contact, never tested", **TOUCH))
+        keys.append(marks.point_key("first contact of a sub-path", "X", 9, **cross))
+    style.keys_below(figure, keys, 3)
     return figure
 
 
@@ -132,16 +154,21 @@ def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
     return [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in rows]
 
 
-def _postures(one: ShownMotion) -> list[tuple[Any, ...]]:
-    """Return the links at the start, and at tested positions of both sub-paths."""
-    start = one.condition.problem(Problem).start
+def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
+    """Yield the links at the start, at tested positions of both sub-paths, and where they touch."""
+    c = one.condition
     if one.replicate is None:
-        return _links(one, LINK, np.zeros(1), start[:, None])
-    tested = int(one.condition.planner.collision.num_positions)
+        yield from _links(one, LINK, np.zeros(1), c.problem(Problem).start[:, None])
+        return
+    tested = int(c.planner.collision.num_positions)
     steps = np.arange(0, tested, -(-tested // MOST_POSTURES))[1:] / tested
     instants = np.concatenate([[0.0], steps, [1.0], 1.0 + steps, [2.0]])
-    motion = one.condition.motion(one.replicate)
-    return _links(one, LINK, instants, np.column_stack([motion.at(float(t)) for t in instants]))
+    motion, solution = c.motion(one.replicate), c.solutions[one.replicate]
+    yield from _links(one, LINK, instants, np.column_stack([motion.at(float(t)) for t in instants]))
+    for instant, pair in one.contacts:
+        place = motion_geometry.contact(c.prepared, solution, instant, pair)
+        yield (CONTACT, pair, 1 + int(instant >= 1.0), instant, -1, *place, *place, *NO_SIZE)
+        yield from _links(one, TOUCHING, np.array([instant]), motion.at(instant)[:, None])
 
 
 def _links(
@@ -154,22 +181,6 @@ def _links(
         for _, link, start, end in motion_geometry.joint_positions(assembly, q / DEGREE)
         for k, t in enumerate(instants)
     ]
-
-
-def _contacts(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
-    """Return the places at which bodies touch, and the postures at which they do."""
-    for instant, pair in one.contacts:
-        assert one.replicate is not None, "only motions touch"
-        solution, q = one.condition.solutions[one.replicate], one.condition.motion(one.replicate)
-        place = motion_geometry.contact(one.condition.prepared, solution, instant, pair)
-        yield (CONTACT, pair, 1 + int(instant >= 1.0), instant, -1, *place, *place, *NO_SIZE)
-        yield from _links(one, TOUCHING, np.array([instant]), q.at(instant)[:, None])
-
-
-def _span(rows: pd.DataFrame) -> tuple[float, float]:
-    """Return how wide and how high a scene is."""
-    x, y = (rows[[name, f"{name}_end"]].to_numpy() for name in "xy")
-    return float(np.ptp(x)), float(np.ptp(y))
 
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
@@ -188,16 +199,6 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
         axes.plot(row.x, row.y, MARKERS[row.name], ms=wide, **point)
 
 
-def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
-    """Show the surroundings of box and targets only."""
-    shown = rows[rows["element"].isin([BOX, TARGET])]
-    for name in "xy":
-        values = shown[[name, f"{name}_end"]].to_numpy()
-        pad = AROUND * float(np.ptp(values))
-        axes.set(**{f"{name}lim": (float(values.min()) - pad, float(values.max()) + pad)})
-    axes.set_title("around the box", fontweight="normal")
-
-
 def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
     """Draw the start in black, each sub-path in a colour of its own, its end strong."""
     for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
@@ -213,43 +214,16 @@ def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> Non
             axes.plot(x, y, color=colour, alpha=0.15 + 0.5 * share, linewidth=1.0, zorder=3)
         if element == LINK and sub_path > 0:
             axes.plot(x[-1], y[-1], ".", color=colour, markersize=4, zorder=7)
-        if element == LINK and instant == sub_path:
-            _draw_joints(axes, x, y, sub_path, sub_path in named)
+        if element == LINK and instant == sub_path:  # joints at the end of a sub-path
+            marks.hollow(axes, x[:-1], y[:-1], "o", colour, 3.6, mew=0.9, zorder=7)
+            if sub_path in named:
+                name, place, side = PLACES[sub_path]
+                look: dict[str, Any] = {"ha": side, "zorder": 10, "fontsize": 8, "color": colour}
+                marks.write(axes, name, (x[-1], y[-1]), place, path_effects=marks.HALO, **look)
     base = links[links["link"] == 0].iloc[0]
     marks.base(axes, base["x"], base["y"], 7, zorder=4)
-
-
-def _draw_joints(axes: Axes, x: list[float], y: list[float], sub_path: int, named: bool) -> None:
-    """Draw the joints of a posture at the end of a sub-path, and its name."""
-    colour = _colour(sub_path)
-    marks.hollow(axes, x[:-1], y[:-1], "o", colour, 3.6, mew=0.9, zorder=7)
-    if named:
-        name, place, side = PLACES[sub_path]
-        look: dict[str, Any] = {"ha": side, "zorder": 10, "fontsize": 8, "color": colour}
-        marks.write(axes, name, (x[-1], y[-1]), place, path_effects=marks.HALO, **look)
 
 
 def _colour(sub_path: int) -> str:
     """Return the colour of a sub-path; that of the start for 0."""
     return style.arm_colour(sub_path - 1) if sub_path else style.NEUTRAL
-
-
-def _keys(table: pd.DataFrame) -> list[Any]:
-    """Return the entries of the legend."""
-    moved = sorted(set(table.loc[table["element"] == LINK, "sub_path"]) - {0})
-    point: dict[str, Any] = {"linestyle": "none", "color": "black", "mec": "white", "ms": 9}
-    touching = [
-        style.key("posture in contact, never tested", **TOUCH),
-        marks.point_key("first contact of a sub-path", "X", 9, color=style.FORBIDDEN, mec="white"),
-    ]
-    return [
-        style.key("start posture", **START, marker="o", mfc="white", ms=4),
-        *(
-            style.key(f"SP{k}, to posture {'AB'[k - 1]}", color=_colour(k), linewidth=2.6)
-            for k in moved
-        ),
-        Patch(facecolor=style.FAINT, label="ellipses"),
-        style.key("inside of the box", color=style.FAINT, **INSIDE),
-        *(style.key(name, marker=MARKERS[name], **point) for name in TARGETS),
-        *(touching if (table["element"] == CONTACT).any() else ()),
-    ]

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from evoexp.papers.lavoie.measures import Percentage
 from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -25,8 +25,6 @@ DISTRIBUTION_COLUMNS = [
     *("series", "position", "condition", "error", "having", "total"),
     *("share", "lower", "upper"),
 ]
-Point = tuple[float, Proportion]
-"""(x, count of the paper's runs)."""
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart
 STOPPING_COLUMNS = [
@@ -49,7 +47,7 @@ def attempts_table(results: Results, confidence: float) -> pd.DataFrame:
 
 def draw_attempts(table: pd.DataFrame) -> Figure:
     """Draw one bar per number of attempts and arm, with intervals and counts."""
-    figure, (axes,) = style.row_of_panels(2.9, 1)
+    figure, (axes,) = style.panels(2.9)
     count = table["position"].nunique()
     width = 0.8 / count
     for k, (position, rows) in enumerate(groups(table, "position")):
@@ -66,14 +64,14 @@ def draw_attempts(table: pd.DataFrame) -> Figure:
     axes.set_xticks(sorted(table["attempts"].unique()))
     axes.set(xlabel="attempts of SP1 → SP2", ylabel="share of runs [%]")
     axes.grid(visible=False, axis="x")
-    style.legend_below(figure, axes, 2)
+    style.legend_below(figure, [axes], 2)
     return figure
 
 
 def distribution_table(
     results: Results,
     errors: Values,
-    printed: Callable[[ConditionResults], Sequence[Point]],
+    printed: Callable[[ConditionResults], Sequence[Percentage]],
     confidence: float,
 ) -> pd.DataFrame:
     """Return P(error < x) of every condition at each error that occurs, and the printed points."""
@@ -83,7 +81,8 @@ def distribution_table(
         steps, counts = np.unique(values[np.isfinite(values)], return_counts=True)
         totals = zip([0.0, *steps], [0, *np.cumsum(counts)], strict=True)
         points = [(FOUND, x, Proportion(int(count), len(values))) for x, count in totals]
-        for series, x, share in [*points, *((PRINTED, *point) for point in printed(c))]:
+        points += [(PRINTED, one.bound, one.proportion) for one in printed(c)]
+        for series, x, share in points:
             given = series, results.position(c.label), c.label, x
             rows.append((*given, *share, share.share, *share.interval(confidence)))
     unit = results.with_data[0].length_unit
@@ -96,14 +95,23 @@ def distribution_table(
 
 def draw_distribution(table: pd.DataFrame) -> Figure:
     """Draw steps with bands: over the whole range, and where the printed points are."""
-    figure, (whole, close) = style.row_of_panels(3.9, 2)
+    figure, (whole, close) = style.panels(3.9, 2)
     printed, found = (table[table["series"] == series] for series in (PRINTED, FOUND))
     greatest = max(2.1, 1.05 * float(table["error"].max()))
     for axes in (whole, close):
         for (position, condition), rows in groups(found, ["position", "condition"]):
-            _curve(axes, rows, greatest, style.condition_colour(int(position)), str(condition))
-        for position, rows in groups(printed, "position"):
-            _points(axes, rows, style.condition_colour(int(position)))
+            colour = style.condition_colour(int(position))
+            rows = pd.concat([rows, rows.iloc[[-1]].assign(error=greatest)], ignore_index=True)
+            x, label = rows["error"], f"{condition} (n = {int(rows['total'].iloc[0])})"
+            marks.band(axes, x, rows["lower"], rows["upper"], colour, alpha=0.22, step="post")
+            axes.step(x, rows["share"], where="post", color=colour, label=label)
+        # the printed points with the intervals of the paper's own sample
+        for (position, condition), rows in groups(printed, ["position", "condition"]):
+            colour, x = style.condition_colour(int(position)), rows["error"]
+            name = f"printed, {condition} (their n = {int(rows['total'].iloc[0])})"
+            axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
+            look = {"label": name, "mew": 1.4, "zorder": 5}
+            marks.hollow(axes, x, rows["share"], "D", colour, 5, **look)
         axes.set(
             xlim=(0.0, greatest),
             xlabel=f"x [{table['length_unit'].iloc[0]}]",
@@ -113,35 +121,16 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
     low = min([0.93, *printed["lower"]])
     near = low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low)
     close.set(ylim=near, title="b  where the printed percentages are")
+    # printed percentages, the greatest at its x above its point, others below
     for row in records(printed):
-        _label(close, row, row.share == printed.loc[printed["error"] == row.error, "share"].max())
-    style.legend_below(figure, whole, 2)
+        is_greatest = row.share == printed.loc[printed["error"] == row.error, "share"].max()
+        left = row.error > 0.7 * greatest
+        words: dict[str, Any] = {"ha": "right" if left else "left", "fontsize": 7.5, "zorder": 6}
+        words |= {"color": style.condition_colour(row.position), "path_effects": HALO}
+        offset = -6 if left else 7, 4 if is_greatest else -10
+        marks.write(close, f"{100 * row.share:.1f} %", (row.error, row.share), offset, **words)
+    style.legend_below(figure, [whole], 2)
     return figure
-
-
-def _curve(axes: Axes, rows: pd.DataFrame, greatest: float, colour: str, name: str) -> None:
-    """Draw the steps of an arm's curve up to the right end, and their band."""
-    rows = pd.concat([rows, rows.iloc[[-1]].assign(error=greatest)], ignore_index=True)
-    x, label = rows["error"], f"{name} (n = {int(rows['total'].iloc[0])})"
-    marks.band(axes, x, rows["lower"], rows["upper"], colour, alpha=0.22, step="post")
-    axes.step(x, rows["share"], where="post", color=colour, label=label)
-
-
-def _points(axes: Axes, rows: pd.DataFrame, colour: str) -> None:
-    """Draw the printed points of one arm with the intervals of the paper's own sample."""
-    name = f"printed, {rows['condition'].iloc[0]} (their n = {int(rows['total'].iloc[0])})"
-    axes.vlines(rows["error"], rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
-    look = {"label": name, "mew": 1.4, "zorder": 5}
-    marks.hollow(axes, rows["error"], rows["share"], "D", colour, 5, **look)
-
-
-def _label(axes: Axes, row: Any, greatest: bool) -> None:
-    """Write a printed percentage above its point if it is the greatest at its x, else below."""
-    left = row.error > 0.7 * axes.get_xlim()[1]
-    look: dict[str, Any] = {"ha": "right" if left else "left", "fontsize": 7.5, "zorder": 6}
-    look |= {"color": style.condition_colour(row.position), "path_effects": HALO}
-    offset = -6 if left else 7, 4 if greatest else -10
-    marks.write(axes, f"{100 * row.share:.1f} %", (row.error, row.share), offset, **look)
 
 
 def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataFrame:
@@ -189,5 +178,5 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
         axes.set_xticks(sorted(table["stop_cost"].unique()))
         style.shorten_thousands(axes.yaxis)
     panels[0].invert_xaxis()
-    style.legend_below(figure, panels[0], 2)
+    style.legend_below(figure, [panels[0]], 2)
     return figure

@@ -48,8 +48,21 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     for (posture, arm), links in groups(table, ["posture", "arm"]):
         at_start = posture == "start"
         style.draw_arm(axes, arm, links, alpha=1.0 if at_start else 0.35, dashed=not at_start)
+        # joint angles with their reference directions, arcs and values
         for row in records(links) if at_start else ():
-            _angle(axes, row)
+            x, y, colour = row.x, row.y, style.arm_colour(row.arm)
+            reference, angle, radius = row.reference_deg, row.angle_deg, 0.55 if row.joint else 0.75
+            s, c = sincos(DEGREE * reference)
+            line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.8, "zorder": 1}
+            axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", **line)
+            first, last = sorted((reference, reference + angle))
+            arc: dict[str, Any] = {"theta1": first, "theta2": last, "linewidth": 1.0}
+            axes.add_patch(Arc((x, y), 2 * radius, 2 * radius, color=colour, **arc))
+            s, c = sincos(DEGREE * (reference + 0.5 * angle))
+            text = f"{style.joint_symbol(row.arm, row.joint)} = {angle:g}°"
+            place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
+            look: dict[str, Any] = {"va": "center", "color": colour, "zorder": 5}
+            axes.annotate(text, place, ha="left" if c >= 0 else "right", **look)
     for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
         marks.base(axes, row.x, row.y, 9, zorder=2)
         colour = style.arm_colour(row.arm)
@@ -92,8 +105,21 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
         axes.plot(
             *(final[name] for name in ANGLES), **looks[last] | {"color": style.arm_colour(arm)}
         )
-        x, y, instants = (final[name].to_numpy() for name in (*ANGLES, "instant"))
-        _numbers(axes, x, y, instants, rows[ANGLES].to_numpy())
+        # every fifth via-point, the start and the goal have their number at that of eight places
+        # around that is farthest from all points, and from the numbers that stand there already
+        points, taken = final[ANGLES].to_numpy(), list(rows[ANGLES].to_numpy())
+        size = max(float(np.ptp(points, axis=0).max()), 1e-9)
+        angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
+        for k, (here, instant) in enumerate(zip(points, final["instant"], strict=True)):
+            if instant % NUMBERED and k < len(points) - 1:
+                continue
+            places = [here + NUMBER_ROOM * size * np.array([c, s]) for s, c in angles]
+            best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
+            s, c = angles[best]
+            taken.append(places[best])
+            look: dict[str, Any] = {"va": "center", "fontsize": 7, "zorder": 6}
+            offset = NUMBER_OFFSET * c, NUMBER_OFFSET * s
+            marks.write(axes, str(instant), here, offset, path_effects=marks.HALO, **look)
         axes.margins(0.1)
     keys = [
         style.key(first, **looks[first]),
@@ -108,9 +134,11 @@ def configuration_planes(
 ) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
     """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm)."""
     by_arm = list(groups(table, "arm"))
-    figure, panels = style.row_of_panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
+    figure, panels = style.panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
     for axes, (arm, _) in zip(panels, by_arm, strict=True):
-        style.configuration_axes(axes, arm)
+        x, y = (f"{style.joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
+        axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
+        axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
     return figure, [(axes, *own) for axes, own in zip(panels, by_arm, strict=True)]
 
 
@@ -127,7 +155,13 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     centres = problem.sphere_centres(at)
     for arm, points in enumerate(centres):
         rows += [("circle", arm, *p[:2], *p[:2], problem.sphere_radius, np.nan) for p in points]
-    a, b = _closest(centres)
+    # the two closest centres of different arms
+    couples = (
+        couple
+        for first, second in itertools.combinations(centres, 2)
+        for couple in itertools.product(first, second)
+    )
+    a, b = min(couples, key=lambda ab: float(np.linalg.norm(ab[0] - ab[1])))
     rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
     nearest = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
     rows.append(
@@ -165,7 +199,7 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     axes.plot([], [], " ", label=f"collision below 2r = {2 * radius:g} {unit}; {safety}")
     axes.set_title(f"instant {int(table['instant'].iloc[0])}")
     axes.margins(0.08)
-    style.legend_below(figure, axes, 1)
+    style.legend_below(figure, [axes], 1)
     return figure
 
 
@@ -178,56 +212,3 @@ def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFram
         angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")
         frames.append(pd.DataFrame({"arm": arm, "instant": range(rows)}).join(angles))
     return pd.concat(frames, ignore_index=True)
-
-
-def _angle(axes: Axes, row: Any) -> None:
-    """Draw a joint angle: its reference direction, its arc and its value."""
-    x, y, arm, joint = row.x, row.y, row.arm, row.joint
-    reference, angle = row.reference_deg, row.angle_deg
-    colour, radius = style.arm_colour(arm), 0.75 if joint == 0 else 0.55
-    s, c = sincos(DEGREE * reference)
-    axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", color=style.NEUTRAL, linewidth=0.8, zorder=1)
-    first, last = sorted((reference, reference + angle))
-    axes.add_patch(
-        Arc((x, y), 2 * radius, 2 * radius, theta1=first, theta2=last, color=colour, linewidth=1.0)
-    )
-    s, c = sincos(DEGREE * (reference + 0.5 * angle))
-    text = f"{style.joint_symbol(arm, joint)} = {angle:g}°"
-    place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
-    axes.annotate(
-        text, place, ha="left" if c >= 0 else "right", va="center", color=colour, zorder=5
-    )
-
-
-def _numbers(
-    axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray, around: FloatArray
-) -> None:
-    """Write the number of every fifth via-point, the start and the goal where there is room.
-
-    Of eight places around a via-point the one is taken that is farthest from all points `around`,
-    (points, 2), and from the numbers that stand there already.
-    """
-    size = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
-    taken = list(around)
-    angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
-    for k, instant in enumerate(instants):
-        if instant % NUMBERED and k < len(instants) - 1:
-            continue
-        here = np.array([x[k], y[k]])
-        places = [here + NUMBER_ROOM * size * np.array([c, s]) for s, c in angles]
-        best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
-        s, c = angles[best]
-        taken.append(places[best])
-        look: dict[str, Any] = {"va": "center", "fontsize": 7, "zorder": 6}
-        offset = NUMBER_OFFSET * c, NUMBER_OFFSET * s
-        marks.write(axes, str(instant), (x[k], y[k]), offset, path_effects=marks.HALO, **look)
-
-
-def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the two closest centres of different arms."""
-    couples = (
-        (a, b)
-        for first, second in itertools.combinations(centres, 2)
-        for a, b in itertools.product(first, second)
-    )
-    return min(couples, key=lambda ab: float(np.linalg.norm(ab[0] - ab[1])))

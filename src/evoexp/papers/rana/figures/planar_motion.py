@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
+import pinocchio as pin
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -97,7 +97,25 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         whole = stage == stages[-1]
         for _, outline in groups(obstacles, "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
-        _snapshot(axes, rows, whole=whole)
+        first, last = rows["instant"].min(), rows["instant"].max()
+        for arm, own in groups(rows, "arm"):
+            colour = style.arm_colour(arm)
+            tips = own[own["link"] == own["link"].max()]
+            axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
+            between, shades = [], []
+            for instant, links in groups(own, "instant"):
+                line = [np.append(links[n], links[f"{n}_end"].iloc[-1]) for n in "xy"]
+                if instant == last:
+                    style.draw_arm(axes, arm, links)
+                elif instant == first:
+                    axes.plot(*line, color=colour, **FIRST)
+                else:
+                    between.append(np.column_stack(line))
+                    shade = 0.7 - 0.5 * (last - instant) / (last - first)
+                    shades.append(0.25 if whole else shade)
+            look: dict[str, Any] = {"colors": colour, "linewidths": 1.0, "zorder": 1}
+            axes.add_collection(LineCollection(between, alpha=shades or None, **look))
+            marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)
         style.operational_axes(axes, unit)
         axes.label_outer()
         axes.set_title(motions.stage_title(rows, whole))
@@ -170,17 +188,21 @@ def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]
     Both take configurations (nq, instants) [deg].
     """
     problem, kinds = motions.problem(condition), motions.kinds_of_pairs(condition)
-    by_coal = {motions.ARMS: motion_geometry.link_distance(problem.assembly)}
+    scene, by_coal = problem.scene, {motions.ARMS: motion_geometry.link_distance(problem.assembly)}
     centres = {
         motions.ARMS: problem.centre_distances,
         motions.OBSTACLES: problem.obstacle_distances,
     }
     if motions.OBSTACLES in kinds:
-        by_coal[motions.OBSTACLES] = motions.obstacle_distance(problem)
+        geometry = scene.geometry.copy()
+        geometry.removeAllCollisionPairs()
+        for one, two in scene.pairs[kinds[motions.OBSTACLES][0]]:
+            geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
+        by_coal[motions.OBSTACLES] = motion_geometry.BodyDistance(scene.model, geometry)
     found = dict[str, tuple[Measure, Measure]]()
     for kind, bodies in by_coal.items():
         pairs = kinds[kind][0]
-        quick = motion_geometry.distance_measure(problem.scene.of_pairs(pairs), bodies)
+        quick = motion_geometry.distance_measure(scene.of_pairs(pairs), bodies)
         found[COLUMNS[kind][CENTRES]] = (centres[kind], centres[kind])
         found[COLUMNS[kind][LINKS]] = (_in_radians(bodies), _in_radians(quick))
     return found
@@ -227,7 +249,18 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     for axes_of_kind, kind in zip(panels.T, kinds, strict=True):
         own = table[table["kind"] == kind]
         for axes, measure in zip(axes_of_kind, (CENTRES, LINKS), strict=True):
-            _distances(axes, own[own["measure"] == measure], required[kind], below)
+            series = dict(groups(own[own["measure"] == measure], "series"))
+            low, high, red = series[LOWEST], series[HIGHEST], style.FORBIDDEN
+            ends = low["distance"], high["distance"], style.ARM_COLOURS[0]
+            marks.band(axes, low["instant"], *ends, label="range over replicates")
+            for name, look in LOOKS.items():
+                if name in series and len(series[name]):
+                    crowded = CROWDED.get(name, {}) if len(series[name]) > MANY else {}
+                    x, y = (series[name][column] for column in ("instant", "distance"))
+                    axes.plot(x, y, **{"label": name} | look | crowded)
+            label, safety = f"below the required distance: {below}", required[kind]
+            axes.axhspan(0.0, safety, color=red, alpha=0.08, linewidth=0, label=label)
+            axes.axhline(safety, color=red, linewidth=1.0, linestyle=(0, (5, 2)))
             axes.set(
                 title=f"{next(letters)}  {kind}: {TITLES[measure]}",
                 ylabel=f"least distance [{unit}]",
@@ -236,43 +269,5 @@ def draw_distances(table: pd.DataFrame) -> Figure:
             )
         axes_of_kind[-1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
         axes_of_kind[-1].set_xlabel("instant (whole numbers: via-points)")
-    style.legend_of_all(figure, [panels[1, 0]], 2)
+    style.legend_below(figure, [panels[1, 0]], 2)
     return figure
-
-
-def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> None:
-    series = dict(groups(rows, "series"))
-    low, high, colour = series[LOWEST], series[HIGHEST], style.ARM_COLOURS[0]
-    ends = low["distance"], high["distance"]
-    marks.band(axes, low["instant"], *ends, colour, label="range over replicates")
-    for name, look in LOOKS.items():
-        if name in series and len(series[name]):
-            crowded = CROWDED.get(name, {}) if len(series[name]) > MANY else {}
-            x, y = (series[name][column] for column in ("instant", "distance"))
-            axes.plot(x, y, **{"label": name} | look | crowded)
-    label = f"below the required distance: {required}"
-    axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
-    axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))
-
-
-def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
-    """Draw the instants of one stage."""
-    first, last = rows["instant"].min(), rows["instant"].max()
-    for arm, own in groups(rows, "arm"):
-        colour = style.arm_colour(arm)
-        tips = own[own["link"] == own["link"].max()]
-        axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
-        between, shades = [], []
-        for instant, links in groups(own, "instant"):
-            x, y = (np.append(links[name], links[f"{name}_end"].iloc[-1]) for name in "xy")
-            if instant == last:
-                style.draw_arm(axes, arm, links)
-            elif instant == first:
-                axes.plot(x, y, color=colour, **FIRST)
-            else:
-                between.append(np.column_stack([x, y]))
-                shades.append(0.25 if whole else 0.7 - 0.5 * (last - instant) / (last - first))
-        axes.add_collection(
-            LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
-        )
-        marks.base(axes, own["x"].iloc[0], own["y"].iloc[0], 6, zorder=2)

@@ -21,11 +21,7 @@ BEST = "best replicate"
 
 
 def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
-    """Return all links at every instant of a motion.
-
-    Returns:
-        Columns of `motion_geometry.links_table`, length_unit.
-    """
+    """Return all links at every instant of a motion."""
     table = motion_geometry.links_table(motions.problem(condition).assembly, q)
     return rounded(table).assign(length_unit=condition.length_unit)
 
@@ -55,10 +51,12 @@ def draw_arm(table: pd.DataFrame) -> Figure:
         axes.set_title(title)
         _arm(axes, 0, links, width=1.2 if k == 0 else 2.6)
         if k == 0:
+            around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 17), np.linspace(0.0, np.pi, 9))
+            ball = np.cos(around) * np.sin(up), np.sin(around) * np.sin(up), np.cos(up)
             for row in records(spheres):
-                axes.plot_surface(
-                    *_ball(row), color=style.arm_colour(0), alpha=0.25, linewidth=0, shade=True
-                )
+                grid = (getattr(row, k) + row.radius * x for k, x in zip("xyz", ball, strict=True))
+                look: dict[str, Any] = {"color": style.arm_colour(0), "alpha": 0.25}
+                axes.plot_surface(*grid, linewidth=0, shade=True, **look)
         else:
             _name_points(axes, 0, links)
     return figure
@@ -72,8 +70,11 @@ def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
     problem = motions.problem(condition)
     table = links_table(condition, np.column_stack([problem.start, problem.goal]))
     lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))
-    moving = np.array([link.joint > 0 for link in problem.assembly.links])
-    own = moving[table["link"].to_numpy() + _offsets(problem.assembly)[table["arm"].to_numpy()]]
+    links = problem.assembly.links
+    arms = [link.arm for link in links]
+    first = np.array([arms.index(arm) for arm in range(problem.assembly.num_arms)])  # links of arms
+    moving = np.array([link.joint > 0 for link in links])
+    own = moving[table["link"].to_numpy() + first[table["arm"].to_numpy()]]
     counted = table.assign(reach=np.where(own, lengths, 0.0))
     reach = counted[counted["instant"] == 0].groupby("arm")["reach"].sum()
     return table.assign(reach=table["arm"].map(reach).round(9))
@@ -131,12 +132,6 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _offsets(assembly: Any) -> np.ndarray:
-    """Return, per arm, the place of its first link among all links."""
-    arms = [link.arm for link in assembly.links]
-    return np.array([arms.index(arm) for arm in range(assembly.num_arms)])
-
-
 def _space(
     figure: Figure,
     place: tuple[int, int, int],
@@ -185,13 +180,6 @@ def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
             axes.text(x, y, z, f"{text}    ", **look | {"ha": "right", "va": "center"})
         else:
             axes.text(x, y, z + 0.11, text, path_effects=marks.HALO, **look)
-
-
-def _ball(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return a sphere as a grid for a surface."""
-    around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 17), np.linspace(0.0, np.pi, 9))
-    x, y, z = np.cos(around) * np.sin(up), np.sin(around) * np.sin(up), np.cos(up)
-    return row.x + row.radius * x, row.y + row.radius * y, row.z + row.radius * z
 
 
 def _legend(figure: Figure, table: pd.DataFrame, more: Line2D) -> None:

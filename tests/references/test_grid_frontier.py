@@ -28,10 +28,6 @@ SETTINGS = {
     "least_weight": 1e-3,
     "greatest_weight": 10.0,
     "max_nodes": 60,
-    "exchanged_nodes": 3,
-    "forced_nodes": 2,
-    "bound_gap": 1e-3,
-    "bound_steps": 200,
 }
 
 

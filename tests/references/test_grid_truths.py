@@ -44,7 +44,7 @@ def test_a_map_is_known_by_all_that_its_truth_depends_on() -> None:
     own, problem = dict(expanded("chen_path", "paper").conditions)["(b), exact"].prepare()
     heavier = own.planner.objective.model_copy(update={"distance_weight": 0.123})
     for update in (
-        {"exchanged_nodes": 2},
+        {"max_nodes": own.max_nodes - 1},
         {"planner": own.planner.model_copy(update={"objective": heavier})},
     ):
         assert own.model_copy(update=update).key(problem) not in known_maps()

@@ -19,17 +19,16 @@ import hashlib
 import json
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field
 
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray, IntArray
 from evoexp.references.reference import Reference, Truth
-from evoexp.validation import LayoutCount, NonNegativeCount, Positive
+from evoexp.validation import LayoutCount, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS that decides among equally short paths only
@@ -133,7 +132,7 @@ class GridFrontier(Reference):
     """The best path known, and the bound below all paths."""
 
     component: ClassVar[str] = "grid_frontier"
-    revision: ClassVar[int] = 3
+    revision: ClassVar[int] = 4
 
     planner: GridPathGa  # the path search whose grid and cost it shares
     # values of μ, from `least_weight` to `greatest_weight` by equal ratios, after the very
@@ -143,17 +142,6 @@ class GridFrontier(Reference):
     greatest_weight: Positive  # of μ [cell]
     # of the walks; longer walks are not searched, and cannot be better if ε is not very small
     max_nodes: LayoutCount
-    # The next four are those of `scripts/update-grid-truths`, and tell of the shipped maps' truths:
-    # no exchange of at most so many nodes improves the best path known
-    exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
-    # exchanges of at most so many nodes are made though they cost more, to improve the path from
-    # there
-    forced_nodes: Annotated[int, Field(ge=0, le=4)]
-    # the bound is raised until it is within this part of the best cost known, by every number
-    # of nodes [-]
-    bound_gap: Annotated[float, Field(ge=0.0, lt=1.0)]
-    # most steps that raise it, by every number of nodes; 0: the bound by walks
-    bound_steps: NonNegativeCount
 
     def truth(self, problem: Any) -> Truth:
         """Return the best path known, or the best walk where nodes may be passed again.

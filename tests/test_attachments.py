@@ -64,7 +64,7 @@ def test_files_travel_with_jobs(path: Path) -> None:
     condition = condition_with(path)
     job = Job(condition.id, condition.to_json(), 3, tuple(condition.files().values()))
     forget()
-    assert not run_jobs([job])[0].failed
+    assert not run_jobs([job])[0].reason
 
 
 def test_a_stored_run_has_its_files(path: Path, tmp_path: Path) -> None:

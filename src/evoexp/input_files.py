@@ -12,6 +12,7 @@ import os
 import re
 import stat
 import tokenize
+import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -145,7 +146,8 @@ def read_npy(content: bytes) -> NDArray[Any]:
     try:
         is_first = npy_format.read_magic(file) == (1, 0)
         reads = npy_format.read_array_header_1_0 if is_first else npy_format.read_array_header_2_0
-        shape, columns_first, kind = reads(file)
+        with warnings.catch_warnings(action="ignore"):  # of headers that Python 2 wrote
+            shape, columns_first, kind = reads(file)
     except (*_UNREADABLE, RecursionError, MemoryError):
         raise ValueError("its header is damaged") from None
     if kind.kind not in "biuf":

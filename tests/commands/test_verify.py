@@ -18,8 +18,8 @@ from evoexp.commands import verify
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.planners.via_point_ga.planner import ViaPointGa
-from evoexp.store import integrity, run_directory
 from evoexp.store import log as log_module
+from evoexp.store import run_directory
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from forged_logs import Row, with_message
@@ -250,7 +250,7 @@ def test_a_directory_that_may_not_be_read_hides_no_other(
     evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As root reads everything, the refusal is played."""
-    known, leftovers = run_directory.stored_id, integrity._leftovers
+    known, listed = run_directory.stored_id, Path.iterdir
 
     def forbidden(path: Path) -> Path:
         if path == run.path:
@@ -258,7 +258,7 @@ def test_a_directory_that_may_not_be_read_hides_no_other(
         return path
 
     monkeypatch.setattr(run_directory, "stored_id", lambda path: known(forbidden(path)))
-    monkeypatch.setattr(integrity, "_leftovers", lambda path: leftovers(forbidden(path)))
+    monkeypatch.setattr(Path, "iterdir", lambda path: listed(forbidden(path)))
     said = evoexp("verify", "--json")
     assert said.code == 1
     found = {each["hash"]: each for each in json.loads(said.out)}

@@ -160,7 +160,8 @@ class Checksums(event.Listener):
             folder, lock = self._writing.pop()
             with contextlib.suppress(OSError):
                 # sources that changed since they were hashed may have been loaded by now
-                if all(_states(package) == states for package, states in _STATES.items()):
+                loaded = {name: states for name, states in _STATES.items() if name in sys.modules}
+                if all(_states(package) == states for package, states in loaded.items()):
                     list_files(folder)
             lock.release()
 

@@ -92,32 +92,32 @@ def drawn(
     Raises:
         SettingError: If the style file is none of matplotlib's.
     """
-    images = {}
     with _looking(look):
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         try:
-            figure = _arranged(draw())
+            images = _images(draw(), formats, dpi)
         except ValueError:  # a name with a $ that begins no formula
             mpl.rcParams["text.parse_math"] = False
-            figure = _arranged(draw())
-        for kind in formats:
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
-            images[kind] = buffer.getvalue()
+            images = _images(draw(), formats, dpi)
     if "svg" in images:
         images["svg"] = images["svg"].replace(_FONT, _FONTS)
     return images
 
 
-def _arranged(figure: Figure) -> Figure:
-    """Arrange a figure once, for all formats."""
+def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes]:
+    """Arrange a figure once, and return one file per format."""
     FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
     if engine := figure.get_layout_engine():
         engine.execute(figure)
         if fit_texts(figure):  # what is broken into lines takes room from the others
             engine.execute(figure)
     figure.set_layout_engine(None)  # with "none" every file would be drawn twice
-    return figure
+    images = {}
+    for kind in formats:
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
+        images[kind] = buffer.getvalue()
+    return images
 
 
 @contextlib.contextmanager

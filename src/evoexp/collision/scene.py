@@ -14,6 +14,7 @@ import pinocchio as pin
 from evoexp.collision.body_table import BodyTable, body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import are_neighbours, unjudged_pairs
+from evoexp.collision.distance_maps import DistanceMap
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
@@ -59,6 +60,7 @@ class Scene(NamedTuple):
     tolerances: FloatArray
     # pairs that are none of `pairs`, since they may touch
     contacts: tuple[AllowedContact, ...] = ()
+    maps: tuple[DistanceMap, ...] = ()  # of some pairs of its bodies
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """Return the names of a pair's bodies."""

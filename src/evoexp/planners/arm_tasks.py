@@ -216,7 +216,8 @@ def _covered(
     check_limits(assembly, ends)
     for field, q in zip(FIELDS, ends, strict=True):
         check_bodies(bodies, DEGREE * q, field, task.length_unit)
-    return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored), bodies
+    collision = model.bind(assembly, task.obstacles, np.column_stack(ends), ignored)
+    return collision, bodies._replace(maps=collision.bodies.maps)
 
 
 def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:

@@ -15,6 +15,7 @@ from evoexp.collision.bodies.body_tables import FlatTables, flattened, named_tab
 from evoexp.collision.bodies.clearance_kernels import least_clearances
 from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.packing import BodyPair, Shapes, pack_tables
+from evoexp.collision.distance_maps import DistanceMap
 from evoexp.numeric.compilation import KernelAddress, kernel
 from evoexp.numeric.vectors import LANES
 from evoexp.records import BoolArray, FloatArray
@@ -103,6 +104,7 @@ class BodyCollision(NamedTuple):
         pairs: Iterable[BodyPair],
         ignored: Iterable[BodyPair] = (),
         arms: Sequence[int] = (),
+        maps: Sequence[DistanceMap] = (),
     ) -> "BodyCollision":
         """Return the collision model of a robot among obstacles, ready for batches.
 
@@ -115,8 +117,9 @@ class BodyCollision(NamedTuple):
                 stands on.
             arms: Which arm each joint of the model belongs to, the world included; all to one if
                 empty. Negative numbers belong to every arm.
+            maps: Distances of pairs that their shapes do not tell.
         """
-        packed = pack_tables(table, shapes, obstacles, pairs, ignored, arms)
+        packed = pack_tables(table, shapes, obstacles, pairs, ignored, arms, maps)
         return cls(flattened(packed), table.num_coordinates)
 
     @classmethod

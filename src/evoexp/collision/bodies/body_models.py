@@ -22,6 +22,7 @@ from evoexp.collision.covers.body_covers import (
     kept_sphere_cover,
 )
 from evoexp.collision.derived_pairs import Pair
+from evoexp.collision.distance_maps import DistanceMap, distance_map
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable
@@ -106,6 +107,8 @@ class BodyModel(NamedTuple):
     asked: float = np.inf  # how far covers are asked to reach beyond bodies at most [length unit]
     # bodies whose covers were made smaller (`fitted`), and by how much
     shrunk: tuple[tuple[int, float], ...] = ()
+    # of pairs whose covers always touch; a search tests those of `sorted_pairs.mapped`
+    maps: tuple[DistanceMap, ...] = ()
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -159,8 +162,11 @@ class BodyModel(NamedTuple):
                 pairs.overlapping
             ),
         }
+        mapped = {
+            "covers touch in every posture sampled, tested by maps of exact distances": pairs.mapped
+        }
         fitted = {f"covers touch at {where}, left to the certifier": pairs.fitted}
-        groups = (unjudged | left) if is_complete else left
+        groups = (unjudged | left | mapped) if is_complete else left | mapped
         lines += _listed(groups, names)
         if self.shrunk:
             sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
@@ -196,7 +202,18 @@ class BodyModel(NamedTuple):
             shapes = Shapes.joined([shapes, _shapes(carried.cover, carried.joint, own)])
             pairs = (*pairs, *((body, own) for body in carried.watched))
         table = self.assembly.table
-        return BodyCollision.build(table, shapes, obstacles, pairs, ignored, of_joint)
+        maps = [each for each in self.maps if each.pair in self.sorted_pairs.mapped]
+        return BodyCollision.build(table, shapes, obstacles, pairs, ignored, of_joint, maps)
+
+    def with_maps(self) -> "BodyModel":
+        """Return the bodies with maps of the distances of pairs whose covers always touch."""
+        pairs, maps = self.sorted_pairs, dict[Pair, DistanceMap]()
+        for pair in pairs.overlapping:
+            if (of_pair := distance_map(self.assembly, pair)) is not None:
+                maps[pair] = of_pair
+        left = tuple(pair for pair in pairs.overlapping if pair not in maps)
+        pairs = pairs._replace(overlapping=left, mapped=tuple(maps))
+        return self._replace(maps=tuple(maps.values()), sorted_pairs=pairs)
 
     def touching(
         self,
@@ -261,7 +278,9 @@ class BodyModel(NamedTuple):
             if BodyCollision.of_pair(self.assembly.table, shapes, pair).collides(q).any()
         )
         tested = tuple(pair for pair in self.pairs if pair not in touching)
-        pairs = self.sorted_pairs._replace(tested=tested, fitted=touching)
+        mapped = tuple(each.pair for each in self.maps if (each.at(q) >= 0.0).all())
+        touching += tuple(pair for pair in self.sorted_pairs.mapped if pair not in mapped)
+        pairs = self.sorted_pairs._replace(tested=tested, mapped=mapped, fitted=touching)
         return self._replace(shapes=shapes, sorted_pairs=pairs, shrunk=tuple(shrunk))
 
 

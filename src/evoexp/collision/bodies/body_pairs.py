@@ -7,12 +7,9 @@ other robots, pairs that never touch are proven to, and so nobody judges them.
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from evoexp.collision.bodies.body_collision import BodyCollision
 from evoexp.collision.bodies.packing import Shapes
-from evoexp.collision.body_table import body_table
-from evoexp.collision.box_support import coal, distance
 from evoexp.collision.derived_pairs import (
     DerivedPairs,
     Pair,
@@ -21,7 +18,7 @@ from evoexp.collision.derived_pairs import (
     joint_limits,
     sampled_configurations,
 )
-from evoexp.collision.motion_bounds import pair_reaches, reaches
+from evoexp.collision.distance_maps import approach_speeds, coal_distances
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 
@@ -42,6 +39,8 @@ class BodyPairs(NamedTuple):
     # pairs whose covers touch in every posture sampled although the bodies do not: only the
     # certifier judges them
     overlapping: tuple[Pair, ...] = ()
+    # pairs whose covers always touch, tested by maps of their distances
+    mapped: tuple[Pair, ...] = ()
     # pairs whose covers touch at the start or the goal although the bodies do not: only the
     # certifier judges them
     fitted: tuple[Pair, ...] = ()
@@ -49,7 +48,7 @@ class BodyPairs(NamedTuple):
     @property
     def judged(self) -> tuple[Pair, ...]:
         """Pairs that the certifier judges."""
-        return (*self.tested, *self.unseen, *self.overlapping, *self.fitted)
+        return (*self.tested, *self.unseen, *self.overlapping, *self.mapped, *self.fitted)
 
 
 def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
@@ -104,16 +103,7 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     The distances are those of the covers or, where these are too close, coal's on a coarser grid.
     Pairs with more than two joints between them are never proven, and so always tested.
     """
-    items, table = list(assembly.geometry.geometryObjects), assembly.table
-    bodies = body_table(table, [items[body] for body in pair])
-    strokes = np.abs(joint_limits(assembly)).max(axis=0)
-    reach = reaches(table.chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
-    way = pair_reaches(np.array([[0, 1]], dtype=np.int64), reach)[0]  # (joints,)
-    # joints that follow others share their coordinates
-    way = np.asarray(
-        np.bincount(table.index_q, way * np.abs(table.rule[:, 0]), table.num_coordinates),
-        dtype=np.float64,
-    )
+    way = approach_speeds(assembly, pair)
     moving = np.flatnonzero(way > 0.0)
     if len(moving) > 2:
         return False
@@ -121,14 +111,7 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     if float(BodyCollision.of_pair(assembly.table, shapes, pair).clearance(q).least.min()) > slack:
         return True
     q, slack = _grid(assembly, moving, way, COARSE_GRID)
-    model, data, least = assembly.model, assembly.model.createData(), np.inf
-    for n in range(q.shape[1]):
-        pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
-        places = (data.oMi[items[body].parentJoint] * items[body].placement for body in pair)
-        first, second = (coal.Transform3s(place.rotation, place.translation) for place in places)
-        one, two = (items[body].geometry for body in pair)
-        least = min(least, distance(one, first, two, second))
-    return least > slack
+    return bool(coal_distances(assembly, pair, q).min() > slack)
 
 
 def _grid(

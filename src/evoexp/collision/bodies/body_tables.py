@@ -60,6 +60,10 @@ class BodyTables(NamedTuple):
     # (pairs, 5) two bodies, first and one-past-last pair of their parts, row of the result
     pairs: IntArray
     parts: IntArray  # (part pairs, 2) two units
+    # (maps, 5) two coordinates, first place among the bounds, and numbers of cells along both
+    maps: IntArray
+    grids: FloatArray  # (maps, 4) where the first cells begin along both, then 1 / step of both
+    bounds: FloatArray  # (cells,) of distances from below, map by map [length unit]
     scale: float  # bound of all coordinates while joints that slide stand at 0 [length unit]
 
 
@@ -107,7 +111,10 @@ def named_tables(n: FloatArray, i: IntArray) -> BodyTables:
         _column(i, i, 18),
         _rows(i, i, 19, 5),
         _rows(i, i, 20, 2),
-        n[i[2 * 21]],
+        _rows(i, i, 21, 5),
+        _rows(n, i, 22, 4),
+        _column(n, i, 23),
+        n[i[2 * 24]],
     )
 
 

@@ -42,6 +42,7 @@ from evoexp.collision.bodies.distances import (
     Row,
     between_spheres,
     distance_from_core,
+    mapped_distance,
     memory_of,
     moved_point,
     place_point,
@@ -51,6 +52,7 @@ from evoexp.collision.bodies.distances import (
     store_point,
     turned,
 )
+from evoexp.collision.bodies.packing import SELF
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vectors import (
     LANES,
@@ -124,6 +126,9 @@ def _least_clearances(
         for b in range(len(units) - 1, -1, -1):
             for t in range(units[b, FIRST_BALL], units[b, STOP_ENTRY]):
                 _meet_obstacle(tables, memory, b, tables.owners[t], decide)
+        for m in range(len(tables.maps)):
+            line = U(0) if decide else U(SELF) * VECTOR
+            _lower(memory, line, mapped_distance(tables, m, eight, memory), decide)
         for p in range(len(tables.pairs)):
             pair = tables.pairs[p]
             line = U(0) if decide else U(pair[4]) * VECTOR

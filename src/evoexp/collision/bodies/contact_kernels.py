@@ -29,6 +29,7 @@ from evoexp.collision.bodies.distances import (
     MARGIN,
     Memory,
     between_spheres,
+    mapped_distance,
     memory_of,
     nearest_to_obstacle,
     place_point,
@@ -102,6 +103,8 @@ def _find_contacts(
         spatial_frames(scene.chain, eight, 1.0, memory.frames)
         # obstacles, then pairs of bodies, until all eight are known to collide
         least = _meet_obstacles(scene, memory, time, limits, at_first)
+        for m in range(len(scene.maps)):
+            least = lower(least, mapped_distance(scene, m, eight, memory))
         if not _is_over(least, limits, at_first):
             least = _meet_each_other(scene, memory, time, limits, at_first, least)
         hits = least < -1.0 * limits.slack

@@ -24,6 +24,7 @@ class CoveredBodies(Component):
     """Bodies covered by spheres or capsules, tested at and between the via-points of a path."""
 
     component: ClassVar[str] = "covered_bodies"
+    revision: ClassVar[int] = 2
 
     covers: CollisionModel  # how bodies are covered
     collision_substeps: LayoutCount  # configurations tested per segment of a path
@@ -47,7 +48,7 @@ class CoveredBodies(Component):
             UnsupportedShape: If a body cannot be covered.
         """
         table = obstacle_table(obstacles).without_ellipses()
-        bodies, q = self.covers.bind(assembly), DEGREE * ends
+        bodies, q = self.covers.bind(assembly).with_maps(), DEGREE * ends
         fitted = bodies.fitted(table, ignored, q)
         collision = fitted.collision(table, ignored)
         return CoveredCollision(assembly, fitted, collision, table)

@@ -11,9 +11,11 @@ from evoexp.collision.bodies.body_tables import FIRST_RUN, STOP_RUN, THICKNESS, 
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import LANES, Vector, load, lower, magnitude, root, spread, store, upper
 from evoexp.records import FloatArray
-from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
+from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, Eight
 from evoexp.robots.kinematics import SPATIAL_ROWS, U
 from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE, SPHERE
+
+LARGEST_CELL = 1e9  # of a map; beyond it, or with NaN, nothing is sure
 
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
 
@@ -39,6 +41,7 @@ class Memory(NamedTuple):
     # (units,) the first of the eight for which centres of a unit's spheres were computed
     known: FloatArray
     placed: FloatArray  # (units,) the same of the ball's centre
+    mapped: FloatArray  # (LANES,) of `mapped_distance`
 
 
 @inlined
@@ -57,7 +60,25 @@ def memory_of(tables: BodyTables, nq: int) -> Memory:
         np.empty(3 * LANES),
         np.full(num_units, -1.0),
         np.full(num_units, -1.0),
+        np.empty(LANES),
     )
+
+
+@inlined
+def mapped_distance(tables: BodyTables, m: int, eight: Eight, memory: Memory) -> Vector:
+    """Return the bounds of a map at eight configurations; inf where a coordinate is not sound."""
+    maps, grids = tables.maps, tables.grids
+    for lane in range(LANES):
+        place, is_sound = maps[m, 2], True
+        for k in range(2):
+            at = U(maps[m, k]) * eight.stride + eight.place + U(lane)
+            cell = np.floor((eight.q[at] - grids[m, k]) * grids[m, 2 + k])
+            is_sound &= abs(cell) < LARGEST_CELL
+            if is_sound:
+                step = maps[m, 4] if k == 0 else 1
+                place += int(cell) % maps[m, 3 + k] * step
+        memory.mapped[lane] = tables.bounds[place] if is_sound else np.inf
+    return load(memory.mapped, U(0))
 
 
 @inlined

@@ -22,6 +22,7 @@ from evoexp.collision.bodies.body_tables import (
     BodyTables,
 )
 from evoexp.collision.bodies.distances import MARGIN
+from evoexp.collision.distance_maps import DistanceMap
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE, ObstacleTable
@@ -63,6 +64,7 @@ def pack_tables(
     pairs: Iterable[BodyPair],
     ignored: Iterable[BodyPair],
     arms: Sequence[int],
+    maps: Sequence[DistanceMap],
 ) -> BodyTables:
     """Return the tables of a robot among obstacles.
 
@@ -73,6 +75,7 @@ def pack_tables(
         pairs: Numbers of two bodies each that are checked against each other.
         ignored: Pairs (body's number, obstacle) that are not checked.
         arms: The arm of each joint of the model; negative numbers belong to every arm; empty: one.
+        maps: Distances of pairs that their shapes do not tell.
 
     Raises:
         SettingError: If an obstacle is an ellipse.
@@ -97,7 +100,17 @@ def pack_tables(
     entries, owners = _pack_entries(tables, numbers, joints, set(ignored))
     body_arms = [arms[joint] if arms else 0 for joint in joints]
     body_pairs, parts = _pack_pairs(tables, numbers, body_arms, pairs)
-    return tables._replace(entries=entries, owners=owners, pairs=body_pairs, parts=parts)
+    first = np.cumsum([0, *(each.bounds.size for each in maps)])
+    rows = [(*m.coordinates, k, *m.bounds.shape) for m, k in zip(maps, first, strict=False)]
+    return tables._replace(
+        entries=entries,
+        owners=owners,
+        pairs=body_pairs,
+        parts=parts,
+        maps=np.array(rows, dtype=np.int64).reshape(-1, 5),
+        grids=np.array([(*m.low, *(1.0 / m.step)) for m in maps]).reshape(-1, 4),
+        bounds=np.concatenate([np.empty(0), *(m.around.ravel() for m in maps)]),
+    )
 
 
 def _pack_bodies(
@@ -151,6 +164,9 @@ def _pack_bodies(
         nothing,
         nothing,
         nothing,
+        nothing,
+        np.empty(0),
+        np.empty(0),
         0.0,
     )
 

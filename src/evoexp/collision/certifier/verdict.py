@@ -176,6 +176,10 @@ class _Judgement:
         self.wants_first = False  # any contact is an answer
         goal = np.maximum(self.margins, self.tolerances)
         level = np.maximum(self.margins - self.tolerances, self.tolerances)
+        for each in self.scene.maps:  # a pair that its map proves apart is not looked at
+            (own,) = np.nonzero((self.scene.pairs == each.pair).all(axis=1))
+            if (each.least(self.motion) > goal[own]).all():
+                goal[own] = level[own] = -np.inf
         try:
             contact, bound = self._search(np.inf, goal, level)
         except QueryLimit:

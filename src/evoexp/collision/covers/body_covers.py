@@ -12,21 +12,18 @@ overlaps by no more than the allowed depth; the exact verdict has the last word.
 """
 
 import contextlib
-import functools
-import hashlib
 import json
-from importlib import metadata
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.box_support import EXACT, coal
+from evoexp.collision.box_support import coal
 from evoexp.collision.covers.solid_balls import Balls, Solid, solid_of, varied_spheres
+from evoexp.collision.geometry_key import geometry_key
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.kernel_folders import sources_key
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
@@ -41,9 +38,6 @@ AROUND = 24  # points around the axis of a cylinder, inside it
 SPACING = 0.02  # [length unit] of points along edges and on faces, inside a body, at most
 MOST_RINGS = 100_000  # of a cylinder
 MOST = 12  # points along one edge of a box, at most
-
-_LIBRARIES = ("numpy", "scipy", "coal")
-_SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 
 
 class Cover(NamedTuple):
@@ -319,11 +313,7 @@ def kept_sphere_cover(item: Any, inflation: float) -> Cover:
     """
     if isinstance(item.geometry, coal.Sphere | coal.Capsule):
         return sphere_cover(item, inflation)
-    digest = hashlib.sha256(_code())
-    for part in (*_shape(item.geometry), item.placement.homogeneous, inflation):
-        digest.update(np.ascontiguousarray(part, dtype=np.float64).tobytes())
-    digest.update(type(item.geometry).__name__.encode())
-    path = cache_root() / "covers" / digest.hexdigest()[:32]
+    path = cache_root() / "covers" / geometry_key([item], inflation)
     with contextlib.suppress(FileNotFoundError, Damaged):
         start, end, radius, reach = json.loads(read_kept(path))
         return Cover(np.array(start), np.array(end), np.array(radius), reach)
@@ -332,25 +322,3 @@ def kept_sphere_cover(item: Any, inflation: float) -> Cover:
     with contextlib.suppress(OSError):
         write_kept(path, json.dumps([start, end, radius, float(found.inflation)]).encode())
     return found
-
-
-def _shape(shape: Any) -> list[Any]:
-    """Return all numbers that a shape consists of."""
-    if isinstance(shape, coal.ConvexBase):
-        faces = range(shape.num_polygons if hasattr(shape, "polygons") else 0)
-        points = [shape.point(k) for k in range(shape.num_points)]
-        return [points, [_corners(shape.polygons(k)) for k in faces]]
-    if isinstance(shape, coal.BVHModelBase):
-        points = [shape.vertex(k) for k in range(shape.num_vertices)]
-        return [points, [_corners(shape.tri_indices(k)) for k in range(shape.num_tris)]]
-    return [getattr(shape, name) for name in _SIZES if hasattr(shape, name)]
-
-
-def _corners(triangle: Any) -> list[int]:
-    return [int(triangle[k]) for k in range(3)]
-
-
-@functools.cache
-def _code() -> bytes:
-    versions = [*map(metadata.version, _LIBRARIES)]
-    return hashlib.sha256(json.dumps([*versions, EXACT, sources_key()]).encode()).digest()

@@ -1,0 +1,78 @@
+"""Maps of distances, beside coal's distances at many configurations."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from composed import composed
+from evoexp.collision.distance_maps import coal_distances
+from evoexp.paths.motion import Motion
+
+PROBLEM = "evoexp:motionbenchmaker/problems/table_under_pick_ur5"
+WORDS = (
+    "robot=ur5",
+    "planner=rrt_connect",
+    "ga=rrt_connect",
+    "objective=null",
+    "collision=covered_bodies",
+    "scenario=moveit",
+    f"scenario.scene='{PROBLEM}/scene0001.yaml'",
+    f"scenario.request='{PROBLEM}/request0001.yaml'",
+)
+
+
+@pytest.fixture(scope="module")
+def problem() -> Any:
+    return composed(*WORDS).prepare()[1]
+
+
+@pytest.fixture(scope="module")
+def q(problem: Any) -> np.ndarray:
+    """Configurations (nq, n) over the whole range of all joints, both ends of it included."""
+    low, high = problem.limits.T
+    shares = np.random.default_rng(1).random((len(low), 300))
+    shares[:, 0], shares[:, 1] = 0.0, 1.0
+    return np.asarray(np.radians(low[:, None] + (high - low)[:, None] * shares))
+
+
+def test_the_pairs_whose_covers_always_touch_have_maps(problem: Any) -> None:
+    bodies = problem.collision.bodies
+    names = [tuple(bodies.names[body] for body in each.pair) for each in bodies.maps]
+    assert names == [("base_link", "upper_arm_link"), ("forearm_link", "wrist_2_link")]
+    assert bodies.sorted_pairs.overlapping == ()
+    assert bodies.sorted_pairs.mapped == tuple(each.pair for each in bodies.maps)
+    (note,) = (line for line in problem.collision.notes("m") if "maps of exact distances" in line)
+    assert "forearm_link with wrist_2_link" in note
+
+
+def test_bounds_are_below_coals_distances_and_not_far(problem: Any, q: np.ndarray) -> None:
+    for each in problem.collision.bodies.maps:
+        exact, bounds = coal_distances(problem.collision.assembly, each.pair, q), each.at(q)
+        assert (bounds <= exact).all()
+        assert (bounds > 0.0).any() and ((exact == 0.0) <= (bounds <= 0.0)).all()
+
+
+def test_kernels_read_the_maps(problem: Any, q: np.ndarray) -> None:
+    collision, maps = problem.collision.collision, problem.collision.bodies.maps
+    least = np.min([each.at(q) for each in maps], axis=0)
+    assert (collision.clearance(q).to_self <= least).all()
+    assert collision.collides(q)[least < 0.0].all()
+    alone = problem.collision.bodies._replace(maps=())
+    without = alone.collision(problem.collision.obstacles)
+    assert (collision.collides(q) == (without.collides(q) | (least < 0.0))).all()
+    beyond = np.full((len(q), 8), np.nan)
+    assert collision.collides(beyond).all()
+
+
+def test_the_bound_of_a_motion_is_below_all_of_its_configurations(
+    problem: Any, q: np.ndarray
+) -> None:
+    for each in problem.collision.bodies.maps:
+        for ends in np.split(q[:, :60].T, 20):  # three configurations, two long lines
+            motion = Motion(np.ascontiguousarray(ends))
+            between = [motion.at(t) for t in np.linspace(0.0, 2.0, 200)]
+            exact = coal_distances(problem.collision.assembly, each.pair, np.array(between).T)
+            assert each.least(motion) <= exact.min()
+        still = Motion(np.ascontiguousarray(q[:, :1].T))
+        assert each.least(still) >= each.at(q[:, :1])[0]

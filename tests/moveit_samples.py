@@ -1,9 +1,19 @@
 """A small arm, and scenes and requests for it as MoveIt writes them."""
 
+import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pinocchio as pin
 import yaml
+
+from evoexp.condition import Condition
+from evoexp.planners.moveit_tasks import arm_motion
+from evoexp.scenarios.moveit_files import MessagePart, read_document
+from evoexp.scenarios.moveit_messages import REQUEST, SCENE
+from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world
+from evoexp.testing import conditions
 
 # three turning joints, a passive finger that slides, and one that a URDF left as fixed
 URDF = """<robot name="small">
@@ -68,13 +78,18 @@ def request(**changes: Any) -> dict[str, Any]:
     return plain | changes
 
 
+def written(plain: Any) -> str:
+    """Return plain data as YAML without aliases."""
+    return str(yaml.safe_dump(json.loads(json.dumps(plain))))
+
+
 def write_problem(
     folder: Path, world: dict[str, Any], asked: dict[str, Any] | None = None, number: str = "0001"
 ) -> list[str]:
     """Write a problem; return the overrides that choose it."""
     paths = {"scene": world, "request": request() if asked is None else asked}
     for name, plain in paths.items():
-        (folder / f"{name}{number}.yaml").write_text(yaml.safe_dump(plain))
+        (folder / f"{name}{number}.yaml").write_text(written(plain))
     return [
         "scenario=moveit",
         *(f"scenario.{name}={folder / f'{name}{number}.yaml'}" for name in paths),
@@ -83,3 +98,47 @@ def write_problem(
 
 PLANNER = ["planner=via_points", "ga=via_points", "objective=via_points"]
 COVERED = [*PLANNER, "collision=covered_bodies", "budget=smoke"]
+
+
+def document(plain: Any, message: str = SCENE) -> MessagePart:
+    """Read a scene or a request out of plain data, or out of the text of its file."""
+    text = plain if isinstance(plain, bytes) else written(plain).encode()
+    return read_document(text, f"scenario.{'request' if message == REQUEST else 'scene'}", message)
+
+
+def read(plain: Any) -> World:
+    """Read all of a scene."""
+    file = document(plain)
+    read_state(file["robot_state"])
+    read_allowed(file)
+    return read_world(file, None)
+
+
+def problem(folder: Path, message: Any, asked: Any = None, *words: str) -> Condition:
+    """Return the condition of a scene and a request."""
+    given = [*write_robot(folder), *write_problem(folder, message, asked), *COVERED, *words]
+    (condition,) = conditions(*given).values()
+    return condition
+
+
+def obstacles_of(condition: Any) -> Any:
+    """Return the obstacles of a condition's motion."""
+    return arm_motion(condition.robot.build(), condition.scenario).obstacles
+
+
+def random_pose(rng: np.random.Generator) -> tuple[pin.SE3, dict[str, Any]]:
+    """Return a pose, also as it is written."""
+    quaternion, position = rng.normal(size=4), rng.normal(size=3)
+    quaternion /= np.linalg.norm(quaternion)
+    x, y, z, w = quaternion
+    plain = {"position": position.tolist(), "orientation": quaternion.tolist()}
+    return pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), position), plain
+
+
+def mesh(corners: Any, triangles: Any, **changes: Any) -> dict[str, Any]:
+    """Return a collision object of one mesh."""
+    data = {
+        "vertices": [dict(zip("xyz", map(float, corner), strict=True)) for corner in corners],
+        "triangles": [{"vertex_indices": np.asarray(face).tolist()} for face in triangles],
+    }
+    return {"id": "thing", "meshes": [data], "mesh_poses": [{}]} | changes

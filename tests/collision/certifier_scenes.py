@@ -1,7 +1,4 @@
-"""Random scenes for the certifier.
-
-Arms of turning and sliding joints, bodies of every shape, and their brute force.
-"""
+"""Random scenes for the certifier: arms of all joints, bodies of every shape; brute force."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +6,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from coal_shapes import convex, mesh
 from evoexp.collision.scene import Scene, geometry_scene
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.paths.motion import Motion, cubic_motion
 
 SAMPLES = 10_000  # per segment
@@ -22,22 +21,12 @@ HULL_FACES = [(0, 1, 3), (1, 2, 3), (2, 0, 3), (1, 0, 4), (2, 1, 4), (0, 2, 4)]
 
 
 def hull(scale: float) -> Any:
-    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for corner in HULL_CORNERS * scale:
-        points.append(corner)
-    for face in HULL_FACES:
-        triangles.append(coal.Triangle(*face))
-    return coal.Convex(points, triangles)
+    return convex(HULL_CORNERS * scale, HULL_FACES)
 
 
-def mesh(scale: float) -> Any:
+def open_mesh() -> Any:
     """A mesh, which is not convex: an open fan of two faces of the hull."""
-    built = coal.BVHModelOBBRSS()
-    built.beginModel(2, 4)
-    for face in HULL_FACES[:2]:
-        built.addTriangle(*(HULL_CORNERS[k] * scale for k in face))
-    built.endModel()
-    return built
+    return mesh(HULL_CORNERS[np.array(HULL_FACES[:2])])
 
 
 def random_rotation(rng: np.random.Generator, planar: bool) -> np.ndarray:
@@ -57,7 +46,8 @@ def random_shape(rng: np.random.Generator) -> Any:
         lambda: coal.Cone(a, 2.0 * b),
         lambda: coal.Ellipsoid(a, 2.0 * b, c),
         lambda: hull(a),
-    ][rng.integers(7)]()
+        lambda: convex(*(hull_of(0.4 * a * rng.normal(size=(100, 3))) or ())),
+    ][rng.integers(8)]()
 
 
 def random_scene(rng: np.random.Generator) -> Scene:
@@ -71,15 +61,10 @@ def random_scene(rng: np.random.Generator) -> Scene:
             if not planar:
                 axis = rng.normal(size=3)
                 axis /= np.sqrt((axis**2).sum())
-                slides = rng.random() < 0.3
-                joint = (
-                    pin.JointModelPrismaticUnaligned(axis)
-                    if slides
-                    else pin.JointModelRevoluteUnaligned(axis)
-                )
-            parent = model.addJoint(
-                parent, joint, pin.SE3(random_rotation(rng, planar), place), f"{arm}_{k}"
-            )
+                kind = "Prismatic" if rng.random() < 0.3 else "Revolute"
+                joint = getattr(pin, f"JointModel{kind}Unaligned")(axis)
+            frame = pin.SE3(random_rotation(rng, planar), place)
+            parent = model.addJoint(parent, joint, frame, f"{arm}_{k}")
             place = rng.uniform(-1.0, 1.0, size=3)
             if planar:
                 place[2] = 0.0
@@ -88,13 +73,15 @@ def random_scene(rng: np.random.Generator) -> Scene:
                 pin.GeometryObject(f"{arm}_{k}", parent, 0, placement, random_shape(rng))
             )
             owners.append(arm)
+    if model.njoints > 2 and rng.random() < 0.3:  # a joint follows another
+        model = pin.transformJointIntoMimic(model, 1, 2, *rng.uniform(-1.5, 1.5, size=2))
     for k in range(rng.integers(1, 4)):
         shape, place = random_shape(rng), rng.uniform(-2.0, 2.0, size=3)
         if rng.random() < 0.15:
             normal = rng.normal(size=3)
             shape = coal.Halfspace(normal / np.sqrt((normal**2).sum()), -2.5)
         elif rng.random() < 0.1:
-            shape = mesh(1.0)
+            shape = open_mesh()
         placement = pin.SE3(random_rotation(rng, planar), place)
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k}", 0, 0, placement, shape))
         owners.append(-1)
@@ -108,16 +95,14 @@ def random_scene(rng: np.random.Generator) -> Scene:
 def random_motion(rng: np.random.Generator, nq: int) -> Motion:
     """One or two segments, straight or cubic."""
     segments = 1 if rng.random() < 0.8 else 2
-    q = rng.uniform(-1.5, 1.5, size=nq) + np.cumsum(
-        rng.normal(size=(segments + 1, nq)) * 0.5, axis=0
-    )
+    first = rng.uniform(-1.5, 1.5, size=nq)
+    q = first + np.cumsum(rng.normal(size=(segments + 1, nq)) * 0.5, axis=0)
     if rng.random() < 0.5:
         return Motion(q)
     speed = rng.normal(size=(segments + 1, nq)) * 0.7
     step, m0, m1 = q[1:] - q[:-1], speed[:-1], speed[1:]
-    return cubic_motion(
-        np.stack([q[:-1], m0, 3.0 * step - 2.0 * m0 - m1, m0 + m1 - 2.0 * step], axis=1)
-    )
+    powers = [q[:-1], m0, 3.0 * step - 2.0 * m0 - m1, m0 + m1 - 2.0 * step]
+    return cubic_motion(np.stack(powers, axis=1))
 
 
 class Brute(NamedTuple):

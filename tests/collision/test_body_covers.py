@@ -1,17 +1,23 @@
+"""Covers of bodies: they contain the body and reach no farther than they say."""
+
+import itertools
+from pathlib import Path
+from typing import Any
+
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from coal_shapes import convex, distance_of_point, placed
 from evoexp.collision.bodies.body_models import BodyCapsules
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.covers.body_covers import MOST_SPHERES, Cover, capsule_cover, sphere_cover
+from evoexp.collision.covers import body_covers as covers
+from evoexp.numeric.convex_hull import hull_of
+from evoexp.records import FloatArray
 
-PLACE = pin.SE3(
-    pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix(), np.array([0.3, -0.2, 0.1])
-)
-
-
+TURN = pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix()
+PLACE = pin.SE3(TURN, np.array([0.3, -0.2, 0.1]))
 SHAPES = {
     "sphere": coal.Sphere(0.1),
     "capsule": coal.Capsule(0.05, 0.4),
@@ -22,108 +28,184 @@ SHAPES = {
     "cone": coal.Cone(0.05, 0.2),
     "ellipsoid": coal.Ellipsoid(0.1, 0.05, 0.07),
 }
+SIZES = {"ball": 0.1, "cloud": 0.04, "plate": 0.03, "cylinder": 0.07}
 
 
-def points_of(shape: object, count: int = 4000) -> np.ndarray:
-    """Return points of a shape, most of them on its surface, in its own frame."""
+def body(shape: object, place: pin.SE3 = PLACE) -> pin.GeometryObject:
+    return pin.GeometryObject("body", 0, 0, place, shape)
+
+
+def cloud(rng: np.random.Generator, kind: str, count: int) -> np.ndarray:
+    points = rng.normal(size=(count, 3))
+    if kind == "ball":
+        return np.asarray(points / np.sqrt((points**2).sum(axis=1))[:, None])
+    if kind == "plate":  # flat, with many corners in one plane
+        points[:, 2] = 0.01 * np.round(rng.random(count))
+    if kind == "cylinder":
+        turns = 2.0 * np.pi * np.arange(count) / count
+        points = np.column_stack([np.cos(turns), np.sin(turns), np.arange(count) % 2])
+    return np.asarray(points)
+
+
+def hull(kind: str, scale: float = 1.0) -> coal.Convex:
+    points = cloud(np.random.default_rng(8), kind, 150) * SIZES[kind] * np.array([1.0, 1.3, 0.8])
+    return convex(*(hull_of(points * scale) or ()))
+
+
+def points_of(shape: Any) -> np.ndarray:
+    """Return corners of a shape in the world, and mixtures of few: on edges, on faces, inside."""
     rng = np.random.default_rng(0)
-    u = rng.normal(size=(count, 3))
+    u = rng.normal(size=(2000, 3))
     u /= np.linalg.norm(u, axis=1)[:, None]
-    inside = np.where(rng.random(count) < 0.7, 1.0, rng.random(count))[:, None]
-    if isinstance(shape, coal.Sphere):
-        return u * shape.radius * inside
-    if isinstance(shape, coal.Ellipsoid):
-        return u * shape.radii * inside
-    if isinstance(shape, coal.Capsule):
-        return (
-            u * shape.radius * inside
-            + [0, 0, 1] * rng.uniform(-1, 1, (count, 1)) * shape.halfLength
-        )
-    if isinstance(shape, coal.Box):
-        cube = rng.uniform(-1, 1, (count, 3))
-        cube[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count)
-        return cube * shape.halfSide * inside
-    angle, height = rng.uniform(0, 2 * np.pi, count), rng.uniform(-1, 1, count)
-    flat = rng.random(count) < 0.5
-    share = np.where(flat, np.sqrt(rng.random(count)), 1.0)
-    height = np.where(flat, np.sign(height), height)
-    if isinstance(shape, coal.Cone):
-        share = share * 0.5 * (1.0 - height)
-    radius = shape.radius * share
-    return np.column_stack(
-        [radius * np.cos(angle), radius * np.sin(angle), height * shape.halfLength]
-    )
+    ends = np.sign(u[:, 2:]) * getattr(shape, "halfLength", 0.0)
+    rim = u[:, :2] / np.linalg.norm(u[:, :2], axis=1)[:, None]
+    if isinstance(shape, coal.Convex):
+        corners = np.array([shape.point(k) for k in range(shape.num_points)])
+    elif isinstance(shape, coal.Box):
+        corners = np.sign(u) * shape.halfSide
+    elif isinstance(shape, coal.Ellipsoid):
+        corners = u * shape.radii
+    elif isinstance(shape, coal.Sphere | coal.Capsule):
+        corners = u * shape.radius + np.array([0.0, 0.0, 1.0]) * ends
+    else:
+        apex = isinstance(shape, coal.Cone) & (ends > 0.0)
+        corners = np.hstack([np.where(apex, 0.0, shape.radius * rim), ends])
+    chosen = corners[rng.integers(0, len(corners), (6000, 4))]
+    local = np.vstack([corners, (rng.dirichlet(np.full(4, 0.3), 6000)[..., None] * chosen).sum(1)])
+    return local @ PLACE.rotation.T + PLACE.translation
 
 
-def distance_to(cover: Cover, points: np.ndarray) -> np.ndarray:
+def distance_to(cover: covers.Cover, points: np.ndarray) -> np.ndarray:
     """Return distances of points from a cover, negative inside."""
     along = cover.end - cover.start
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     share = np.clip(((points[:, None] - cover.start) * along).sum(axis=2) / square, 0.0, 1.0)
     nearest = cover.start + share[..., None] * along
-    return np.asarray(
-        (np.linalg.norm(points[:, None] - nearest, axis=2) - cover.radius).min(axis=1)
-    )
+    away = np.linalg.norm(points[:, None] - nearest, axis=2) - cover.radius
+    return np.asarray(away.min(axis=1))
 
 
-@pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("inflation", [0.01, 0.02, 0.05])
-def test_spheres_cover_a_body_and_reach_no_farther_than_they_say(
-    name: str, inflation: float
-) -> None:
-    item = pin.GeometryObject(name, 0, 0, PLACE, SHAPES[name])
-    cover = sphere_cover(item, inflation)
-    points = points_of(SHAPES[name]) @ PLACE.rotation.T + PLACE.translation
-    assert distance_to(cover, points).max() <= 1e-12
-    assert len(cover.radius) <= MOST_SPHERES or name == "capsule"
-    if len(cover.radius) < MOST_SPHERES // 2 and name not in ("rod", "disc", "cone", "ellipsoid"):
+@pytest.mark.parametrize(
+    ("name", "inflation"),
+    [*itertools.product(SHAPES, (0.01, 0.02, 0.05)), *((kind, 0.01) for kind in SIZES)],
+)
+def test_spheres_cover_a_body_and_reach_as_far_as_they_say(name: str, inflation: float) -> None:
+    is_hull = name in SIZES
+    shape = hull(name) if is_hull else SHAPES[name]
+    cover = covers.sphere_cover(body(shape), inflation)
+    assert distance_to(cover, points_of(shape)).max() <= 1e-12
+    most = covers.MOST_VARIED if is_hull else covers.MOST_SPHERES
+    assert 0 < len(cover.radius) <= most or name == "capsule"
+    is_round = name in ("rod", "disc", "cone", "ellipsoid")
+    if len(cover.radius) < covers.MOST_SPHERES // 2 and not is_round:
         assert cover.inflation <= inflation + 1e-12
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    for center, radius in zip(cover.start, cover.radius, strict=True):
-        result.clear()
-        ball = coal.Transform3s(np.eye(3), center)
-        body = coal.Transform3s(PLACE.rotation, PLACE.translation)
-        away = coal.distance(coal.Sphere(1e-6), ball, SHAPES[name], body, request, result)
-        assert away + radius <= cover.inflation + 1e-5 or away <= 0.0
+    ways = np.random.default_rng(9).normal(size=(300, 3))
+    ways /= np.sqrt((ways**2).sum(axis=1))[:, None]
+    worst = max(
+        distance_of_point(point, placed(shape, PLACE))
+        for center, radius in zip(cover.start, cover.radius, strict=True)
+        for point in (center + radius * ways)[:: max(1, len(cover.radius) // 20)]
+    )
+    assert worst <= cover.inflation + 1e-5 or name == "cone"  # covered as the cylinder around it
+    assert not is_hull or (cover.inflation == 0.01 and worst > 0.005)
+
+
+def test_where_balls_do_not_suffice_they_reach_farther_and_say_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(covers, "MOST_VARIED", 20)
+    cover = covers.sphere_cover(body(hull("cylinder")), 0.002)
+    assert len(cover.radius) <= 20
+    assert 0.002 < cover.inflation < 0.05
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_one_capsule_covers_a_body(name: str) -> None:
-    cover = capsule_cover(pin.GeometryObject(name, 0, 0, PLACE, SHAPES[name]))
-    points = points_of(SHAPES[name]) @ PLACE.rotation.T + PLACE.translation
+    cover = covers.capsule_cover(body(SHAPES[name]))
     assert len(cover.radius) == 1
-    assert distance_to(cover, points).max() <= 1e-12
-    if name in ("sphere", "capsule"):
-        assert cover.inflation == 0.0
+    assert distance_to(cover, points_of(SHAPES[name])).max() <= 1e-12
+    assert cover.inflation == 0.0 or name not in ("sphere", "capsule")
 
 
-def test_a_capsule_around_a_cylinder_is_as_thick_as_it() -> None:
-    for shape in (coal.Cylinder(0.5, 0.2), coal.Cylinder(0.1, 2.0)):
-        item = pin.GeometryObject("cylinder", 0, 0, PLACE, shape)
-        cover = BodyCapsules(padding=0.0, around_cylinders=True).cover(item)
-        points = points_of(shape) @ PLACE.rotation.T + PLACE.translation
-        assert distance_to(cover, points).max() <= 1e-12
-        assert cover.radius == pytest.approx([shape.radius])
-        assert cover.inflation == pytest.approx(shape.radius)  # beyond the faces
-        assert np.linalg.norm(cover.end - cover.start) == pytest.approx(2.0 * shape.halfLength)
-    item = pin.GeometryObject("box", 0, 0, PLACE, SHAPES["box"])
-    one, other = (
-        BodyCapsules(padding=0.1, around_cylinders=around).cover(item) for around in (True, False)
-    )
-    assert repr(one) == repr(other)
-
-
-def test_less_inflation_takes_more_spheres() -> None:
-    item = pin.GeometryObject("box", 0, 0, PLACE, SHAPES["box"])
-    sizes = [len(sphere_cover(item, inflation).radius) for inflation in (0.05, 0.03, 0.02)]
-    assert sizes == sorted(sizes) and sizes[0] < sizes[-1]
+@pytest.mark.parametrize("shape", [coal.Cylinder(0.5, 0.2), coal.Cylinder(0.1, 2.0)])
+def test_a_capsule_around_a_cylinder_is_as_thick_as_it(shape: coal.Cylinder) -> None:
+    cover = BodyCapsules(padding=0.0, around_cylinders=True).cover(body(shape))
+    assert distance_to(cover, points_of(shape)).max() <= 1e-12
+    assert cover.radius == pytest.approx([shape.radius])
+    assert cover.inflation == pytest.approx(shape.radius)  # beyond the faces
+    assert np.linalg.norm(cover.end - cover.start) == pytest.approx(2.0 * shape.halfLength)
 
 
 def test_a_half_space_cannot_be_covered() -> None:
-    with pytest.raises(UnsupportedShape, match="body 'floor' must be a solid, was a Halfspace"):
-        sphere_cover(
-            pin.GeometryObject(
-                "floor", 0, 0, PLACE, coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-            ),
-            0.1,
-        )
+    floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+    with pytest.raises(UnsupportedShape, match="body 'body' must be a solid, was a Halfspace"):
+        covers.sphere_cover(body(floor), 0.1)
+
+
+@pytest.mark.parametrize("name", ["sphere", "box", "rod", "ellipsoid", "hull"])
+def test_a_cover_out_of_the_cache_is_the_one_that_is_found_anew(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path))
+    item = body(hull("cloud") if name == "hull" else SHAPES[name])
+    expected = covers.sphere_cover(item, 0.03)
+    for time in ("first", "second", "damaged"):
+        cover = covers.kept_sphere_cover(item, 0.03)
+        assert all(np.array_equal(a, b) for a, b in zip(cover, expected, strict=True)), time
+        files = list((tmp_path / "covers").glob("*"))
+        assert len(files) == (0 if name == "sphere" else 1)
+        for file in files if time == "second" else ():
+            file.write_bytes(b"damaged")
+
+
+def test_whatever_matters_is_in_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path))
+    aside = pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    cases = [
+        (PLACE, hull("cloud"), 0.03),
+        (aside, hull("cloud"), 0.03),
+        (PLACE, hull("cloud", 1.01), 0.03),
+        (PLACE, hull("cloud"), 0.029),
+        (PLACE, SHAPES["box"], 0.03),
+        (PLACE, coal.Ellipsoid(0.1, 0.25, 0.06), 0.03),
+    ]
+    for count, (place, shape, inflation) in enumerate(cases, 1):
+        covers.kept_sphere_cover(body(shape, place), inflation)
+        assert len(list((tmp_path / "covers").glob("*"))) == count
+
+
+DEPTH = 0.001
+
+
+def reach_of(shape: object, n: FloatArray) -> float:
+    """Return the greatest reach of a shape against direction n, by its corners or closed form."""
+    if isinstance(shape, coal.Box):
+        return float(np.abs(n) @ shape.halfSide)
+    if isinstance(shape, coal.Cylinder):
+        return float(shape.radius * np.hypot(n[0], n[1]) + shape.halfLength * abs(n[2]))
+    return float(shape.radius + getattr(shape, "halfLength", 0.0) * abs(n[2]))
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        *(coal.Cylinder(0.03, 0.25), coal.Cylinder(0.2, 0.01), coal.Box(0.13, 0.04, 0.05)),
+        *(coal.Box(0.5, 0.5, 0.001), coal.Capsule(0.01, 0.06), coal.Sphere(0.04)),
+    ],
+)
+def test_free_inner_shapes_mean_no_deeper_than_allowed_on_any_tilted_plane(shape: object) -> None:
+    """And what does not reach half as deep is never refused."""
+    inner = covers.inner_balls(body(shape), DEPTH)
+    # cylinders: 24 points on a rim miss its lowest point by r (1 − cos 7.5°)
+    missed = shape.radius * 0.0086 if isinstance(shape, coal.Cylinder) else 0.0
+    for n in np.random.default_rng(1).normal(size=(200, 3)):
+        n /= np.linalg.norm(n)
+        local = np.concatenate([inner.start, inner.end]) - PLACE.translation
+        inner_reach = float((np.tile(inner.radius, 2) - local @ n).max())
+        deeper = reach_of(shape, PLACE.rotation.T @ n) - inner_reach
+        assert -1e-12 <= deeper <= DEPTH + missed + 1e-12
+        assert deeper >= min(0.5 * DEPTH, deeper + inner_reach) - 1e-12
+
+
+def test_other_inner_shapes_are_left_to_the_exact_verdict() -> None:
+    assert covers.inner_balls(body(SHAPES["ellipsoid"]), DEPTH) is None

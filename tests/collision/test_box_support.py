@@ -26,23 +26,27 @@ if sys.argv[1] in first: distance(*first[sys.argv[1]], (2.0, 1.0, 0.5))
 print([distance(box, bar, 0.3 * k, (1.0 + 0.1 * k, 0.3, 0.0)).hex() for k in range(5)])
 print(distance(box, bar, 0.0, (1.0, 0.0, 0.0)))
 """
-FIRST = ("nothing", "aligned", "turned", "capsules")
 
 
-def answers(first: str, *words: str) -> str:
-    command = [sys.executable, "-c", ASK, first, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+def run(program: str, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", program, *words]
+    return subprocess.run(command, capture_output=True, text=True, check=True)
+
+
+def answers(*words: str) -> set[str]:
+    return {
+        run(ASK, first, *words).stdout for first in ("nothing", "aligned", "turned", "capsules")
+    }
 
 
 def test_coal_itself_still_depends_on_its_first_question() -> None:
     """Where coal is mended, this fails, and `box_support` can go."""
-    assert len({answers(first) for first in FIRST}) == 2
+    assert len(answers()) == 2
 
 
 def test_with_evoexp_no_answer_depends_on_what_was_asked_first() -> None:
-    found = {answers(first, "evoexp") for first in FIRST}
-    assert len(found) == 1
-    exact = float(found.pop().splitlines()[1])
+    (answer,) = answers("evoexp")
+    exact = float(answer.splitlines()[1])
     assert exact == pytest.approx(0.75, abs=1e-15), "boxes are not inflated"
 
 
@@ -55,6 +59,6 @@ coal.distance(box, here, box, aside, coal.DistanceRequest(), coal.DistanceResult
 from evoexp.collision import box_support
 print(box_support.EXACT)
 """
-    done = subprocess.run([sys.executable, "-c", early], capture_output=True, text=True, check=True)
+    done = run(early)
     assert done.stdout.strip() == "False"
     assert "coal was asked about a box before evoexp" in done.stderr

@@ -11,21 +11,20 @@ import pinocchio as pin
 import pytest
 
 from collision.built_bodies import built, num_before_contact
-from composed import composed
 from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
 from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.packing import Shapes
+from evoexp.collision.bodies.planar_contacts import contacts, link_lines
+from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray
-from evoexp.scenarios.obstacles import (
-    BoxObstacle,
-    HalfSpaceObstacle,
-    SphereObstacle,
-    obstacle_table,
-)
+from evoexp.robots.arms import Arms
+from evoexp.robots.assembly import Robot
+from evoexp.robots.planar_chain import PlanarChain
+from evoexp.robots.serial_chain import SerialChain, SerialJoint
+from evoexp.scenarios.obstacles import obstacle_table
+from obstacle_samples import box, half_space, sphere
 from references import arms_6r, arms_7r
-
-COUNTS = [1, 7, 8, 9, 100, 333]
 
 
 def arm_7r() -> BodyCollision:
@@ -33,48 +32,44 @@ def arm_7r() -> BodyCollision:
     return built(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
 
 
-def arm_6r() -> BodyCollision:
+def arm_6r(geometry: Any = arms_6r.spheres) -> BodyCollision:
     model, table = arms_6r.model(), obstacle_table(arms_6r.OBSTACLES)
-    return built(
-        model,
-        arms_6r.shapes_of(arms_6r.spheres(model)),
-        table,
-        arms_6r.SELF_PAIRS,
-        [(1, arms_6r.FLOOR)],
-    )
+    shapes, ignored = arms_6r.shapes_of(geometry(model)), [(1, arms_6r.FLOOR)]
+    return built(model, shapes, table, arms_6r.SELF_PAIRS, ignored)
 
 
 ARMS = {"6R": (arm_6r, arms_6r), "7R": (arm_7r, arms_7r)}
 
 
-def decided(collision: BodyCollision, q: FloatArray, at_first: bool) -> tuple[int, BoolArray]:
+def decided(
+    collision: BodyCollision, q: FloatArray, at_first: bool = False
+) -> tuple[int, BoolArray]:
     """Return the kernel's answer without the exact one behind it."""
     out = np.empty(q.shape[1], dtype=np.bool_)
     return find_contacts(collision.tables, at_first, np.ascontiguousarray(q), out), out
 
 
-def slider(size: float, obstacles: tuple[Any, ...], radius: float = 0.1) -> BodyCollision:
+def slider(size: float, obstacle: Any, radius: float = 0.1) -> BodyCollision:
     """A ball that slides along x, and one that turns about z at its end."""
     model = pin.Model()
     first = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
     model.addJoint(first, pin.JointModelRZ(), pin.SE3.Identity(), "turn")
-    center = np.array([[0.0, 0.0, 0.0], [size, 0.0, 0.0]])
-    joints = np.array([1, 2])
+    center, joints = np.array([[0.0, 0.0, 0.0], [size, 0.0, 0.0]]), np.array([1, 2])
     shapes = Shapes(joints, center, center, np.array([radius, radius]), joints)
-    return built(model, shapes, obstacle_table(obstacles), ())
+    return built(model, shapes, obstacle_table((obstacle,)), ())
 
 
 @pytest.mark.parametrize("arm", ARMS)
 @pytest.mark.parametrize("drawn", ["random_configurations", "population"])
-@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 100, 333])
 def test_answers_are_the_signs_of_the_clearances(arm: str, drawn: str, count: int) -> None:
     make, source = ARMS[arm]
     collision, q = make(), getattr(source, drawn)(count)
     exact = collision.clearance(q).least
-    doubts, found = decided(collision, q, at_first=False)
+    doubts, hits = decided(collision, q)
     assert doubts == 0, "none of these is within 1e-12 of contact"
     assert np.abs(exact).min() > 1e-9
-    assert np.array_equal(found, exact < 0.0)
+    assert np.array_equal(hits, exact < 0.0)
     assert np.array_equal(collision.collides(q), exact < 0.0)
     assert num_before_contact(collision, q) == leading_free(exact < 0.0)
 
@@ -92,8 +87,7 @@ def test_a_7r_arm_agrees_with_coal(drawn: str) -> None:
 @pytest.mark.parametrize("arm", ARMS)
 def test_the_search_for_any_collision_ends_where_the_first_is_found(arm: str) -> None:
     make, source = ARMS[arm]
-    collision = make()
-    q = source.random_configurations(400)
+    collision, q = make(), source.random_configurations(400)
     hits = collision.clearance(q).least < 0.0
     free = q[:, ~hits]
     for place in (0, 5, 8, 50, free.shape[1]):
@@ -101,16 +95,14 @@ def test_the_search_for_any_collision_ends_where_the_first_is_found(arm: str) ->
         assert decided(collision, mixed, at_first=True)[0] == -1 - place // 8 * 8
         assert num_before_contact(collision, mixed) == place // 8 * 8
     assert decided(collision, free, at_first=True)[0] == 0
-    assert num_before_contact(collision, free) == free.shape[1]
-    assert num_before_contact(collision, free[:, :0]) == 0
+    for count in (0, free.shape[1]):
+        assert num_before_contact(collision, free[:, :count]) == count
 
 
 def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
-    ball = SphereObstacle(shape="sphere", center=(1.0, 0.0, 0.0), radius=0.5)
-    collision = slider(0.0, (ball,), radius=0.25)
-    at = 0.25 + 2.0**-52 * np.array([-1.0, 0.0, 1.0])
-    q = np.stack([at, np.zeros(3)])
-    assert decided(collision, q, at_first=False)[0] == 3
+    collision = slider(0.0, sphere((1.0, 0.0, 0.0), 0.5), radius=0.25)
+    q = np.stack([0.25 + 2.0**-52 * np.array([-1.0, 0.0, 1.0]), np.zeros(3)])
+    assert decided(collision, q)[0] == 3
     exact = collision.clearance(q).least
     assert np.array_equal(exact < 0.0, [False, False, True])
     assert np.array_equal(collision.collides(q), exact < 0.0)
@@ -119,21 +111,18 @@ def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
 
 
 def test_centres_within_boxes_without_thickness_collide() -> None:
-    box = BoxObstacle(shape="box", center=(1.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
-    collision = slider(0.2, (box,), radius=0.0)
+    collision = slider(0.2, box((1.0, 0.0, 0.0), (1.0, 1.0, 1.0)), radius=0.0)
     q = np.array([[0.0, 0.29, 0.31, 0.49, 0.51, 1.0], [0.0, 0.0, 0.0, np.pi, 0.0, 1.0]])
     assert np.array_equal(collision.collides(q), [False, False, True, False, True, True])
 
 
 def test_far_slides_large_angles_and_what_is_not_a_number_are_judged_exactly() -> None:
-    floor = HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, -5.0), normal=(1e-6, 0.0, 1.0))
-    collision = slider(0.5, (floor,))
-    q = np.array(
-        [[0.0, -6e6, 4e6, -1e30, np.nan, np.inf, 1e3], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e9]]
-    )
+    collision = slider(0.5, half_space((0.0, 0.0, -5.0), (1e-6, 0.0, 1.0)))
+    q = np.zeros((2, 7))
+    q[0], q[1, 6] = [0.0, -6e6, 4e6, -1e30, np.nan, np.inf, 1e3], 1e9
     with np.errstate(invalid="ignore"):
         exact = collision.clearance(q).least
-    assert decided(collision, q, at_first=False)[0] == 6
+    assert decided(collision, q)[0] == 6
     assert np.array_equal(collision.collides(q), ~(exact >= 0.0))
     assert np.array_equal(collision.collides(q)[:3], [False, True, False])
 
@@ -142,79 +131,41 @@ def test_far_slides_large_angles_and_what_is_not_a_number_are_judged_exactly() -
 def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
     rng = np.random.default_rng(seed)
     scale = 10.0 ** rng.uniform(-3.0, 3.0)
-    model, own = arms_6r.model(), arms_7r.shapes()
-    for joint in range(1, model.njoints):
-        model.jointPlacements[joint].translation *= scale
-    joint = np.minimum(own.joint, 6)
-    fitting = own._replace(joint=joint, body=joint)
-    shapes = fitting._replace(
-        start=scale * own.start, end=scale * own.end, radius=scale * own.radius
-    )
-    obstacles = tuple(
-        one.model_copy(
-            update={
-                "center": tuple(scale * x for x in one.center),
-                **(
-                    {"radius": scale * one.radius}
-                    if isinstance(one, SphereObstacle)
-                    else {"size": tuple(scale * x for x in one.size)}
-                ),
-            }
-        )
-        for one in arms_6r.OBSTACLES
-        if isinstance(one, SphereObstacle | BoxObstacle)
-    )
-    collision = built(model, shapes, obstacle_table(obstacles))
+    model, (joint, *sizes, _) = arms_6r.model(), arms_7r.shapes()
+    for k in range(1, model.njoints):
+        model.jointPlacements[k].translation *= scale
+    joint = np.minimum(joint, 6)
+    solids = [each for each in arms_6r.OBSTACLES if each.shape in ("sphere", "box")]
+    table = obstacle_table(tuple(solids))
+    scaled = table._replace(center=scale * table.center, size=scale * table.size)
+    collision = built(model, Shapes(joint, *(scale * size for size in sizes), joint), scaled)
     q = rng.uniform(-np.pi, np.pi, size=(6, 1)) + rng.choice([0.1, 3.0]) * rng.normal(size=(6, 203))
-    doubts, found = decided(collision, q, at_first=False)
+    doubts, hits = decided(collision, q)
     assert doubts == 0
-    assert np.array_equal(found, collision.clearance(q).least < 0.0)
+    assert np.array_equal(hits, collision.clearance(q).least < 0.0)
 
 
 def test_capsules_are_answered_in_full() -> None:
-    model, table = arms_6r.model(), obstacle_table(arms_6r.OBSTACLES)
-    collision = built(
-        model,
-        arms_6r.shapes_of(arms_6r.capsules(model)),
-        table,
-        arms_6r.SELF_PAIRS,
-        [(1, arms_6r.FLOOR)],
-    )
-    q = arms_6r.random_configurations(50)
+    collision, q = arm_6r(arms_6r.capsules), arms_6r.random_configurations(50)
     hits = collision.collides(q)
     assert num_before_contact(collision, q) == leading_free(hits)
     assert num_before_contact(collision, q[:, ~hits]) == (~hits).sum()
 
 
-@pytest.mark.parametrize("experiment", ["rana_planar", "rana_obstacles", "rana_puma"])
-def test_touching_spheres_find_any_collision(experiment: str) -> None:
-    planner, problem = composed(f"experiment={experiment}").prepare()
-    collision = problem.collision
-    strings = planner.sample(problem, np.random.default_rng(0), 24)
-    q = np.ascontiguousarray(strings.reshape(len(strings), -1))
-    hits = collision.clearance(q).least < 0.0
-    assert 0 < hits.sum() < len(hits)
-    assert np.array_equal(collision.collides(q), hits)
-    general, q = collision.general, DEGREE * q
-    assert num_before_contact(general, q) == leading_free(hits)
-    free = q[:, ~hits]
-    assert num_before_contact(general, free) == free.shape[1]
-    for count in (1, 7, 8, 9, 20):
-        few = q[:, :count]
-        assert num_before_contact(general, few) == leading_free(hits[:count])
-        mixed = np.hstack([free[:, :count], q[:, hits][:, :1]])
-        assert num_before_contact(general, mixed) == count // 8 * 8
-
-
 PROGRAMME = """
 import sys
-import numpy as np
 sys.path.insert(0, {tests!r})
-from collision.test_contacts import ARMS
-for make, source in ARMS.values():
-    for drawn in ("random_configurations", "population"):
-        print(make().collides(getattr(source, drawn)(300)).astype(int).tolist())
+from collision.test_contacts import answers
+print("\\n".join(answers()))
 """
+
+
+def answers() -> list[str]:
+    return [
+        str(make().collides(getattr(source, drawn)(300)).astype(int).tolist())
+        for make, source in ARMS.values()
+        for drawn in ("random_configurations", "population")
+    ]
 
 
 @pytest.mark.matrix
@@ -223,16 +174,115 @@ def test_other_processors_give_the_same_answers(processor: str, tmp_path: Path) 
     names = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
     environment = {**os.environ, **names, "EVOEXP_CACHE": str(tmp_path)}
     programme = PROGRAMME.format(tests=str(Path(__file__).parents[1]))
-    done = subprocess.run(
-        [sys.executable, "-c", programme],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    expected = [
-        str(make().collides(getattr(source, drawn)(300)).astype(int).tolist())
-        for make, source in ARMS.values()
-        for drawn in ("random_configurations", "population")
-    ]
-    assert done.stdout.splitlines() == expected
+    command = [sys.executable, "-c", programme]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == answers()
+
+
+def planar(*lengths: float, base: tuple[float, float], angle: float = 0.0) -> PlanarChain:
+    return PlanarChain(link_lengths=lengths, base_position=base, base_angle=angle)
+
+
+def elbow(y: float) -> SerialChain:
+    """Return a spatial 3R arm, for the kernel in space."""
+    rows = ((0.0, 0.0, 1.0), 0.0, 0.0), ((0.0, 1.0, 0.0), 0.0, 1.0), ((0.0, 1.0, 0.0), 1.5, 0.0)
+    joints = tuple(SerialJoint(axis=axis, offset=(x, 0.0, z)) for axis, x, z in rows)
+    return SerialChain(joints=joints, tip=(1.2, 0.1, 0.0), base_position=(0.0, y, 0.0))
+
+
+TWO_PLANAR = Arms(
+    arms=(planar(4.0, 4.0, base=(0.0, 0.0)), planar(4.0, 4.0, base=(0.0, 8.0), angle=20.0))
+)
+ROBOTS = {
+    "two arms": TWO_PLANAR,
+    "three arms": Arms(arms=(*TWO_PLANAR.arms, planar(3.0, 2.0, 2.0, base=(9.0, 4.0)))),
+    "in space": Arms(arms=(elbow(0.0), elbow(2.5))),
+    "alone": planar(4.0, 4.0, base=(0.0, 4.0)),
+}
+
+
+def touching(
+    robot: Robot, spheres: int = 5, radius: float = 0.5, obstacles: tuple[object, ...] = ()
+) -> SphereCollision:
+    model = TouchingSpheres(spheres_per_link=spheres, sphere_radius=radius, collision_substeps=1)
+    return model.bind(robot.build(), obstacles)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_clearances_are_those_of_the_general_model(robot: str) -> None:
+    """Which stands beside coal and a plain reference of its own."""
+    rng = np.random.default_rng(1)
+    for obstacles in (*((each,) for each in arms_6r.OBSTACLES), arms_6r.OBSTACLES):
+        collision = touching(ROBOTS[robot], obstacles=obstacles)
+        q = rng.uniform(-720.0, 720.0, size=(collision.general.nq, 133))
+        exact, general = collision.clearance(q), collision.general.clearance(DEGREE * q)
+        arms, solids = exact.between_arms, exact.to_obstacles
+        assert np.allclose(arms, general.between_arms, rtol=0.0, atol=1e-12)
+        assert np.allclose(solids, general.to_obstacles, rtol=0.0, atol=1e-12)
+        assert np.isposinf(arms).all() == (robot == "alone")
+        assert np.array_equal(collision.collides(q), exact.least < 0.0)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("spheres", [1, 2, 5, 11, 200])
+@pytest.mark.parametrize("count", [1, 9, 64, 8 * 64 + 5])
+def test_circles_at_equal_steps_collide_where_their_clearance_is_negative(
+    robot: str, spheres: int, count: int
+) -> None:
+    collision = touching(ROBOTS[robot], spheres)
+    rng, nq = np.random.default_rng(spheres + count), collision.general.nq
+    for spread in (180.0, 5.0):
+        middle = rng.uniform(-180.0, 180.0, size=(nq, 1))
+        q = middle + rng.uniform(-spread, spread, size=(nq, count))
+        exact = collision.clearance(q).least
+        assert np.abs(exact).min() > 1e-10
+        assert np.array_equal(collision.collides(q), exact < 0.0)
+        assert num_before_contact(collision.general, DEGREE * q) == leading_free(exact < 0.0)
+
+
+def test_circles_that_touch_are_measured_exactly() -> None:
+    """Two links along y, whose lines are one diameter apart, and a last bit less or more."""
+    arms = Arms(arms=tuple(planar(4.0, 4.0, base=(x, 0.0)) for x in (0.0, 0.75)))
+    q = np.repeat(np.array([[90.0], [0.0], [90.0], [0.0]]), 9, axis=1)
+    q[1, 4] = 1.0  # turned towards the other
+    for radius in np.nextafter(0.375, [0.0, 0.375, 1.0]):
+        collision = touching(arms, 5, float(radius))
+        exact = collision.clearance(q).least
+        assert np.abs(np.delete(exact, 4)).max() < 1e-15
+        assert np.array_equal(collision.collides(q), exact < 0.0)
+
+
+def test_large_angles_and_what_is_not_a_number_are_measured_exactly() -> None:
+    collision, rng = touching(TWO_PLANAR), np.random.default_rng(0)
+    q = rng.uniform(-1.0, 1.0, size=(4, 70)) * 10.0 ** rng.uniform(2.0, 9.0, size=(1, 70))
+    q[1, 3], q[2, 50] = np.nan, np.inf
+    with np.errstate(invalid="ignore"):
+        exact = collision.clearance(q).least
+    assert 0 < (exact < 0.0).sum() < 70
+    assert np.array_equal(collision.collides(q), ~(exact >= 0.0))
+
+
+def test_spheres_at_unequal_steps_are_measured_exactly() -> None:
+    collision, links = touching(TWO_PLANAR), np.array([[0, 5]])
+    joint, local, radius = collision.spheres
+    for axis, is_equal in ((0, True), (1, False), (2, False)):
+        moved = local.copy()
+        moved[2, axis] += 0.0 if is_equal else 0.7
+        chain = collision.assembly.table.chain
+        lines = link_lines(chain, joint, moved, radius, links, np.array([[0, 1]]))
+        assert (lines.scale < np.inf) is is_equal
+    tables = collision.tables
+    unequal = tables._replace(lines=tables.lines._replace(scale=np.inf))
+    q = np.random.default_rng(0).uniform(-180.0, 180.0, size=(4, 300))
+    out = np.empty(300)
+    contacts(unequal, q, 0, out)
+    assert np.array_equal(out < 0.0, collision.clearance(q).least < 0.0)
+
+
+def test_circles_stand_joint_to_joint_and_shared_ones_count_once() -> None:
+    collision = touching(TWO_PLANAR)
+    assert collision.arm_spheres.tolist() == [[0, 9], [9, 18]]
+    assert collision.spheres.local[:9, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0, 3.0, 4.0]
+    assert touching(ROBOTS["alone"], 1).spheres.local[:, 0].tolist() == [2.0, 2.0]
+    with pytest.raises(ValueError, match=r"q must have shape \(4, configurations\)"):
+        collision.clearance(np.zeros((3, 5)))

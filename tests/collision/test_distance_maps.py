@@ -11,14 +11,9 @@ from evoexp.paths.motion import Motion
 
 PROBLEM = "evoexp:motionbenchmaker/problems/table_under_pick_ur5"
 WORDS = (
-    "robot=ur5",
-    "planner=rrt_connect",
-    "ga=rrt_connect",
-    "objective=null",
-    "collision=covered_bodies",
-    "scenario=moveit",
-    f"scenario.scene='{PROBLEM}/scene0001.yaml'",
-    f"scenario.request='{PROBLEM}/request0001.yaml'",
+    *("robot=ur5", "planner=rrt_connect", "ga=rrt_connect", "objective=null"),
+    *("collision=covered_bodies", "scenario=moveit"),
+    *(f"scenario.{name}='{PROBLEM}/{name}0001.yaml'" for name in ("scene", "request")),
 )
 
 
@@ -47,10 +42,19 @@ def test_the_pairs_whose_covers_always_touch_have_maps(problem: Any) -> None:
 
 
 def test_bounds_are_below_coals_distances_and_not_far(problem: Any, q: np.ndarray) -> None:
+    def exact(q: np.ndarray) -> np.ndarray:
+        return coal_distances(problem.collision.assembly, each.pair, q)
+
     for each in problem.collision.bodies.maps:
-        exact, bounds = coal_distances(problem.collision.assembly, each.pair, q), each.at(q)
-        assert (bounds <= exact).all()
-        assert (bounds > 0.0).any() and ((exact == 0.0) <= (bounds <= 0.0)).all()
+        distances, bounds = exact(q), each.at(q)
+        assert (bounds <= distances).all()
+        assert (bounds > 0.0).any() and ((distances == 0.0) <= (bounds <= 0.0)).all()
+        for ends in np.split(q[:, :60].T, 20):  # three configurations, two long lines
+            motion = Motion(np.ascontiguousarray(ends))
+            between = np.array([motion.at(t) for t in np.linspace(0.0, 2.0, 200)])
+            assert each.least(motion) <= exact(between.T).min()
+        still = Motion(np.ascontiguousarray(q[:, :1].T))
+        assert each.least(still) >= bounds[0]
 
 
 def test_kernels_read_the_maps(problem: Any, q: np.ndarray) -> None:
@@ -58,21 +62,7 @@ def test_kernels_read_the_maps(problem: Any, q: np.ndarray) -> None:
     least = np.min([each.at(q) for each in maps], axis=0)
     assert (collision.clearance(q).to_self <= least).all()
     assert collision.collides(q)[least < 0.0].all()
-    alone = problem.collision.bodies._replace(maps=())
-    without = alone.collision(problem.collision.obstacles)
-    assert (collision.collides(q) == (without.collides(q) | (least < 0.0))).all()
+    alone = problem.collision.bodies._replace(maps=()).collision(problem.collision.obstacles)
+    assert (collision.collides(q) == (alone.collides(q) | (least < 0.0))).all()
     beyond = np.full((len(q), 8), np.nan)
     assert collision.collides(beyond).all()
-
-
-def test_the_bound_of_a_motion_is_below_all_of_its_configurations(
-    problem: Any, q: np.ndarray
-) -> None:
-    for each in problem.collision.bodies.maps:
-        for ends in np.split(q[:, :60].T, 20):  # three configurations, two long lines
-            motion = Motion(np.ascontiguousarray(ends))
-            between = [motion.at(t) for t in np.linspace(0.0, 2.0, 200)]
-            exact = coal_distances(problem.collision.assembly, each.pair, np.array(between).T)
-            assert each.least(motion) <= exact.min()
-        still = Motion(np.ascontiguousarray(q[:, :1].T))
-        assert each.least(still) >= each.at(q[:, :1])[0]

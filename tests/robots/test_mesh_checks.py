@@ -1,6 +1,7 @@
 """Meshes are what their files say: against a reader of OBJ that is a page of Python."""
 
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,15 @@ import coal
 import numpy as np
 import pytest
 
-from evoexp.attachments import File
+from coal_shapes import distance, distance_of_point, placed
+from evoexp.attachments import PREFIX, File, keep
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
+from evoexp.robots import mesh_pieces as module
 from evoexp.robots.mesh_checks import load, triangles_of, unused_vertices, whole_mesh
+from evoexp.robots.mesh_pieces import loaded_mesh, mesh_pieces, read_pieces
 from evoexp.robots.urdf import Urdf
+from robots.robot_samples import task, urdf_of
 
 # two triangles far from one another, of two materials in one object
 MATERIALS = b"""mtllib none.mtl
@@ -31,7 +36,6 @@ f 4//1 5//1 6//1
 l 1 2
 """
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-PANDA = Path(__file__).parents[2] / "src/evoexp/assets/motionbenchmaker/panda/meshes/collision"
 
 
 def obj_triangles(content: bytes) -> set[tuple[tuple[float, ...], ...]]:
@@ -69,46 +73,28 @@ def test_triangles_of_several_materials_end_where_the_file_says() -> None:
     assert built_triangles(mended) == obj_triangles(MATERIALS)
 
 
-def test_the_shipped_mesh_is_read_whole_and_with_materials_too() -> None:
-    """MotionBenchMaker's own `link6.obj` gives its faces seventeen materials; here, two."""
-    plain = (PANDA / "link6.obj").read_bytes()
-    assert whole_mesh(plain, "link6.obj", "robot.path") is plain
-    expected = obj_triangles(plain)
-    assert len(expected) == 1308 and built_triangles(load(plain, "a.obj", "")) == expected
-    lines = plain.splitlines()
-    faces = [k for k, line in enumerate(lines) if line.startswith(b"f ")]
-    for k in (faces[900], faces[0]):
-        lines.insert(k, b"usemtl shell_%d" % k)
-    painted = b"\n".join(lines)
-    assert unused_vertices(load(painted, "a.obj", "")) > 100
-    assert built_triangles(load(whole_mesh(painted, "a.obj", ""), "a.obj", "")) == expected
+LAST_FACE = b"f 4//1 5//1 6//1"
+VARIANTS = {
+    "one material": MATERIALS.replace(b"usemtl two\n", b""),
+    "objects": MATERIALS.replace(b"usemtl two", b"o second"),
+    "numbers from the end": MATERIALS.replace(LAST_FACE, b"f -3 -2 -1"),
+    "a quadrangle": MATERIALS.replace(LAST_FACE, b"f 4 5 6 2"),
+    "a line continued": MATERIALS.replace(LAST_FACE, b"f 4 5 \\\n6"),
+    "an indented face": MATERIALS.replace(b"usemtl two\nf 4", b"  f 4"),
+    "a capital": MATERIALS.replace(b"usemtl two\nf 4", b"F 4"),
+    "indented vertices": MATERIALS.replace(b"v 5", b" v 5").replace(b"\n", b"\r\n"),
+}
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        MATERIALS.replace(b"usemtl two\n", b""),
-        MATERIALS.replace(b"usemtl two", b"o second"),
-        MATERIALS.replace(b"f 4//1 5//1 6//1", b"f -3 -2 -1"),
-        MATERIALS.replace(b"f 4//1 5//1 6//1", b"f 4 5 6 2"),
-        MATERIALS.replace(b"f 4//1 5//1 6//1", b"f 4 5 \\\n6"),
-        MATERIALS.replace(b"usemtl two\nf 4", b"  f 4"),
-        MATERIALS.replace(b"usemtl two\nf 4", b"F 4"),
-        MATERIALS.replace(b"v 5", b" v 5").replace(b"\n", b"\r\n"),
-    ],
-    ids=[
-        *("one material", "objects", "numbers from the end", "a quadrangle", "a line continued"),
-        *("an indented face", "a capital", "indented vertices"),
-    ],
-)
-def test_files_of_objects_are_read_like_by_the_slow_reader(content: bytes) -> None:
-    mesh = load(whole_mesh(content, "a.obj", "robot.path"), "a.obj", "")
-    expected = obj_triangles(content.replace(b"\\\n", b""))
-    area = [
+@pytest.mark.parametrize("name", VARIANTS)
+def test_files_of_objects_are_read_like_by_the_slow_reader(name: str) -> None:
+    mesh = load(whole_mesh(VARIANTS[name], "a.obj", "robot.path"), "a.obj", "")
+    expected = obj_triangles(VARIANTS[name].replace(b"\\\n", b""))
+    areas = [
         sum(np.linalg.norm(np.cross(np.subtract(b, a), np.subtract(c, a))) for a, b, c in triangles)
         for triangles in (built_triangles(mesh), expected)
     ]
-    assert unused_vertices(mesh) == 0 and area[0] == pytest.approx(area[1])
+    assert unused_vertices(mesh) == 0 and areas[0] == pytest.approx(areas[1])
 
 
 DAE = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"
@@ -131,8 +117,7 @@ def triangles(*lists: str) -> str:
 
 
 def binary_stl(told: int, numbers: FloatArray) -> bytes:
-    normal = [0.0, 0.0, 1.0]
-    rows = [struct.pack("<12fH", *normal, *map(float, row), 0) for row in numbers]
+    rows = [struct.pack("<12fH", 0.0, 0.0, 1.0, *map(float, row), 0) for row in numbers]
     return b"x" * 80 + struct.pack("<I", told) + b"".join(rows)
 
 
@@ -169,11 +154,8 @@ NO_NUMBER = "a vertex that is no finite number"
         ("m.obj", TETRAHEDRON.replace("v 1 0", "v 1 inf").encode(), NO_NUMBER),
         ("m.ply", PLY.replace(b"1 0 0", b"1 nan 0"), NO_NUMBER),
         ("m.dae", DAE.format(unit=1, lists="").replace("5 0 0 6", "5 NaN 0 6").encode(), NO_NUMBER),
-        (
-            "m.dae",
-            DAE.format(unit=1, lists=triangles("0 1 2", "3 4 5")).encode(),
-            "parts whose triangles coal joins to other vertices (save it as one mesh, an STL)",
-        ),
+        ("m.dae", DAE.format(unit=1, lists=triangles("0 1 2", "3 4 5")).encode(),
+         "parts whose triangles coal joins to other vertices (save it as one mesh, an STL)"),
     ],
 )  # fmt: skip
 def test_a_mesh_that_is_none_is_refused_with_the_reason(
@@ -205,13 +187,10 @@ def test_a_mesh_travels_as_it_is(name: str, content: bytes) -> None:
 
 
 def robot(folder: Path, name: str, scale: str = "", **settings: Any) -> Urdf:
-    (folder / "r.urdf").write_text(
-        f'<robot name="r"><link name="a"/><link name="b"><collision><geometry><mesh {scale} '
-        f'filename="{name}"/></geometry></collision></link><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/></joint></robot>'
-    )
-    found = Urdf.read_files({"path": str(folder / "r.urdf"), **settings}, "robot")
-    return Urdf.model_validate(found, strict=False)
+    body = f'<collision><geometry><mesh {scale} filename="{name}"/></geometry></collision>'
+    joint = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>'
+    text = f'<robot name="r"><link name="a"/><link name="b">{body}</link>{joint}</robot>'
+    return urdf_of(folder, text, **settings)
 
 
 def test_a_mesh_that_only_coal_refuses_is_named(tmp_path: Path) -> None:
@@ -227,8 +206,6 @@ def test_meshes_of_a_stored_condition_are_compared_with_the_file(tmp_path: Path)
     (tmp_path / "m.obj").write_bytes(MATERIALS)
     whole = robot(tmp_path, "m.obj")
     assert whole.meshes[0].file.content != MATERIALS
-    from evoexp.attachments import keep
-
     stored = whole.meshes[0].model_copy(update={"file": File(sha256=keep(MATERIALS))})
     with pytest.raises(SettingError, match=r"'m\.obj': 3 of 6 vertices end in"):
         whole.model_copy(update={"meshes": (stored,)}).build()
@@ -236,21 +213,14 @@ def test_meshes_of_a_stored_condition_are_compared_with_the_file(tmp_path: Path)
 
 def test_a_mirrored_mesh_is_mirrored_as_pieces_too(tmp_path: Path) -> None:
     (tmp_path / "m.obj").write_text(TETRAHEDRON)
-    rng = np.random.default_rng(1)
     plain, hull = (
         robot(tmp_path, "m.obj", 'scale="1 -2 1"', **settings).build().geometry.geometryObjects[0]
         for settings in ({}, {"decomposition": "hulls"})
     )
-    ball = coal.Sphere(0.1)
-    for _ in range(50):
-        place = coal.Transform3s(np.eye(3), rng.uniform([-1, -3, -1], [2, 1, 2]))
-        away = []
-        for body in (plain, hull):
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            still = coal.Transform3s.Identity()
-            away.append(coal.distance(body.geometry, still, ball, place, request, result))
-        if away[1] > 0.0:  # a mesh has no inside
-            assert away[0] == pytest.approx(away[1], abs=1e-6)
+    for center in np.random.default_rng(1).uniform([-1, -3, -1], [2, 1, 2], (50, 3)):
+        ball = placed(coal.Sphere(0.1), center)
+        away = [distance(placed(body.geometry), ball) for body in (plain, hull)]
+        assert away[1] <= 0.0 or away[0] == pytest.approx(away[1], abs=1e-6)  # a mesh has no inside
 
 
 def test_the_unit_of_a_dae_is_a_note(tmp_path: Path) -> None:
@@ -261,3 +231,113 @@ def test_the_unit_of_a_dae_is_a_note(tmp_path: Path) -> None:
     assert robot(tmp_path, "m.dae").notes() == []
     (item,) = robot(tmp_path, "cm.dae").build().geometry.geometryObjects
     assert item.geometry.vertices().max() == 6.0
+
+
+L_PROFILE = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
+
+
+def angle_iron() -> bytes:
+    """A closed L of unit depth, as an OBJ file."""
+    lines = [f"v {x} {y} {z}" for z in (0, 1) for x, y in L_PROFILE]
+    caps = [(1, 2, 3), (1, 3, 4), (1, 4, 5), (1, 5, 6)]
+    faces = [(a, c, b) for a, b, c in caps] + [(a + 6, b + 6, c + 6) for a, b, c in caps]
+    for a, b in ((k + 1, (k + 1) % 6 + 1) for k in range(6)):
+        faces += [(a, b, b + 6), (a, b + 6, a + 6)]
+    return "\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in faces)]).encode()
+
+
+def surface_points(count: int) -> np.ndarray:
+    corners, triangles = loaded_mesh(angle_iron(), ".obj", "test")
+    rng = np.random.default_rng(2)
+    a, b, c = corners[triangles].transpose(1, 0, 2)
+    area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1))
+    chosen = rng.choice(len(triangles), size=count, p=area / area.sum())
+    shares = rng.dirichlet(np.ones(3), count)
+    return np.einsum("pc,pcx->px", shares, corners[triangles][chosen])
+
+
+def pieces_of(content: bytes) -> list[coal.Convex]:
+    return read_pieces(content, np.ones(3), "test")
+
+
+def standing_out(pieces: list[coal.Convex], count: int) -> float:
+    """The greatest distance of points of the L from the nearest of some pieces, by coal."""
+    bodies = [placed(piece) for piece in pieces]
+    points = surface_points(count)
+    return max(min(distance_of_point(point, body) for body in bodies) for point in points)
+
+
+def test_the_hull_of_a_mesh_contains_it() -> None:
+    pieces = pieces_of(mesh_pieces(angle_iron(), ".obj", "hulls", "test"))
+    assert len(pieces) == 1 and pieces[0].num_points == 5 * 2
+    assert standing_out(pieces, 300) < 1e-6
+
+
+def test_pieces_of_coacd_contain_the_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("coacd")
+    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path))
+    content = mesh_pieces(angle_iron(), ".obj", "coacd", "test")
+    pieces = pieces_of(content)
+    assert 2 <= len(pieces) <= 4
+    assert standing_out(pieces, 1000) < 1e-6
+    # the notch of the L stays free
+    notch = placed(coal.Sphere(0.8), [2.0, 2.0, 0.5])
+    assert all(distance(notch, placed(piece)) > 0.05 for piece in pieces)
+    # the second time they are read from the cache
+    monkeypatch.setattr(module, "_grown", None)
+    assert mesh_pieces(angle_iron(), ".obj", "coacd", "test") == content
+
+
+def test_pieces_that_leave_parts_out_are_grown() -> None:
+    """Two boxes that are smaller than the arms of the L, as CoACD's remeshed pieces may be."""
+    corners, triangles = loaded_mesh(angle_iron(), ".obj", "test")
+    box = np.array(np.meshgrid((0.02, 0.98), (0.02, 0.98), (0.02, 0.98))).reshape(3, -1).T
+    small = [box * [3.0, 1.0, 1.0], box * [1.0, 3.0, 1.0]]
+    grown = module._grown(small, corners, triangles)
+    before, after = (pieces_of(module._written(points, "test")) for points in (small, grown))
+    assert standing_out(before, 500) > 0.01
+    assert standing_out(after, 500) < 1e-6
+    # no arm grows by more than triangles that are not cut any more: the notch stays free
+    assert all(piece.num_points < 500 for piece in after)
+    assert max(min(p[0], p[1]) for each in grown for p in each) <= 1.0 + 3.0 * module.SHORT
+
+
+def test_without_the_library_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "coacd", None)
+    must = r"hulls, or coacd with it installed \(pip install 'evoexp\[meshes\]'\), was 'coacd'"
+    with pytest.raises(SettingError, match=f"robot.decomposition: must be {must}"):
+        task("robot.decomposition=coacd")
+
+
+def test_a_misspelt_way_is_refused() -> None:
+    with pytest.raises(SettingError, match=r"robot.decomposition: must be .*'hulls'.* was 'hull'"):
+        task("robot.decomposition=hull")
+
+
+def test_pieces_travel_with_the_condition() -> None:
+    plain, cut = task(), task("robot.decomposition=hulls")
+    assert b"decomposition" not in plain.to_json() and b"pieces" not in plain.to_json()
+    assert plain.id != cut.id
+    (mesh,) = cut.robot.meshes
+    pieces = mesh.pieces.content
+    assert pieces.startswith(b"o piece_0\nv ")
+    assert cut.files()[PREFIX + keep(pieces)] == pieces
+    bodies: list[Any] = [each.robot.build().geometry.geometryObjects for each in (plain, cut)]
+    names = [[item.name for item in items] for items in bodies]
+    assert names[0] == names[1]
+    before, after = (items[6] for items in bodies)
+    assert before.geometry.num_vertices == 8 and isinstance(after.geometry, coal.Convex)
+    assert before.placement == after.placement and before.parentJoint == after.parentJoint
+    # the OBJ's scale in the URDF holds for its pieces
+    for item in (before, after):
+        item.geometry.computeLocalAABB()
+    assert after.geometry.aabb_radius == pytest.approx(before.geometry.aabb_radius, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"v 0 0 0", b"o piece_0\nv 0 0\n", b"o a\nv 0 0 0\nf 1 2 3\n", b"\xff", b"o a\no b\n"],
+)
+def test_damaged_pieces_are_refused(content: bytes) -> None:
+    with pytest.raises(SettingError, match="test: must be pieces of a mesh"):
+        pieces_of(content)

@@ -1,139 +1,80 @@
-"""Robots out of a URDF: against Pinocchio's own reading, through two planners.
-
-And what is refused.
-"""
+"""Robots out of a URDF: their identity, their files, their frames, their spheres, refusals."""
 
 import json
 import shutil
 from pathlib import Path
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.attachments import PREFIX
+from evoexp.attachments import PREFIX, keep
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log
+from evoexp.collision.covers.body_covers import given_cover
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
-from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.store.log_reader import read_log
+from robots.robot_samples import TWO, UR5_LIKE, placements, task, tool_pose
 
-DATA = Path(__file__).parent / "data" / "ur5_like"
-URDF = DATA / "ur5_like.urdf"
-REACH = (
-    "robot=urdf", "scenario=urdf_reach", "planner=posture_es", "ga=corsepius",
-    "objective=corsepius_reach",
-    "collision=corsepius_spheres",
-)  # fmt: skip
-TWO = (
-    "robot=two_urdf", "scenario=urdf_two_arms", "planner=rana_puma", "ga=rana_puma",
-    "objective=rana_puma",
-    "collision=urdf_two_arms",
-)  # fmt: skip
+SRDF = f"robot.srdf={UR5_LIKE / 'ur5_like.srdf'}"
 
 
-def condition(*overrides: str, base: tuple[str, ...] = REACH, path: Path = URDF) -> Condition:
-    found: Condition = (
-        compose.expand([*base, f"robot.path={path}", *overrides])[0].conditions[0].condition
-    )
-    return found
-
-
-def test_tool_and_bodies_are_where_pinocchio_has_them() -> None:
-    assembly = condition().robot.build()  # type: ignore[attr-defined]
-    own = pin.buildModelFromUrdf(str(URDF))
-    geometry = pin.buildGeomFromUrdf(
-        own, str(URDF), pin.GeometryType.COLLISION, package_dirs=[str(DATA.parent)]
-    )
-    data, placed = own.createData(), geometry.createData()
-    again, moved = assembly.model.createData(), assembly.geometry.createData()
-    tool = assembly.tools[0]
-    local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
-    for seed in range(20):
-        q = np.random.default_rng(seed).uniform(-2.5, 2.5, 6)
-        pin.framesForwardKinematics(own, data, q)
-        expected = data.oMf[own.getFrameId("tool0")]
-        pose = frame_pose(assembly.table, tool.joint - 1, local, q)
-        assert pose[9:] == pytest.approx(expected.translation, abs=1e-12)
-        assert pose[:9] == pytest.approx(expected.rotation.ravel(), abs=1e-12)
-        pin.updateGeometryPlacements(own, data, geometry, placed, q)
-        pin.updateGeometryPlacements(assembly.model, again, assembly.geometry, moved, q)
-        for one, two in zip(placed.oMg, moved.oMg, strict=True):
-            assert one.isApprox(two, 1e-12)
-    assert [item.name for item in assembly.geometry.geometryObjects][-1] == "wrist_3_link"
-    assert assembly.geometry.geometryObjects[6].geometry.num_vertices == 8
+def changed(tmp_path: Path, before: str, after: str) -> Path:
+    """Copy the robot's files, and replace a part of the URDF, which occurs once or more."""
+    file = shutil.copytree(UR5_LIKE, tmp_path / "ur5_like") / "ur5_like.urdf"
+    assert before in file.read_text()
+    file.write_text(file.read_text().replace(before, after))
+    return file
 
 
 def test_identity_is_the_content_wherever_it_lies(tmp_path: Path) -> None:
-    shutil.copytree(DATA, tmp_path / "ur5_like")
-    moved = tmp_path / "ur5_like" / "renamed.urdf"
-    (tmp_path / "ur5_like" / "ur5_like.urdf").rename(moved)
-    assert condition(path=moved).id == condition().id
-    (tmp_path / "ur5_like" / "hand.obj").write_text(
-        (DATA / "hand.obj").read_text().replace("0.04", "0.05")
-    )
-    assert condition(path=moved).id != condition().id
-    assert str(tmp_path) not in condition(path=moved).to_json().decode()
+    moved = shutil.copytree(UR5_LIKE, tmp_path / "ur5_like") / "renamed.urdf"
+    (moved.parent / "ur5_like.urdf").rename(moved)
+    same = task(path=moved)
+    assert same.id == task().id == Condition.from_json(same.to_json()).id
+    config = json.loads(same.to_json())["robot"]
+    assert set(config) == {"_target_", "revision", "urdf", "meshes", "pairs"}, "hashes only"
+    assert config["meshes"][0]["name"] == "package://ur5_like/hand.obj"
+    mesh = moved.parent / "hand.obj"
+    mesh.write_text(mesh.read_text().replace("0.04", "0.05"))
+    other = task(path=moved)
+    assert other.id != same.id
+    assert str(tmp_path) not in other.to_json().decode()
 
 
 def test_files_travel_with_the_log(tmp_path: Path) -> None:
-    found = condition(f"robot.srdf={DATA / 'ur5_like.srdf'}")
-    content = run_replicate(found, 0).content
+    condition = task(SRDF)
+    content = run_replicate(condition, 0).content
     attachments = read_log(content).attachments
     contents = {data for name, data in attachments.items() if name.startswith(PREFIX)}
-    pairs = found.robot.pairs.content  # type: ignore[attr-defined]
-    assert contents == {pairs, *(path.read_bytes() for path in DATA.iterdir())}
+    files = {path.read_bytes() for path in UR5_LIKE.iterdir()}
+    assert contents == {condition.robot.pairs.content, *files}
     log = tmp_path / "0000.mcap"
     log.write_bytes(content)
     assert reproduce_log(log).matches
     assert read_log(content).summary.solved
 
 
-def test_pairs_that_an_srdf_names_are_not_judged() -> None:
-    assembly = condition(f"robot.srdf={DATA / 'ur5_like.srdf'}").robot.build()  # type: ignore[attr-defined]
-    assert frozenset(("shoulder_link", "forearm_link")) in assembly.disabled
-    _, problem = condition(f"robot.srdf={DATA / 'ur5_like.srdf'}").prepare()
-    names = problem.bodies.names
-    tested = {frozenset((names[a], names[b])) for a, b in problem.bodies.pairs}
-    assert not tested & assembly.disabled
-
-
 def test_two_of_them_through_strings_of_via_points() -> None:
-    found = condition("ga.num_generations=60", base=TWO)
-    summary = run_replicate(found, 0).summary
+    condition = task("ga.num_generations=60", base=TWO)
+    summary = run_replicate(condition, 0).summary
     assert summary.solved
     assert summary.certified is not None
-    assembly = found.robot.build()  # type: ignore[attr-defined]
+    assembly = condition.robot.build()
     assert assembly.num_arms == 2
     names = [item.name for item in assembly.geometry.geometryObjects]
     assert names[0] == "arm_1_base_link" and names[7] == "arm_2_base_link"
 
 
 def test_base_and_tool_frames_are_chosen_by_name() -> None:
-    moved = condition(
-        "robot.base_position=[1,0,0]",
-        "robot.base_rotation=[0,0,90]",
-        "robot.tool_frame=wrist_3_link",
-    )
-    assembly = moved.robot.build()  # type: ignore[attr-defined]
-    plain = condition("robot.tool_frame=wrist_3_link").robot.build()  # type: ignore[attr-defined]
-    poses = []
-    for one in (assembly, plain):
-        tool = one.tools[0]
-        local = local_pose(one.table, tool.joint, tool.rotation, tool.position)
-        poses.append(frame_pose(one.table, tool.joint - 1, local, np.full(6, 0.3)))
-    x, y, z = poses[1][9:]
-    assert poses[0][9:] == pytest.approx([1.0 - y, x, z])
-
-
-def written(tmp_path: Path, change: Any) -> Path:
-    shutil.copytree(DATA, tmp_path / "ur5_like")
-    file = tmp_path / "ur5_like" / "ur5_like.urdf"
-    file.write_text(change(file.read_text()))
-    return file
+    tool, place = "robot.tool_frame=wrist_3_link", "robot.base_position=[1,0,0]"
+    moved = task(place, "robot.base_rotation=[0,0,90]", tool).robot.build()
+    plain = task(tool).robot.build()
+    x, y, z = tool_pose(plain, np.full(6, 0.3))[9:]
+    assert tool_pose(moved, np.full(6, 0.3))[9:] == pytest.approx([1.0 - y, x, z])
 
 
 def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
@@ -142,104 +83,125 @@ def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
         '<link name="root"/><joint name="mount" type="fixed"><parent link="root"/>'
         '<child link="base_link"/><origin xyz="0.3 -0.2 0.5" rpy="0.4 -0.7 1.1"/></joint></robot>'
     )
-    mounted = written(tmp_path, lambda text: text.replace("</robot>", root))
     placed = ("robot.base_position=[1,2,3]", "robot.base_rotation=[10,20,30]")
-    found = condition(*placed, "robot.base_frame=base_link", path=mounted).robot.build()  # type: ignore[attr-defined]
-    plain = condition(*placed).robot.build()  # type: ignore[attr-defined]
-    q, poses = np.full(6, 0.3), []
-    for assembly in (found, plain):
-        tool = assembly.tools[0]
-        local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
-        poses.append(frame_pose(assembly.table, tool.joint - 1, local, q))
-        placements = assembly.geometry.createData()
-        data = assembly.model.createData()
-        pin.updateGeometryPlacements(assembly.model, data, assembly.geometry, placements, q)
-        poses.append(np.array([placement.homogeneous for placement in placements.oMg]))
-    assert poses[0] == pytest.approx(poses[2], abs=1e-12)
-    assert poses[1] == pytest.approx(poses[3], abs=1e-12)
+    mounted = changed(tmp_path, "</robot>", root)
+    one = task(*placed, "robot.base_frame=base_link", path=mounted).robot.build()
+    two, q = task(*placed).robot.build(), np.full(6, 0.3)
+    assert tool_pose(one, q) == pytest.approx(tool_pose(two, q), abs=1e-12)
+    for place, expected in zip(placements(one, q)[1], placements(two, q)[1], strict=True):
+        assert place.isApprox(expected, 1e-12)
+
+
+NO_MESH = "robot.path: must be a file whose meshes are there, was \"a missing mesh 'package://ur5_l"
+KIND = "fixed, floating or planar, was \"joint 'elbow_joint' of type spherical\""
+LIMIT = "robot.joint_limits: must be given for every joint: postures are drawn between them, and"
+RULE = "robot.path: must be a URDF whose joints follow joints that are there, was \"'"
 
 
 @pytest.mark.examples(2)
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("before", "after", "message"),
     [
-        (
-            lambda text: text[:300],
-            "robot.path: must be XML with the root <robot>, was 'unclosed token: line 7",
-        ),
-        (lambda text: "<sdf></sdf>", "robot.path: must be XML with the root <robot>, was '<sdf>'"),
-        (
-            lambda text: text.replace("hand.obj", "hnad.obj"),
-            'robot.path: must be a file whose meshes are there, was "a missing mesh '
-            "'package://ur5_like/hnad.obj'\"",
-        ),
-        (
-            lambda text: text.replace(
-                '"elbow_joint" type="revolute"', '"elbow_joint" type="spherical"'
-            ),
-            "robot.path: must be a URDF whose joints are revolute, continuous, prismatic, fixed, "
-            "floating or planar, was \"joint 'elbow_joint' of type spherical\"",
-        ),
-        (
-            lambda text: text.replace(
-                '<limit lower="-2.8" upper="2.8"', '<limit lower="1" upper="1"'
-            ),
-            "robot.joint_limits: must be given for every joint: postures are drawn between them, "
-            "and margins rated",
-        ),
-        (
-            lambda text: text.replace(
-                '<limit lower="-2.8"', '<mimic joint="elbow"/><limit lower="-2.8"'
-            ),
-            "robot.path: must be a URDF whose joints follow joints that are there, was \"'",
-        ),
-        (
-            lambda text: text.replace('<child link="tool0"/>', '<child link="nothing"/>'),
-            "robot.path: must be a URDF that has the links of joint 'tool_joint', "
-            "was \"without 'nothing'\"",
-        ),
+        ("hand.obj", "hnad.obj", NO_MESH),
+        ('"elbow_joint" type="revolute"', '"elbow_joint" type="spherical"', KIND),
+        ('<limit lower="-2.8" upper="2.8"', '<limit lower="1" upper="1"', LIMIT),
+        ('<limit lower="-2.8"', '<mimic joint="elbow"/><limit lower="-2.8"', RULE),
     ],
 )
-def test_refusals(tmp_path: Path, change: Any, message: str) -> None:
-    with pytest.raises(EvoexpError) as found:
-        condition(path=written(tmp_path, change)).prepare()
-    assert message in str(found.value)
-    assert "\n" not in str(found.value)
+def test_changed_files_are_refused(tmp_path: Path, before: str, after: str, message: str) -> None:
+    with pytest.raises(EvoexpError) as refusal:
+        task(path=changed(tmp_path, before, after)).prepare()
+    assert message in str(refusal.value) and "\n" not in str(refusal.value)
 
 
 @pytest.mark.examples(2)
 @pytest.mark.parametrize(
-    ("overrides", "message"),
+    ("override", "message"),
     [
-        (
-            ("robot.path=nowhere.urdf",),
-            "robot.path: must be a file that can be read (no such file or directory)",
-        ),
-        (("robot.tool_frame=tool1",), "was 'tool1'; did you mean 'tool0'?"),
-        (
-            ("robot.tool_frame=base_link",),
-            "robot.tool_frame: must be a frame that moves, was 'base_link'",
-        ),
-        (
-            ("robot.base_frame=tool0",),
-            "robot.base_frame: must be a frame that does not move, was 'tool0'",
-        ),
-        (("robot.srdf=no.srdf",), "robot.srdf: must be a file that can be read"),
+        ("path=nowhere.urdf", "a file that can be read (no such file or directory)"),
+        ("tool_frame=tool1", "was 'tool1'; did you mean 'tool0'?"),
+        ("tool_frame=base_link", "robot.tool_frame: must be a frame that moves, was 'base_link'"),
+        ("base_frame=tool0", "robot.base_frame: must be a frame that does not move, was 'tool0'"),
+        ("srdf=no.srdf", "robot.srdf: must be a file that can be read"),
     ],
 )
-def test_frames_and_files_that_are_not_there(overrides: tuple[str, ...], message: str) -> None:
-    given = [
-        *REACH,
-        *(() if overrides[0].startswith("robot.path") else (f"robot.path={URDF}",)),
-        *overrides,
-    ]
-    with pytest.raises(EvoexpError) as found:
-        compose.expand(given)[0].conditions[0].condition.prepare()
-    assert message in str(found.value)
+def test_frames_and_files_that_are_not_there(override: str, message: str) -> None:
+    with pytest.raises(EvoexpError) as refusal:
+        task(f"robot.{override}").prepare()
+    assert message in str(refusal.value)
 
 
-def test_a_configuration_holds_hashes_only() -> None:
-    config = json.loads(condition().to_json())["robot"]
-    assert set(config) == {"_target_", "revision", "urdf", "meshes", "pairs"}
-    assert config["meshes"][0]["name"] == "package://ur5_like/hand.obj"
-    assert Condition.from_json(condition().to_json()).id == condition().id
+def spheres(tmp_path: Path, **links: Any) -> Path:
+    """Write balls (x, y, z, radius) of links as a URDF."""
+    ball = (
+        '<collision><origin xyz="{} {} {}"/><geometry><sphere radius="{}"/></geometry></collision>'
+    )
+    text = "".join(
+        f'<link name="{name}">{"".join(ball.format(*each) for each in balls)}</link>'
+        for name, balls in links.items()
+    )
+    file = tmp_path / "spheres.urdf"
+    file.write_text(f'<robot name="spheres">{text}</robot>')
+    return file
+
+
+def test_spheres_of_others_stand_where_their_file_has_them(tmp_path: Path) -> None:
+    balls = [(0.01, 0.02, 0.03, 0.05), (-0.01, 0.0, 0.1, 0.04)]
+    file = spheres(tmp_path, forearm_link=balls, wrist_3_link=[(0.0, 0.0, 0.0, 0.03)])
+    condition = task(f"robot.spheres={file}")
+    assert condition.files()[PREFIX + keep(file.read_bytes())] == file.read_bytes()
+    assembly, (_, problem) = condition.robot.build(), condition.prepare()
+    items = {item.name: k for k, item in enumerate(assembly.geometry.geometryObjects)}
+    cover, other = (
+        problem.bodies.covers[items[name]] for name in ("forearm_link", "upper_arm_link")
+    )
+    assert np.array_equal(np.sort(cover.radius), [0.04, 0.05])
+    own, q = pin.buildModelFromUrdf(str(UR5_LIKE / "ur5_like.urdf")), np.linspace(-2.0, 2.0, 6)
+    data = own.createData()
+    pin.framesForwardKinematics(own, data, q)
+    link = data.oMf[own.getFrameId("forearm_link")]
+    joint = assembly.geometry.geometryObjects[items["forearm_link"]].parentJoint
+    frame = placements(assembly, q)[0][joint]
+    expected = sorted(link.act(np.array(ball[:3])).tolist() for ball in balls)
+    assert np.allclose(sorted(frame.act(center).tolist() for center in cover.start), expected)
+    # other links are covered as asked
+    assert other.uncovered == 0.0 < cover.uncovered
+    notes = " | ".join(condition.planner.notes(problem))
+    assert "given spheres do not contain all bodies; standing out [m]: " in notes
+    assert "forearm_link 0." in notes
+
+
+BOX, CAPSULE = coal.Box(0.2, 0.2, 0.2), coal.Capsule(0.05, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("shape", "balls", "uncovered", "inflation"),
+    [
+        (BOX, [(0.0, 0.0, 0.0, 0.1)], 0.1 * np.sqrt(3.0) - 0.1, 0.0),  # a corner
+        (BOX, [(0.0, 0.0, 0.0, 0.18), (0.15, 0.0, 0.0, 0.01)], 0.0, 0.08),
+        (CAPSULE, [(0.0, 0.02, 0.3, 0.05)], np.hypot(0.02, 0.4), np.hypot(0.02, 0.2)),
+    ],
+)
+def test_how_far_a_body_stands_out(shape: Any, balls: Any, uncovered: Any, inflation: Any) -> None:
+    item = pin.GeometryObject("body", 0, 0, pin.SE3.Identity(), shape)
+    cover = given_cover(item, np.array(balls))
+    assert cover.uncovered == pytest.approx(uncovered)
+    assert cover.inflation == pytest.approx(inflation, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("links", "message"),
+    [
+        ({"forearm": [(0, 0, 0, 0.1)]}, "belong to links .* 'forearm'.*forearm_link"),
+        ({"forearm_link": []}, "must be a URDF of spheres, was 'one without'"),
+    ],
+)
+def test_spheres_that_do_not_fit_are_refused(tmp_path: Path, links: Any, message: str) -> None:
+    with pytest.raises(EvoexpError, match=f"robot.spheres: .*{message}"):
+        task(f"robot.spheres={spheres(tmp_path, **links)}").prepare()
+
+
+def test_one_of_several_arms_has_no_spheres_of_others(tmp_path: Path) -> None:
+    file = spheres(tmp_path, forearm_link=[(0.0, 0.0, 0.0, 0.1)])
+    with pytest.raises(EvoexpError, match="spheres"):
+        task(f"+robot.arms.0.spheres={file}", base=TWO).prepare()

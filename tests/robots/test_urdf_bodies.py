@@ -1,8 +1,10 @@
-"""Bodies of URDFs against a slow reader of their XML, and of capsules through every use."""
+"""Bodies of URDFs against a slow reader of their XML; every robot of the gallery plans a reach."""
 
-import json
 import math
-import re
+import os
+import shutil
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -14,15 +16,14 @@ import pinocchio as pin
 import pytest
 
 from evoexp.attachments import File, keep, located
-from evoexp.batch.replicate import run_replicate
-from evoexp.cli import main
-from evoexp.errors import SettingError
+from evoexp.errors import EvoexpError, SettingError
 from evoexp.mesh_files import mesh_content
 from evoexp.records import FloatArray
-from evoexp.robots.robot_data import ROBOT_DATA
+from evoexp.robots.robot_data import ROBOT_DATA, robot_file
 from evoexp.robots.urdf import Urdf
 from evoexp.robots.urdf_model import urdf_model
-from evoexp.testing import conditions
+from robot_gallery import POSTURES, ROBOTS, GalleryRobot, planned_reach
+from robots.robot_samples import placements, urdf
 
 DATA = Path(__file__).parent / "data"
 SHIPPED = [located(f"evoexp:motionbenchmaker/{name}/{name}.urdf") for name in ("panda", "ur5")]
@@ -39,15 +40,18 @@ REFUSED = {
 NO_ROBOT = ("must be a URDF with collision bodies", "must be a URDF with a joint that moves")
 
 
-def robot_files() -> list[Path]:
-    """List the URDFs of the tests, those that evoexp ships, and example-robot-data's if there."""
-    found = [*sorted(DATA.rglob("*.urdf")), *map(Path, SHIPPED)]
+def gallery() -> Path | None:
+    """Return the folder of the robots of example-robot-data, if they are installed."""
     try:
         package = distribution(ROBOT_DATA)
     except PackageNotFoundError:
-        return found
-    folder = Path(str(package.locate_file(f"cmeel.prefix/share/{ROBOT_DATA}/robots")))
-    return [*found, *sorted(folder.rglob("*.urdf"))]
+        return None
+    return Path(str(package.locate_file(f"cmeel.prefix/share/{ROBOT_DATA}/robots")))
+
+
+GALLERY = gallery()
+FILES = [*sorted(DATA.rglob("*.urdf")), *map(Path, SHIPPED)]
+FILES += sorted(GALLERY.rglob("*.urdf")) if GALLERY else []
 
 
 def pose(element: ET.Element | None) -> FloatArray:
@@ -57,8 +61,7 @@ def pose(element: ET.Element | None) -> FloatArray:
         return x
     x[:3, 3] = [float(word) for word in element.get("xyz", "0 0 0").split()]
     r, p, y = (float(word) for word in element.get("rpy", "0 0 0").split())
-    about = [turn(axis, angle) for axis, angle in (((0, 0, 1), y), ((0, 1, 0), p), ((1, 0, 0), r))]
-    x[:3, :3] = about[0] @ about[1] @ about[2]
+    x[:3, :3] = turn((0, 0, 1), y) @ turn((0, 1, 0), p) @ turn((1, 0, 0), r)
     return x
 
 
@@ -137,21 +140,23 @@ def is_as_given(shape: ET.Element, body: Any, slow: SlowRobot, special: set[str]
             scale = np.array([float(word) for word in shape.get("scale", "1 1 1").split()])
             points = np.asarray(body.vertices())
             assert np.isfinite(points).all() and body.num_tris > 0
-            content = mesh_content(name, slow.path, {}, "")
+            content, corners = mesh_content(name, slow.path, {}, ""), points / scale
             if name.lower().endswith(".stl") and len(content) == 84 + 50 * body.num_tris:
                 rows = np.frombuffer(content, np.dtype([("x", "<f4", 12), ("a", "<u2")]), -1, 84)
-                corners = rows["x"][:, 3:].reshape(-1, 3) * scale
-                assert np.allclose(points.min(axis=0), corners.min(axis=0), atol=1e-9)
-                assert np.allclose(points.max(axis=0), corners.max(axis=0), atol=1e-9)
+                corners = rows["x"][:, 3:].reshape(-1, 3)
+            elif name == "package://ur5_like/hand.obj":
+                corners = np.array([line.split()[1:] for line in content.decode().splitlines()
+                                    if line.startswith("v ")], float)  # fmt: skip
+            for end in (np.min, np.max):
+                assert np.allclose(end(points, axis=0), end(corners * scale, axis=0), atol=1e-9)
         case _:
             raise AssertionError(shape.tag)
 
 
-@pytest.mark.parametrize("path", robot_files(), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_every_body_of_every_link_is_built_where_the_file_has_it(path: Path) -> None:
     try:
-        settings = Urdf.read_files({"path": str(path)}, "robot")
-        assembly = Urdf.model_validate(settings, strict=False).build()
+        assembly = urdf(path).build()
     except SettingError as refusal:
         reasons = [*NO_ROBOT, *([REFUSED[path.name]] if path.name in REFUSED else [])]
         assert any(reason in str(refusal) for reason in reasons), str(refusal)
@@ -166,15 +171,14 @@ def test_every_body_of_every_link_is_built_where_the_file_has_it(path: Path) -> 
         q = low + (high - low) * np.random.default_rng(seed).random(model.nq)
         free = [k for k in range(1, model.njoints) if model.nqs[k]]
         values = {str(model.names[k]): float(q[model.idx_qs[k]]) for k in free}
-        data, placed = model.createData(), assembly.geometry.createData()
-        pin.updateGeometryPlacements(model, data, assembly.geometry, placed, q)
+        places = placements(assembly, q)[1]
         for link, rows in expected.items():
             frame = slow.link_pose(link, values)
             checks = slow.root.findall(f"link[@name='{link}']/collision_checking/*")
             for k, (shape, local) in enumerate(rows):
                 index, item = built[link if len(rows) == 1 else f"{link}_{k}"]
                 is_as_given(shape, item.geometry, slow, {check.tag for check in checks})
-                assert np.abs(placed.oMg[index].homogeneous - frame @ local).max() < 1e-9
+                assert np.abs(places[index].homogeneous - frame @ local).max() < 1e-9
 
 
 @pytest.mark.parametrize("path", [*map(Path, SHIPPED)], ids=lambda path: path.name)
@@ -192,63 +196,58 @@ def test_joints_and_frames_stand_as_by_pinocchios_reader_bit_by_bit(path: Path) 
             assert np.array_equal(own.placement.homogeneous, frame.placement.homogeneous)
 
 
-# the ball lies on the circle on which the body's middle moves
-CAPSULE = (
-    '<robot name="r"><link name="a"><collision><geometry><box size=".1 .1 .1"/></geometry>'
-    '</collision></link><link name="b"><collision><origin xyz="0.5 0 0"/><geometry>{shape}'
-    '</geometry></collision></link><joint name="j" type="revolute"><parent link="a"/>'
-    '<child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1"/></joint></robot>'
+needs_robots = pytest.mark.skipif(
+    GALLERY is None, reason="needs the robots: pip install 'evoexp[robots]'"
 )
-MOTION = (
-    *("robot=urdf", "scenario=urdf_two_arms", "planner=via_points", "ga=via_points"),
-    *("objective=via_points", "collision=covered_bodies", "scenario.q_start=[[-50.0]]"),
-    *("scenario.q_goal=[[50.0]]", "scenario.security_margin=0"),
-)
-PLAIN, DRAKE = (f'<{name} radius="0.05" length="0.3"/>' for name in ("capsule", "drake:capsule"))
 
 
-def capsule_words(folder: Path, shape: str, ball: list[float]) -> list[str]:
-    path = folder / "r.urdf"
-    path.write_text(CAPSULE.format(shape=shape))
-    obstacle = f"{{shape: sphere, name: ball, center: {ball}, radius: 0.02}}"
-    return [*MOTION, f"robot.path={path}", f"scenario.obstacles=[{obstacle}]"]
+@pytest.mark.matrix
+@needs_robots
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_a_reach_is_planned_and_certified(robot: GalleryRobot) -> None:
+    found = planned_reach(robot)
+    _, problem = found.reach.postures.prepare()
+    assert problem.bodies.num_shapes > 0
+    assert found.postures is not None
+    assert found.strings is not None
 
 
-@pytest.mark.parametrize("shape", [PLAIN, DRAKE])
-@pytest.mark.parametrize(
-    ("ball", "certified"),
-    [
-        ([0.5, 0.0, 0.0], False),
-        ([0.5, 0.0, 0.21], False),  # in the cap: beyond the cylinder's end
-        ([0.5, 0.0, 0.225], True),  # beyond the cap
-    ],
-)
-def test_a_capsule_hits_a_ball_where_it_is(
-    tmp_path: Path, shape: str, ball: list[float], certified: bool
-) -> None:
-    """Every motion of the one joint passes the middle; the capsule reaches to 0.2 m."""
-    words = [*capsule_words(tmp_path, shape, ball), "collision.covers.inflation=0.001"]
-    (condition,) = conditions(*words).values()
-    summary = run_replicate(condition, 0).summary
-    assert summary.certified is certified and summary.solved is certified
-    if certified:
-        assert summary.clearance == pytest.approx(0.225 - 0.2 - 0.02, abs=1e-6)
-    else:
-        assert summary.refuted_pair == "b – ball"
+@pytest.mark.matrix
+@needs_robots
+def test_a_run_is_reproduced_when_its_robot_is_gone(tmp_path: Path) -> None:
+    """By commands in processes of their own, which share nothing but what is stored."""
+    urdf = Path(robot_file(f"{ROBOT_DATA}:ur_description/urdf/ur5_robot.urdf", "robot.path"))
+    robots = tmp_path / ROBOT_DATA / "robots"  # as meshes are named in the file
+    shutil.copytree(urdf.parents[1], robots / "ur_description")
+    copy = robots / "ur_description" / "urdf" / urdf.name
+    words = (f"robot.path={copy}", "robot=urdf", "budget=smoke", "num_replicates=1")
+    _evoexp(tmp_path, "run", *words, *POSTURES, "runner=serial", "--no-report")
+    (run,) = (tmp_path / "outputs" / "runs").iterdir()
+    shutil.rmtree(robots)
+    assert "MATCH" in _evoexp(tmp_path, "reproduce", run.name).splitlines()[-1]
 
 
-def test_a_capsule_is_drawn_and_exported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "out"))
-    monkeypatch.chdir(tmp_path)
-    words = capsule_words(tmp_path, PLAIN, [0.5, 0.0, 0.4])
-    assert main(["run", *words, "budget=smoke", "runner.num_workers=1"]) == 0
-    (log, *_) = sorted(tmp_path.rglob("0000.mcap"))
-    page = tmp_path / "motion.html"
-    assert main(["view", str(log), "-o", str(page)]) == 0
-    assert main(["export", str(log), "-o", str(tmp_path / "motion.json")]) == 0
-    capsys.readouterr()
-    drawn = re.search(r'"kind": ?"capsule"[^{}]*', page.read_text())
-    assert drawn is not None and "0.05" in drawn[0] and "0.3" in drawn[0]
-    assert json.loads((tmp_path / "motion.json").read_text())
+def _evoexp(place: Path, *words: str) -> str:
+    """Run a command; return what it says."""
+    around = os.environ | {"EVOEXP_OUTPUTS": str(place / "outputs")}
+    command = [sys.executable, "-m", "evoexp", *words]
+    done = subprocess.run(command, env=around, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_name_of_the_package_is_refused_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("evoexp.robots.robot_data.distribution", missing)
+    with pytest.raises(EvoexpError, match=r"pip install 'evoexp\[robots\]'"):
+        Urdf.read_files({"path": f"{ROBOT_DATA}:ur5.urdf"}, "robot")
+
+
+@needs_robots
+def test_a_name_that_the_package_does_not_have_is_refused() -> None:
+    with pytest.raises(EvoexpError, match="did you mean 'z1_description/urdf/z1.urdf'?"):
+        Urdf.read_files({"path": f"{ROBOT_DATA}:z1_description/urdf/z2.urdf"}, "robot")
+    with pytest.raises(EvoexpError):
+        Urdf.read_files({"path": f"{ROBOT_DATA}:../../../../x.urdf"}, "robot")

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from evoexp.errors import SettingError
-from evoexp.robots.urdf import Urdf
+from robots.robot_samples import urdf_of
 
 BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
@@ -30,14 +30,8 @@ def collision(shape: str, origin: str = "") -> str:
     return f"<collision>{origin}<geometry>{shape}</geometry></collision>"
 
 
-def robot(folder: Path, text: str, **settings: Any) -> Urdf:
-    (folder / "r.urdf").write_text(text)
-    found = Urdf.read_files({"path": str(folder / "r.urdf"), **settings}, "robot")
-    return Urdf.model_validate(found, strict=False)
-
-
 def bodies(folder: Path, text: str) -> dict[str, Any]:
-    return {item.name: item for item in robot(folder, text).build().geometry.geometryObjects}
+    return {item.name: item for item in urdf_of(folder, text).build().geometry.geometryObjects}
 
 
 SHAPES = "one of box, sphere, cylinder, capsule, mesh in a <geometry>"
@@ -49,28 +43,20 @@ REFUSED = {
     "no geometry": (f"<collision/>{BOX}", "a <geometry> in a <collision>"),
     "two geometries": (BOX.replace("</coll", "<geometry/></coll"), "one of box"),
     "a position of two": (collision('<box size="1 1 1"/>', '<origin xyz="1 0"/>'), "three numbers"),
-    "an angle of two": (collision('<box size="1 1 1"/>', '<origin rpy="1 0"/>'), "three numbers"),
     "a position of none": (collision('<box size="1 1 1"/>', '<origin xyz=""/>'), "three numbers"),
     "two origins": (collision('<box size="1 1 1"/>', "<origin/><origin/>"), "one <origin>"),
     "an attribute misspelt": (collision('<box size="1 1 1"/>', '<origin xzy="1 0 0"/>'), "'xyz'?"),
     "an element misspelt": (collision('<box size="1 1 1"/>', "<orgin/>"), "did you mean 'origin'?"),
     "a collision misspelt": (BOX.replace("collision", "Collision"), "did you mean 'collision'?"),
-    "a mesh without a name": (collision('<mesh filename=""/>'), "filename in a <mesh>"),
     "a quaternion": (collision('<box size="1 1 1"/>', '<origin quat_xyzw="0 0 0 1"/>'), "rpy in"),
     "NaN": (collision('<box size="1 1 1"/>', '<origin xyz="nan 0 0"/>'), "finite numbers"),
     "infinity": (collision('<sphere radius="inf"/>'), "finite numbers"),
     "a large number": (collision('<sphere radius="1e9"/>'), "finite numbers, at most 1e+07"),
-    "a unit": (collision('<sphere radius="0.1m"/>'), "finite numbers"),
     "a decimal comma": (collision('<sphere radius="0,1"/>'), "finite numbers"),
     "an underscore": (collision('<sphere radius="1_0"/>'), "finite numbers"),
-    "a hexadecimal": (collision('<sphere radius="0x1"/>'), "finite numbers"),
     "a negative radius": (collision('<sphere radius="-1"/>'), "numbers greater than 0"),
-    "a radius of 0": (collision('<sphere radius="0"/>'), "numbers greater than 0"),
     "a flat box": (collision('<box size="1 1 0"/>'), "numbers greater than 0"),
-    "a short capsule": (collision('<capsule radius="1" length="0"/>'), "numbers greater than 0"),
     "no radius": (collision("<sphere/>"), "radius in a <sphere>"),
-    "no length": (collision('<cylinder radius="1"/>'), "length in a <cylinder>"),
-    "no size": (collision("<box/>"), "size in a <box>"),
     "no name of a mesh": (collision("<mesh/>"), "filename in a <mesh>"),
     "a scale of one": (collision('<mesh filename="a.obj" scale="0.001"/>'), "three numbers"),
     "a scale of 0": (collision('<mesh filename="a.obj" scale="1 0 1"/>'), "numbers other than 0"),
@@ -85,13 +71,18 @@ def test_a_body_that_cannot_be_is_refused_by_its_link(
     tmp_path: Path, body: str, must: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SettingError) as refusal:
-        robot(tmp_path, arm(body))
+        urdf_of(tmp_path, arm(body))
     text = str(refusal.value)
     assert must in text and "link 'b'" in text and str(tmp_path / "r.urdf") in text
     assert "\n" not in text and not capfd.readouterr().err
 
 
 TAKEN = {
+    "a default namespace": arm(head=' xmlns="http://drake.mit.edu"'),
+    "an unbound prefix": arm(more='<gazebo><controller:x name="y"/></gazebo>'),
+    "Gazebo": arm(more='<gazebo reference="b"><collision>b</collision></gazebo><transmission/>'),
+    "a version": arm(head=' version="2.7" xmlns:xacro="http://www.ros.org/wiki/xacro"'),
+    "a byte order mark": "\ufeff" + arm(),
     "spaces and line ends": collision('<box size=" 0.1\n 0.2\t0.3 "/>'),
     "exponents": collision('<box size="1e-1 +.2 3.E-1"/>'),
     "an empty origin": collision('<box size="0.1 0.2 0.3"/>', "<origin/>"),
@@ -108,48 +99,29 @@ TAKEN = {
 def test_a_body_is_built_whatever_stands_beside_it(
     tmp_path: Path, body: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    found = bodies(tmp_path, arm(body))
+    found = bodies(tmp_path, body if "<robot" in body else arm(body))
     assert list(found) == ["a", "b"]
     assert np.array_equal(2.0 * found["b"].geometry.halfSide, [0.1, 0.2, 0.3])
     assert not capfd.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "shape",
-    ['<capsule radius="0.05" length="0.3"/>', '<drake:capsule length="0.3" radius="0.05"/>'],
-)
-def test_a_capsule_is_one(tmp_path: Path, shape: str) -> None:
-    found = bodies(tmp_path, arm(collision(shape, '<origin xyz="0.5 0 0" rpy="0 1.5 0"/>') + BOX))
-    capsule = found["b_0"]
-    assert isinstance(capsule.geometry, coal.Capsule)
-    assert (capsule.geometry.radius, 2.0 * capsule.geometry.halfLength) == (0.05, 0.3)
-    assert capsule.placement.translation == pytest.approx([0.5, 0.0, 0.0])
+@pytest.mark.parametrize("name", ["capsule", "drake:capsule"])
+def test_a_capsule_is_one_of_several_bodies(tmp_path: Path, name: str) -> None:
+    shape = collision(f'<{name} radius="0.05" length="0.3"/>', '<origin xyz="0.5 0 0"/>')
+    found = bodies(tmp_path, arm(shape + BOX))
+    capsule = found["b_0"].geometry
+    assert isinstance(capsule, coal.Capsule)
+    assert (capsule.radius, 2.0 * capsule.halfLength) == (0.05, 0.3)
+    assert found["b_0"].placement.translation == pytest.approx([0.5, 0.0, 0.0])
     assert np.array_equal(2.0 * found["b_1"].geometry.halfSide, [0.1, 0.2, 0.3])
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        arm(head=' xmlns="http://drake.mit.edu"'),
-        arm(more='<gazebo><controller:x name="y"/></gazebo>'),
-        arm(more='<gazebo reference="b"><collision>b</collision></gazebo><transmission/>'),
-        arm(head=' version="2.7" xmlns:xacro="http://www.ros.org/wiki/xacro"'),
-        "\ufeff" + arm(),
-    ],
-    ids=["default namespace", "unbound prefix", "elements of Gazebo", "version", "byte order mark"],
-)
-def test_namespaces_and_elements_of_others_are_no_matter(tmp_path: Path, text: str) -> None:
-    assert list(bodies(tmp_path, text)) == ["a", "b"]
 
 
 LINK = '<link name="c"/>'
 
 
 def join(name: str, parent: str, child: str, kind: str = "fixed") -> str:
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        "</joint>"
-    )
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}</joint>'
 
 
 @pytest.mark.parametrize(
@@ -177,6 +149,8 @@ def join(name: str, parent: str, child: str, kind: str = "fixed") -> str:
         ("<!doctype html><html></html>", "was \"an HTML page in the file's place"),
         ("version https://git-lfs.github.com/spec/v1\n", "was \"a Git-LFS pointer in the file's"),
         ("", "was 'an empty file'"),
+        (arm()[:60], "must be XML with the root <robot>, was 'unclosed token: line 1"),
+        ("<sdf></sdf>", "must be XML with the root <robot>, was '<sdf>'"),
         (arm(limit='<limit lower="1" upper="-1"/>'), "was \"joint 'j': 1 to -1\""),
         (arm(limit='<limit upper="-1"/>'), "was \"joint 'j': 0 to -1 (an absent limit is 0)\""),
         (arm(limit='<limit lower="nan" upper="1"/>'), "finite numbers"),
@@ -187,7 +161,7 @@ def test_what_is_wrong_with_a_file_is_told_with_its_name(
     tmp_path: Path, text: str, message: str
 ) -> None:
     with pytest.raises(SettingError) as refusal:
-        robot(tmp_path, text)
+        urdf_of(tmp_path, text)
     told = str(refusal.value)
     assert message in told and str(tmp_path / "r.urdf") in told and "\n" not in told
 
@@ -197,19 +171,17 @@ def test_what_is_wrong_with_a_file_is_told_with_its_name(
 )
 def test_links_that_the_base_adds_have_other_names(tmp_path: Path, root: str, base: str) -> None:
     text = arm(more=LINK + join("k", "b", "c", "planar")).replace('"a"', f'"{root}"')
-    assert robot(tmp_path, text).build().model.nq == 1
+    assert urdf_of(tmp_path, text).build().model.nq == 1
     with pytest.raises(SettingError, match=f"that robot.base adds, was '{root}'"):
-        robot(tmp_path, text, base=base).build()
+        urdf_of(tmp_path, text, base=base).build()
 
 
 def test_groups_that_hold_each_other_twice_are_looked_up_once(tmp_path: Path) -> None:
-    groups = "".join(
-        f'<group name="g{k}"><group name="g{k + 1}"/><group name="g{k + 1}"/></group>'
-        for k in range(60)
-    )
+    twice = '<group name="g{0}"><group name="g{1}"/><group name="g{1}"/></group>'
+    groups = "".join(twice.format(k, k + 1) for k in range(60))
     srdf = tmp_path / "r.srdf"
     srdf.write_text(f'<robot>{groups}<group name="g60"><joint name="j"/></group></robot>')
-    assert robot(tmp_path, arm(), srdf=str(srdf), group="g0").build().model.nq == 1
+    assert urdf_of(tmp_path, arm(), srdf=str(srdf), group="g0").build().model.nq == 1
 
 
 @pytest.mark.parametrize("axis", ["1 -5.6e-17 0", "0 1e-13 1", "1e-11 1 0", "0 0 2", "0 -1 0"])
@@ -219,42 +191,38 @@ def test_joints_are_aligned_where_pinocchio_aligns_them(
 ) -> None:
     text = arm().replace("revolute", kind).replace('"0 0 1"', f'"{axis}"')
     (_, own), (_, reference) = (
-        model.joints for model in (robot(tmp_path, text).build().model, pin.buildModelFromXML(text))
+        model.joints
+        for model in (urdf_of(tmp_path, text).build().model, pin.buildModelFromXML(text))
     )
     assert own.shortname() == reference.shortname()
 
 
 def test_a_joint_without_room_names_the_setting_of_a_limit(tmp_path: Path) -> None:
-    locked = robot(tmp_path, arm(limit='<limit lower="0" upper="0" velocity="1"/>'))
+    locked = urdf_of(tmp_path, arm(limit='<limit lower="0" upper="0" velocity="1"/>'))
     with pytest.raises(SettingError, match=r"joint 'j': 0 to 0.*robot\.turn_limit"):
         locked.build()
     turn = '<link name="c"/>' + join("k", "b", "c", "continuous")
-    still = robot(tmp_path, arm(limit='<limit upper="0"/>', more=turn), joints=["k"])
+    still = urdf_of(tmp_path, arm(limit='<limit upper="0"/>', more=turn), joints=["k"])
     assert still.build().model.nq == 1
     sliding = arm(limit="<limit upper='0'/>").replace("revolute", "prismatic")
     with pytest.raises(SettingError, match=r"robot\.slide_limit"):
-        robot(tmp_path, sliding).build()
+        urdf_of(tmp_path, sliding).build()
 
 
-@pytest.mark.parametrize(
-    ("limit", "low", "high"),
-    [("", -90.0, 90.0), ('<limit lower="-inf" upper="1e9" velocity="inf"/>', -90.0, 90.0)],
-)
-def test_limits_that_are_none_are_the_setting(
-    tmp_path: Path, limit: str, low: float, high: float
-) -> None:
-    model = robot(tmp_path, arm(limit=limit), turn_limit=90.0).build().model
-    assert np.degrees(model.lowerPositionLimit) == pytest.approx([low])
-    assert np.degrees(model.upperPositionLimit) == pytest.approx([high])
+@pytest.mark.parametrize("limit", ["", '<limit lower="-inf" upper="1e9" velocity="inf"/>'])
+def test_limits_that_are_none_are_the_setting(tmp_path: Path, limit: str) -> None:
+    model = urdf_of(tmp_path, arm(limit=limit), turn_limit=90.0).build().model
+    assert np.degrees(model.lowerPositionLimit) == pytest.approx([-90.0])
+    assert np.degrees(model.upperPositionLimit) == pytest.approx([90.0])
     assert np.isinf(model.velocityLimit).all()
 
 
 @pytest.mark.parametrize("limit", ['lower="2" upper="inf"', 'lower="-1e9" upper="-2"'])
 def test_a_joint_with_one_limit_has_room_to_the_other_side(tmp_path: Path, limit: str) -> None:
     one_sided = arm(limit=f"<limit {limit}/>")
-    assert robot(tmp_path, one_sided).build().model.nq == 1
+    assert urdf_of(tmp_path, one_sided).build().model.nq == 1
     with pytest.raises(SettingError, match=r"room within robot\.turn_limit, was \"joint 'j': "):
-        robot(tmp_path, one_sided, turn_limit=90.0).build()
+        urdf_of(tmp_path, one_sided, turn_limit=90.0).build()
 
 
 def test_bodies_have_different_names(tmp_path: Path) -> None:
@@ -272,17 +240,17 @@ def test_states_of_an_srdf_are_finite_numbers(tmp_path: Path, value: str) -> Non
     with pytest.raises(
         SettingError, match=f"finite numbers, at most 1e.07, was \"'{value}' of 'j'"
     ):
-        robot(tmp_path, arm(), srdf=str(srdf)).build()
+        urdf_of(tmp_path, arm(), srdf=str(srdf)).build()
 
 
 def test_notes_name_links_without_a_body_and_limits_that_are_not_given(tmp_path: Path) -> None:
     tool = '<link name="tool"/>' + join("k", "b", "tool")
     note = "links that move and have no body: tool"
-    assert robot(tmp_path, arm(more=tool)).notes() == [note]
-    assert robot(tmp_path, arm(more='<link name="s"/>' + join("k", "a", "s"))).notes() == []
-    (low,) = robot(tmp_path, arm(limit='<limit upper="1"/>')).notes()
+    assert urdf_of(tmp_path, arm(more=tool)).notes() == [note]
+    assert urdf_of(tmp_path, arm(more='<link name="s"/>' + join("k", "a", "s"))).notes() == []
+    (low,) = urdf_of(tmp_path, arm(limit='<limit upper="1"/>')).notes()
     assert low == "joint 'j': the URDF gives no lower limit, which counts as 0"
-    (none,) = robot(tmp_path, arm(limit="<limit effort='1'/>"), turn_limit=90.0).notes()
+    (none,) = urdf_of(tmp_path, arm(limit="<limit effort='1'/>"), turn_limit=90.0).notes()
     assert "'j': the URDF gives no limits; robot.turn_limit holds, 90 deg" in none
-    free = robot(tmp_path, arm(body="", more=tool), base="planar").notes()
+    free = urdf_of(tmp_path, arm(body="", more=tool), base="planar").notes()
     assert free == ["links that move and have no body: b, tool"]

@@ -1,68 +1,46 @@
 """Obstacles as settings and as a table."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError
-from evoexp.scenarios.obstacles import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    ELLIPSE,
-    HALF_SPACE,
-    SPHERE,
-    BoxObstacle,
-    CapsuleObstacle,
-    CylinderObstacle,
-    EllipseObstacle,
-    HalfSpaceObstacle,
-    Obstacle,
-    SphereObstacle,
-    obstacle_table,
-    rotation_matrix,
-)
+from evoexp.scenarios import obstacles
+from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table, rotation_matrix
+from obstacle_samples import box, capsule, cylinder, ellipse, half_space, sphere
 
 ONE_OF_EACH = (
-    SphereObstacle(shape="sphere", center=(1.0, 2.0), radius=0.5),
-    BoxObstacle(
-        shape="box", center=(1.0, 2.0, 3.0), size=(0.2, 0.4, 0.6), rotation=(10.0, 20.0, 30.0)
-    ),
-    CapsuleObstacle(shape="capsule", start=(0.0, 0.0), end=(0.0, 3.0), radius=0.1),
-    CylinderObstacle(shape="cylinder", start=(0.0, 0.0, 1.0), end=(2.0, 0.0, 1.0), radius=0.3),
-    HalfSpaceObstacle(shape="half_space", point=(0.0, -1.0), normal=(0.0, 2.0)),
-    EllipseObstacle(shape="ellipse", center=(3.0, 4.0), semi_axes=(2.0, 0.5), angle=90.0),
+    sphere((1.0, 2.0), 0.5),
+    box((1.0, 2.0, 3.0), (0.2, 0.4, 0.6), (10.0, 20.0, 30.0)),
+    capsule((0.0, 0.0), (0.0, 3.0), 0.1),
+    cylinder((0.0, 0.0, 1.0), (2.0, 0.0, 1.0), 0.3),
+    half_space((0.0, -1.0), (0.0, 2.0)),
+    ellipse((3.0, 4.0), (2.0, 0.5), 90.0),
 )
 
 
 def test_the_table_of_every_kind() -> None:
     table = obstacle_table(ONE_OF_EACH)
-    assert table.kind.tolist() == [SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE, ELLIPSE]
-    assert table.center.tolist() == [
-        [1, 2, 0],
-        [1, 2, 3],
-        [0, 1.5, 0],
-        [1, 0, 1],
-        [0, -1, 0],
-        [3, 4, 0],
-    ]
+    kinds = ("SPHERE", "BOX", "CAPSULE", "CYLINDER", "HALF_SPACE", "ELLIPSE")
+    assert table.kind.tolist() == [getattr(obstacles, kind) for kind in kinds]
+    centers = [[1, 2, 0], [1, 2, 3], [0, 1.5, 0], [1, 0, 1], [0, -1, 0], [3, 4, 0]]
+    assert table.center.tolist() == centers
     sizes = [[0.5, 0, 0], [0.1, 0.2, 0.3], [0.1, 1.5, 0], [0.3, 1.0, 0], [0, 0, 0], [2.0, 0.5, 0.5]]
     assert table.size.tolist() == sizes
-    rotations = table.rotation.reshape(-1, 3, 3)
-    np.testing.assert_allclose(
-        rotations @ rotations.transpose(0, 2, 1), np.tile(np.eye(3), (6, 1, 1)), atol=1e-15
-    )
-    np.testing.assert_array_equal(rotations[1], rotation_matrix((10.0, 20.0, 30.0)))
-    np.testing.assert_allclose(rotations[2:5, :, 2], [[0, 1, 0], [1, 0, 0], [0, 1, 0]], atol=1e-15)
+    turns = table.rotation.reshape(-1, 3, 3)
+    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), [np.eye(3)] * 6, atol=1e-15)
+    np.testing.assert_array_equal(turns[1], rotation_matrix((10.0, 20.0, 30.0)))
+    np.testing.assert_allclose(turns[2:5, :, 2], [[0, 1, 0], [1, 0, 0], [0, 1, 0]], atol=1e-15)
 
 
 def test_collision_models_without_ellipses_refuse_them() -> None:
     assert obstacle_table(ONE_OF_EACH[:5]).without_ellipses().kind.tolist() == [0, 1, 2, 3, 4]
-    with pytest.raises(
-        SettingError, match=r"scenario\.obstacles\[5\]\.shape: must be any but an ellipse"
-    ):
+    with pytest.raises(SettingError, match=r"obstacles\[5\]\.shape: must be any but an ellipse"):
         obstacle_table(ONE_OF_EACH).without_ellipses()
 
 
@@ -72,21 +50,18 @@ def test_the_axis_of_a_half_space_is_its_normal(x: float, y: float, z: float) ->
     length = np.sqrt((normal * normal).sum())
     if length < 1e-100:
         return
-    table = obstacle_table(
-        (HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0), normal=(x, y, z)),)
-    )
-    turn = table.rotation[0].reshape(3, 3)
+    turn = obstacle_table((half_space((0.0, 0.0), (x, y, z)),)).rotation[0].reshape(3, 3)
     np.testing.assert_allclose(turn[:, 2], normal / length, atol=1e-14)
     assert np.linalg.det(turn) == pytest.approx(1.0)
 
 
 def test_settings_are_read_from_plain_data() -> None:
-    adapter = TypeAdapter(Obstacle)
+    adapter = TypeAdapter(obstacles.Obstacle)
     data = {"shape": "half_space", "point": (0.0, 0.0, 0.1), "normal": (0.0, 0.0, 1.0)}
-    assert adapter.validate_python(data) == HalfSpaceObstacle(**data)
+    assert adapter.validate_python(data) == half_space(data["point"], data["normal"])
     data = {"shape": "cylinder", "start": (0.0, 0.0), "end": (0.0, 0.1), "radius": 1.0}
     found = adapter.validate_python(data)
-    assert found == CylinderObstacle(**data)
+    assert found == cylinder(data["start"], data["end"], 1.0)
     assert found.canonical() == data | {"start": [0.0, 0.0], "end": [0.0, 0.1]}
 
 
@@ -101,23 +76,24 @@ def test_settings_are_read_from_plain_data() -> None:
 )
 def test_settings_out_of_range_are_refused(data: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
-        TypeAdapter(Obstacle).validate_python(data)
+        TypeAdapter(obstacles.Obstacle).validate_python(data)
+
+
+SLANTED = ((0.0, 0.0, 0.0), (1.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1.0))
+LEVEL = tuple((x, y, 0.0) for x, y, _ in SLANTED)
 
 
 @pytest.mark.parametrize(
     ("obstacle", "field"),
     [
-        (
-            CylinderObstacle(shape="cylinder", start=(1.0, 0.0), end=(1.0, 0.0, 0.0), radius=1.0),
-            "end",
-        ),
-        (
-            CapsuleObstacle(shape="capsule", start=(1.0, 0.0), end=(1.0, 0.0, 0.0), radius=1.0),
-            "end",
-        ),
-        (HalfSpaceObstacle(shape="half_space", point=(1.0, 0.0), normal=(0.0, 0.0)), "normal"),
+        (cylinder((1.0, 0.0), (1.0, 0.0, 0.0), 1.0), "end"),
+        (capsule((1.0, 0.0), (1.0, 0.0, 0.0), 1.0), "end"),
+        (half_space((1.0, 0.0), (0.0, 0.0)), "normal"),
+        (obstacles.HullObstacle(shape="hull", points=SLANTED), "points: .* no plane"),
+        (obstacles.HullObstacle(shape="hull", points=LEVEL), "points: .* no plane"),
     ],
 )
-def test_obstacles_without_a_direction_are_refused(obstacle: object, field: str) -> None:
+def test_obstacles_without_a_direction_or_a_volume_are_refused(obstacle: Any, field: str) -> None:
+    both = (ONE_OF_EACH[0], obstacle)
     with pytest.raises(SettingError, match=rf"scenario\.obstacles\[1\]\.{field}"):
-        obstacle_table((ONE_OF_EACH[0], obstacle))
+        obstacle_shapes(obstacle_table(both), obstacle_hulls(both))

@@ -1,7 +1,7 @@
 """A planner that can be told to fail, installed as a plug-in, and conditions that use it."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -41,12 +41,15 @@ def installed(plug_in: Path) -> Iterator[None]:
 
 @pytest.fixture
 def faulty() -> Condition:
-    """Return a condition of the planner that can be told to fail.
+    """Return a condition of that planner; how it is to fail is no part of it."""
+    return compose.expand(WORDS)[0].conditions[0].condition
 
-    What it is told is no part of it.
-    """
-    (experiment,) = compose.expand(WORDS)
-    return experiment.conditions[0].condition
+
+@pytest.fixture
+def fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Return a function that tells the planner how to fail, in this process and its workers."""
+    monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))
+    return lambda faults: monkeypatch.setenv("FAULTY", faults)
 
 
 @pytest.fixture(scope="session")

@@ -1,11 +1,8 @@
-"""A plug-in for tests: Rana & Zalzala's planner.
-
-Which misbehaves where the environment tells it to.
+"""A plug-in for tests: Rana & Zalzala's planner, which fails where the environment tells it to.
 
 `FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`,
-`hang:5,6`, `slow:1`, `slow_once:1`, `deaf:1` (slow, and no signal ends it), `eat:1` (80 GB),
-`tell:7` (whether a server forked the worker). It is no part of the condition, so that
-results can be compared with those of an undisturbed run.
+`hang:5,6`, `slow:1`, `slow_once:1`, `deaf:1` (slow, and no signal ends it), `eat:1` (80 GB). It is
+no part of the condition, so that results can be compared with those of an undisturbed run.
 """
 
 import multiprocessing
@@ -31,57 +28,38 @@ class Faulty(ViaPointGa):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         seed = rng.bit_generator.seed_seq
         assert isinstance(seed, np.random.SeedSequence)
-        faults = faults_of(seed.spawn_key[0])
         for generation in generations(super().evolve(problem, rng)):
-            if "hang" in faults and generation.index == 1 and in_worker():
-                time.sleep(HANG_S)
-            if "slow" in faults and generation.index == 1:
-                time.sleep(HANG_S)
-            if "slow_once" in faults and generation.index == 1 and is_first(seed.spawn_key[0]):
-                time.sleep(HANG_S)
-            if "deaf" in faults and generation.index == 1 and in_worker():
-                signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])  # as compiled code
-                time.sleep(HANG_S)
-            if "eat" in faults and generation.index == 1:
-                assert np.ones(10**10).any()
-            if "raise" in faults and generation.index == 1:
-                raise ArithmeticError(
-                    f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why"
-                )
-            if "tell" in faults:
-                raise RuntimeError(
-                    "a server's worker" if forked_from_server() else "the parent's worker"
-                )
-            if faults & {"kill", "kill_once"} and generation.index == 1 and in_worker():
-                die(seed.spawn_key[0], once="kill_once" in faults)
+            if generation.index == 1:
+                fail(seed.spawn_key[0])
             yield generation
 
 
-def faults_of(replicate: int) -> set[str]:
+def fail(replicate: int) -> None:
     parts = [part.partition(":") for part in os.environ.get("FAULTY", "").split(";") if part]
-    return {what for what, _, replicates in parts if str(replicate) in replicates.split(",")}
+    faults = {what for what, _, replicates in parts if str(replicate) in replicates.split(",")}
+    if "raise" in faults:
+        raise ArithmeticError(f"replicate {replicate} is [bold]told[/] to fail\nand says why")
+    if "eat" in faults:
+        assert np.ones(10**10).any()
+    if "slow" in faults or ("slow_once" in faults and count(f"slow {replicate}") == 1):
+        time.sleep(HANG_S)
+    if in_worker() and "deaf" in faults:
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])  # as compiled code
+    if in_worker() and faults & {"hang", "deaf"}:
+        time.sleep(HANG_S)
+    is_struck = in_worker() and faults & {"kill", "kill_once"}
+    if is_struck and (count(str(replicate)) == 1 or "kill" in faults):
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
-def is_first(replicate: int) -> bool:
-    """Return whether a replicate has not been here before; note that it has."""
-    flag = Path(os.environ["FAULTY_FLAGS"]) / f"slow {replicate}"
-    first = not flag.exists()
-    flag.touch()
-    return first
+def count(name: str) -> int:
+    """Return how often this has been asked for; a file notes it."""
+    flag = Path(os.environ["FAULTY_FLAGS"]) / name
+    number = int(flag.read_text()) + 1 if flag.exists() else 1
+    flag.write_text(str(number))
+    return number
 
 
 def in_worker() -> bool:
-    return forked_from_server() or multiprocessing.parent_process() is not None  # that of dask
-
-
-def forked_from_server() -> bool:
-    return any("worker_server" in word for word in sys.orig_argv)
-
-
-def die(replicate: int, once: bool) -> None:
-    """Kill this process, and note it in a file; with `once`, not again."""
-    flag = Path(os.environ["FAULTY_FLAGS"]) / str(replicate)
-    deaths = int(flag.read_text()) if flag.exists() else 0
-    if not once or deaths == 0:
-        flag.write_text(str(deaths + 1))
-        os.kill(os.getpid(), signal.SIGKILL)
+    is_forked = any("worker_server" in word for word in sys.orig_argv)
+    return is_forked or multiprocessing.parent_process() is not None  # that of dask

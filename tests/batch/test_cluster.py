@@ -1,19 +1,23 @@
 """Replicates on a cluster: the same digests as here, a killed worker loses nothing."""
 
+import importlib.util
 import json
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from batch_samples import digests, new_batch, run
+from batch_samples import around_plug_in, digests, failures, new_batch, run
+from process_table import eventually
 
+from evoexp import shipped
 from evoexp.batch import cluster
 from evoexp.condition import Condition
 from evoexp.store.run_directory import RunDirectory
+from evoexp.store.summaries import summary_table
+from store_lookup import find_runs
 
 pytest.importorskip("distributed", reason="needs distributed, from evoexp[cluster]")
 pytestmark = pytest.mark.filterwarnings("ignore")  # distributed's own
@@ -23,8 +27,8 @@ DASK = {"backend": "dask", "num_workers": 2}
 @pytest.fixture
 def scheduler(tmp_path: Path, plug_in: Path) -> Iterator[str]:
     """Start a scheduler and two workers as commands, as on a cluster; return its address."""
-    paths = [str(plug_in), str(Path(__file__).parent), *filter(None, sys.path)]
-    around = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    around = around_plug_in(plug_in, tmp_path)
+    around["PYTHONPATH"] = os.pathsep.join([around["PYTHONPATH"], *sys.path])
     file = tmp_path / "scheduler.json"
     command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
     command += ["--port", "0", "--host", "127.0.0.1", "--scheduler-file", str(file), "--no-show"]
@@ -32,12 +36,9 @@ def scheduler(tmp_path: Path, plug_in: Path) -> Iterator[str]:
     workers += ["--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
     workers += ["--local-directory", str(tmp_path)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": around}
-    started = [subprocess.Popen(words, **quiet) for words in (command, workers)]  # type: ignore[call-overload]
+    started = [subprocess.Popen(words, **quiet) for words in (command, workers)]
     try:
-        for _ in range(600):
-            if file.exists() and file.read_text().strip():
-                break
-            time.sleep(0.1)
+        assert eventually(lambda: file.exists() and file.read_text().strip())
         yield str(json.loads(file.read_text())["address"])
     finally:
         for process in started[::-1]:
@@ -55,33 +56,23 @@ def test_workers_of_a_scheduler_give_the_same_digests(
     faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, scheduler: str
 ) -> None:
     settings = {"backend": "dask", "address": scheduler}
-    outcomes = run(tmp_path / "outputs", (faulty, 12), **settings)
-    assert sorted(outcome.replicate for outcome in outcomes) == list(range(12))
+    assert failures(run(tmp_path / "outputs", (faulty, 12), **settings)) == {}
     assert digests(tmp_path / "outputs", faulty) == undisturbed
     assert not new_batch(tmp_path / "outputs", (faulty, 12), **settings).jobs
 
 
 @pytest.mark.matrix
 def test_a_killed_worker_loses_nothing_but_its_own_replicate(
-    faulty: Condition,
-    undisturbed: dict[int, str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, fail: Callable[[str], None]
 ) -> None:
-    monkeypatch.setenv("FAULTY", "kill_once:3;kill:7;raise:9;slow:5")
-    monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))
-    outcomes = run(tmp_path / "outputs", (faulty, 12), **DASK, timeout_s=5.0)
-    assert sorted(outcome.replicate for outcome in outcomes) == list(range(12)), "each ends once"
-    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.reason}
-    died = "worker process died twice"
-    assert reasons == {
-        5: died,  # ended by its own time limit, which a thread cannot tell
-        7: died,
-        9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
-    }
-    expected = {k: digest for k, digest in undisturbed.items() if k not in reasons}
+    fail("kill_once:3;kill:7;raise:9;slow:5")
+    reasons = failures(run(tmp_path / "outputs", (faulty, 12), **DASK, timeout_s=5.0))
+    died = "worker process died twice"  # of 5 by its own time limit, which a thread cannot tell
+    assert reasons.pop(9).startswith("ArithmeticError: ")
+    assert reasons == {5: died, 7: died}
+    expected = {k: digest for k, digest in undisturbed.items() if k not in (5, 7, 9)}
     assert digests(tmp_path / "outputs", faulty) == expected
-    assert RunDirectory(tmp_path / "outputs", faulty.id).failed() == set(reasons)
+    assert RunDirectory(tmp_path / "outputs", faulty.id).failed() == {5, 7, 9}
 
 
 @pytest.mark.matrix
@@ -89,17 +80,12 @@ def test_a_worker_with_other_code_is_refused(
     faulty: Condition, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "code_identity", lambda: "0.0.1 (abc)")
-    settings = {"backend": "dask", "address": scheduler}
-    with pytest.raises(
-        cluster.ClusterError,
-        match=r"^runner\.address: the worker on .* must have evoexp 0\.0\.1 \(abc\), has ",
-    ):
-        run(tmp_path / "outputs", (faulty, 3), **settings)
+    must = r"^runner\.address: the worker on .* must have evoexp 0\.0\.1 \(abc\), has "
+    with pytest.raises(cluster.ClusterError, match=must):
+        run(tmp_path / "outputs", (faulty, 3), backend="dask", address=scheduler)
 
 
-def test_an_address_that_nobody_answers_is_refused(
-    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_address_that_nobody_answers_is_refused(faulty: Condition, tmp_path: Path) -> None:
     import dask
 
     with (
@@ -107,3 +93,46 @@ def test_an_address_that_nobody_answers_is_refused(
         pytest.raises(cluster.ClusterError, match="must be the address of a scheduler that answ"),
     ):
         run(tmp_path / "outputs", (faulty, 3), backend="dask", address="tcp://127.0.0.1:1")
+
+
+SCRIPT = Path(__file__).parents[2] / "docs" / "slurm_cluster.py"
+SBATCH = """#!/bin/sh
+cp "$1" "$JOBS.sh"  # the file is gone as soon as this script ends, as with Slurm
+bash "$JOBS.sh" >"$JOBS.out" 2>&1 &
+echo $! >>"$JOBS"
+echo "Submitted batch job $!"
+"""
+
+
+# not by importing it: that replaces this process' SIGINT handler
+@pytest.mark.skipif(importlib.util.find_spec("dask_jobqueue") is None, reason="needs dask-jobqueue")
+@pytest.mark.matrix
+def test_an_experiment_runs_on_slurms_workers(tmp_path: Path) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    scancel = '#!/bin/sh\nkill "$@" 2>/dev/null || true\n'
+    for name, text in (("sbatch", SBATCH), ("scancel", scancel)):
+        (programs / name).write_text(text)
+        (programs / name).chmod(0o755)
+    around = os.environ | {
+        "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+        "EVOEXP_OUTPUTS": str(tmp_path / "outputs"),
+        "JOBS": str(tmp_path / "jobs"),
+    }
+    words = "--jobs 1 --cores 2 --memory 2GB --interface lo experiment=rana_planar budget=smoke"
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), *words.split()],
+        env=around,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "jobs").read_text().split()) == 1
+    runs = find_runs(tmp_path / "outputs")
+    assert len(runs) == 3
+    for each in runs:
+        (row,) = {row.digest for row in shipped.find(each.hash12)}
+        assert row in summary_table(each)["digest"].to_pylist()

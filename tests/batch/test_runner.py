@@ -4,45 +4,50 @@ import json
 import math
 import os
 import time
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
-from batch_samples import WORDS, digests, new_batch, run
+from batch_samples import WORDS, digests, failures, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
 
+import evoexp.batch.warm_kernels as warm_kernels_module
 from evoexp.batch import jobs, live_curves
-from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates, fan_out
+from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Replicates
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.workers import Workers
+from evoexp.batch.replicate_limits import ReplicateLimits
+from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.cli import main
 from evoexp.condition import Condition
-from evoexp.configuration import compose
-from evoexp.errors import Busy, DamagedStore, SettingError
+from evoexp.errors import DamagedStore
 from evoexp.store import log_reader
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
 
+Fail = Callable[[str], None]
+REASON = "ArithmeticError: replicate {} is [bold]told[/] to fail"
+
+
+def job(condition: Condition, replicate: int = 0) -> Job:
+    return Job(condition.id, condition.to_json(), replicate)
+
 
 def stamps(directory: RunDirectory) -> dict[str, tuple[int, bytes]]:
-    """Return name → modification time and content of every log."""
-    return {
-        path.name: (path.stat().st_mtime_ns, path.read_bytes())
-        for path in directory.replicates.glob("*.mcap")
-    }
+    """Return name → modification time and content of every log, and of the manifest."""
+    files = [*directory.replicates.glob("*.mcap"), directory.path / "manifest.json"]
+    return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in files}
 
 
 def test_only_what_is_missing_runs(faulty: Condition, tmp_path: Path) -> None:
     outcomes = run(tmp_path, (faulty, 5))
-    assert [(o.condition_id, o.replicate, o.reason) for o in outcomes] == [
-        (faulty.id, k, "") for k in range(5)
-    ]
+    assert [o[:2] for o in outcomes] == [(faulty.id, k) for k in range(5)]
+    assert failures(outcomes) == {}
     directory = RunDirectory(tmp_path, faulty.id)
     before, first = digests(tmp_path, faulty), stamps(directory)
     assert len(set(before.values())) == 5
@@ -52,21 +57,18 @@ def test_only_what_is_missing_runs(faulty: Condition, tmp_path: Path) -> None:
     assert [outcome.replicate for outcome in run(tmp_path, (faulty, 5))] == [1, 3]
     assert digests(tmp_path, faulty) == before
     again = stamps(directory)
-    assert all(again[name] == first[name] for name in ("0000.mcap", "0002.mcap", "0004.mcap"))
-    assert directory.summary_path.exists()
+    assert {name for name in again if again[name] != first[name]} <= {"0001.mcap", "0003.mcap"}
     summaries = read_summaries(directory)
     assert summaries["replicate"].tolist() == list(range(5))
     assert summaries["digest"].tolist() == list(before.values())
-    assert run(tmp_path, (faulty, 5)) == []
 
 
 def test_more_replicates_leave_the_earlier_ones_alone(faulty: Condition, tmp_path: Path) -> None:
     run(tmp_path, (faulty, 2))
     directory = RunDirectory(tmp_path, faulty.id)
-    before = stamps(directory) | {"": (0, (directory.path / "manifest.json").read_bytes())}
+    before = stamps(directory)
     assert [outcome.replicate for outcome in run(tmp_path, (faulty, 4))] == [2, 3]
-    after = stamps(directory) | {"": (0, (directory.path / "manifest.json").read_bytes())}
-    assert {name: after[name] for name in before} == before
+    assert stamps(directory) | before == stamps(directory)
     assert directory.plans() == [Plan(2, 0), Plan(4, 2)]
     assert read_summaries(directory)["replicate"].tolist() == [0, 1, 2, 3]
     assert run(tmp_path, (faulty, 1)) == []
@@ -77,13 +79,11 @@ def test_a_damaged_replicate_runs_again_though_fewer_are_asked_for(
     faulty: Condition, tmp_path: Path
 ) -> None:
     run(tmp_path, (faulty, 3))
-    directory, before = RunDirectory(tmp_path, faulty.id), digests(tmp_path, faulty)
-    log = directory.log_path(2)
+    before, log = digests(tmp_path, faulty), RunDirectory(tmp_path, faulty.id).log_path(2)
     log.write_bytes(log.read_bytes()[:-10])
     with pytest.warns(DamagedStore, match=r"run again: 0002\.mcap"):
         assert [outcome.replicate for outcome in run(tmp_path, (faulty, 1))] == [2]
     assert digests(tmp_path, faulty) == before
-    assert run(tmp_path, (faulty, 1)) == []
 
 
 def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
@@ -97,14 +97,10 @@ def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     (directory.replicates / ".0007.mcap.1.tmp").touch()
     (directory.replicates / "00005.mcap").touch()  # no name of a log
     read_summaries(directory)
-    canonical = Condition.to_json
-    calls: list[Condition] = []
-    monkeypatch.setattr(Condition, "to_json", lambda self: calls.append(self) or canonical(self))  # type: ignore[func-returns-value]
     monkeypatch.setattr(log_reader, "read_summary", lambda path: pytest.fail(f"{path} is decoded"))
     batch = new_batch(tmp_path, (faulty, 10))
     assert [job.replicate for job in batch.jobs] == [0, 5, 7, 8, 9]
     assert not batch.is_damaged
-    assert len(calls) <= 5, "a configuration is put into words per condition, not per replicate"
 
 
 def test_a_condition_is_built_once_per_process(
@@ -113,11 +109,9 @@ def test_a_condition_is_built_once_per_process(
     monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)  # kernels may have to be compiled
     own = faulty._replace(seed=97)  # which no test has run before
     build, calls = Condition.from_config, []
-    monkeypatch.setattr(
-        Condition, "from_config", lambda config: calls.append(config) or build(config)
-    )  # type: ignore[func-returns-value]
-    outcomes = run_jobs([Job(own.id, own.to_json(), k) for k in range(3)])
-    assert [outcome.reason for outcome in outcomes] == ["", "", ""]
+    monkeypatch.setattr(Condition, "from_config", lambda given: calls.append(given) or build(given))
+    outcomes = run_jobs([job(own, k) for k in range(3)])
+    assert failures(outcomes) == {}
     assert len(calls) == 1
     again = run_replicate(own, 2).content
     assert read_log(outcomes[2].content).content_digest == read_log(again).content_digest
@@ -128,198 +122,99 @@ def test_a_batch_tells_how_its_replicates_converge(
 ) -> None:
     monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
     (tmp_path / "curves").mkdir()
-    batch = new_batch(tmp_path / "outputs", (faulty, 1), num_workers=1, curves=tmp_path / "curves")
-    deque(batch.run(), maxlen=0)
+    run(tmp_path / "outputs", (faulty, 1), curves=tmp_path / "curves")
     (curve,) = read_curves(tmp_path / "curves")
     log = read_log(RunDirectory(tmp_path / "outputs", faulty.id).log_path(0))
     assert curve[:3] == (faulty.id, 0, log.summary.num_generations)
     assert curve.costs[-1] == log.summary.best_cost
 
 
-def test_a_condition_wanted_twice_runs_once(faulty: Condition, tmp_path: Path) -> None:
-    other = faulty._replace(seed=1)
-    batch = new_batch(tmp_path, (faulty, 1), (other, 1), (faulty, 3))
-    assert [(job.condition_id, job.replicate) for job in batch.jobs] == [
-        *((faulty.id, k) for k in range(3)),
-        (other.id, 0),
-    ]
-    assert len(list(batch.run())) == 4
-    assert len(batch.runs) == 2
-
-
-def test_planning_and_preparing_write_nothing(faulty: Condition, tmp_path: Path) -> None:
-    batch = new_batch(tmp_path / "outputs", (faulty, 2))
-    batch.prepare()
-    assert len(batch.jobs) == 2
-    assert not (tmp_path / "outputs").exists()
-    bad = compose.expand([*WORDS, "scenario.q_start=[[90,0],[270,0]]"])[0].conditions[0].condition
-    with pytest.raises(SettingError, match="scenario.q_start: must be free of collision"):
-        new_batch(tmp_path / "outputs", (faulty, 2), (bad, 2)).prepare()
-    assert not (tmp_path / "outputs").exists()
-
-
 def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
-    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FAULTY", "raise:0,2")
-    outcomes = run(tmp_path, (faulty, 4))
-    assert [(o.replicate, bool(o.reason)) for o in outcomes] == [
-        (0, True),
-        (1, False),
-        (2, True),
-        (3, False),
-    ]
-    assert outcomes[2].reason == "ArithmeticError: replicate 2 is [bold]told[/] to fail"
-    directory = RunDirectory(tmp_path, faulty.id)
-    assert (directory.completed(), directory.failed()) == ({1, 3}, {0, 2})
-    failure = json.loads(directory.failure_path(2).read_bytes())
-    assert failure["reason"] == outcomes[2].reason
-    assert failure["traceback"].startswith("Traceback (most recent call last):\n")
-    assert failure["traceback"].endswith("to fail\nand says why\n")
-    assert "in evolve" in failure["traceback"]
-    rows = read_summaries(directory)
-    assert rows["status"].tolist() == ["failed", "done", "failed", "done"]
-    assert rows["stop_reason"][2] == outcomes[2].reason
-
-    monkeypatch.setenv("FAULTY", "raise:2")
-    left = new_batch(tmp_path, (faulty, 4))
-    assert (left.jobs, left.num_left_failed) == ([], 2)
-    assert [
-        (o.replicate, bool(o.reason)) for o in run(tmp_path, (faulty, 4), retry_failed=True)
-    ] == [
-        (0, False),
-        (2, True),
-    ]
-    monkeypatch.delenv("FAULTY")
-    assert [
-        (o.replicate, bool(o.reason)) for o in run(tmp_path, (faulty, 4), retry_failed=True)
-    ] == [(2, False)]
-    assert directory.failed() == set()
-    assert not list(directory.replicates.glob("*.failed.json"))
-    assert (read_summaries(directory)["status"] == "done").all()
-
-
-def test_failures_on_the_command_line(
     faulty: Condition,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
-    monkeypatch.setenv("FAULTY", "raise:1")
-    monkeypatch.setenv("COLUMNS", "200")
-    words = ["run", *WORDS[:-1], "num_replicates=3", "runner=serial", "--no-report"]
-    assert main(words) == 1
-    out, err = capsys.readouterr()
-    assert (
-        err
-        == f"failed: {faulty.id[:12]} #1: ArithmeticError: replicate 1 is [bold]told[/] to fail\n"
-    )
-    assert "replicates: 2 of 3 done, 1 failed, ETA 0 s" in out
-    table = out[out.index("\n1 failed ") :]
-    assert all(f"┃ {column} " in table for column in ("hash", "reason", "traceback in"))
-    assert (
-        f"│ {faulty.id[:12]} │ 1 │ ArithmeticError: replicate 1 is [bold]told[/] to fail │ "
-        in table
-    )
-    assert "2 of 3" in out[: out.index("\n1 failed ")]
-    monkeypatch.setenv("COLUMNS", "80")
-    assert main(words) == 1
-    left = capsys.readouterr().out
-    assert "1 replicate failed before" in " ".join(left.split())
-    assert main(["list", "--failed"]) == 0
-    assert "ArithmeticError" in capsys.readouterr().out
-    words.append("--retry-failed")
-    assert main(words) == 1
-    narrow = capsys.readouterr().out
-    assert max(map(len, narrow[narrow.index("\n1 failed") :].splitlines())) <= 80
-    assert "…" not in narrow
-
-    monkeypatch.delenv("FAULTY")
-    assert main(words) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    assert "replicates: 1 of 1 done, 0 failed" in out
-    assert "3 of 3" in out
-
-
-def test_where_every_replicate_failed_there_is_still_a_table_and_exit_code_1(
-    faulty: Condition,
-    tmp_path: Path,
+    fail: Fail,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     blank_figures: None,
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
-    monkeypatch.setenv("FAULTY", "raise:0,1")
-    code = main(
-        [
-            "run",
-            *WORDS[:-1],
-            "num_replicates=2",
-            "runner=serial",
-            "report=paper",
-            "report.formats=[svg]",
-        ]
-    )
-    out = capsys.readouterr().out
-    assert code == 1
-    assert "\n2 failed" in out
-    assert "report: " in out
-
-
-def test_stopping_keeps_what_is_finished_and_leaves_no_lock(
-    faulty: Condition, tmp_path: Path
-) -> None:
-    batch = new_batch(tmp_path, (faulty, 4))
-    outcomes = batch.run()
-    assert [next(outcomes).replicate, next(outcomes).replicate] == [0, 1]
-    with pytest.raises(Busy, match=f"run {faulty.id[:12]}: another process is writing it now"):
-        next(new_batch(tmp_path, (faulty, 5)).run())
-    outcomes.close()
     directory = RunDirectory(tmp_path, faulty.id)
-    with directory.lock():
-        assert directory.completed() == {0, 1}
-    assert directory.summary_path.exists()
-    assert [outcome.replicate for outcome in run(tmp_path, (faulty, 4))] == [2, 3]
+    words = ["run", *WORDS[:-1], "num_replicates=3", "runner=serial"]
+
+    def said(code: int, *more: str, width: int = 80) -> tuple[str, str]:
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert main([*words, *more]) == code
+        return capsys.readouterr()
+
+    fail("raise:0,1,2")
+    out, _ = said(1, "report=paper", "report.formats=[svg]")
+    assert "\n3 failed" in out and "report: " in out
+    fail("raise:1")
+    out, err = said(1, "--retry-failed", "--no-report", width=200)
+    assert err == f"failed: {faulty.id[:12]} #1: {REASON.format(1)}\n"
+    assert "replicates: 2 of 3 done, 1 failed, ETA 0 s" in out
+    result, table = out.split("\n1 failed ")
+    assert "2 of 3" in result
+    assert all(f"┃ {column} " in table for column in ("hash", "reason", "traceback in"))
+    assert f"│ {faulty.id[:12]} │ 1 │ {REASON.format(1)} │ " in table
+    assert (directory.completed(), directory.failed()) == ({0, 2}, {1})
+    failure = json.loads(directory.failure_path(1).read_bytes())
+    assert failure["reason"] == read_summaries(directory)["stop_reason"][1] == REASON.format(1)
+    assert failure["traceback"].startswith("Traceback (most recent call last):\n")
+    assert failure["traceback"].endswith("to fail\nand says why\n")
+    assert read_summaries(directory)["status"].tolist() == ["done", "failed", "done"]
+    assert "1 replicate failed before" in " ".join(said(1, "--no-report")[0].split())
+    assert main(["list", "--failed"]) == 0
+    assert "ArithmeticError" in capsys.readouterr().out
+    narrow, _ = said(1, "--retry-failed", "--no-report")
+    assert max(map(len, narrow[narrow.index("\n1 failed") :].splitlines())) <= 80
+    assert "…" not in narrow
+    fail("")
+    out, err = said(0, "--retry-failed", "--no-report")
+    assert (err, "3 of 3" in out, directory.failed()) == ("", True, set())
 
 
 def test_a_clock_that_is_set_back_changes_nothing(
     faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    outputs = tmp_path / "outputs"
-    run(outputs, (faulty, 6))
-    for path in RunDirectory(outputs, faulty.id).path.rglob("*"):
+    run(tmp_path, (faulty, 6))
+    for path in RunDirectory(tmp_path, faulty.id).path.rglob("*"):
         os.utime(path, (4e9, 4e9))  # written in what is now the future
     monkeypatch.setattr(time, "time", lambda: 0.0)
-    run(outputs, (faulty, 12))
-    assert digests(outputs, faulty) == undisturbed
+    run(tmp_path, (faulty, 12))
+    assert digests(tmp_path, faulty) == undisturbed
 
 
-# Workers
+LATE = "took longer than runner.timeout_s = 2"
+DIED, WORKERS = "worker process died twice", {"num_workers": 2, "timeout_s": 2.0}
 
 
-def test_a_killed_worker_costs_its_own_replicate_a_retry(
+@pytest.mark.parametrize(
+    ("faults", "settings", "reasons"),
+    [
+        ("slow:1;slow_once:2", {"timeout_s": 2.0}, {1: LATE}),
+        ("kill_once:3;kill:7;raise:9", {"num_workers": 2}, {7: DIED, 9: REASON.format(9)}),
+        ("slow:1;slow_once:4;deaf:6", WORKERS, {1: LATE, 6: f"{LATE}, in compiled code: its pro"}),
+        ("eat:8", WORKERS | {"memory_gb": 1.0}, {8: ""}),
+    ],
+)
+def test_a_killed_or_slow_worker_costs_its_own_replicate_a_retry(
     faulty: Condition,
     undisturbed: dict[int, str],
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    fail: Fail,
+    faults: str,
+    settings: dict[str, Any],
+    reasons: dict[int, str],
 ) -> None:
-    monkeypatch.setenv("FAULTY", "kill_once:3;kill:7;raise:9")
-    monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))
-    outcomes = run(tmp_path / "outputs", (faulty, 12), num_workers=2)
-    assert sorted(outcome.replicate for outcome in outcomes) == list(range(12)), "each ends once"
+    fail(faults)
+    outcomes = run(tmp_path / "outputs", (faulty, 12), **settings)
     assert all(outcome.content == b"" for outcome in outcomes), "logs are written and let go"
-    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.reason}
-    assert reasons == {
-        7: "worker process died twice",
-        9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
-    }
-    assert (tmp_path / "3").read_text() == "1"
-    assert (tmp_path / "7").read_text() in ("2", "3"), "twice alone, and perhaps among others"
+    found = failures(outcomes)
+    assert found.keys() == reasons.keys()
+    assert all(found[k].startswith(reasons[k]) for k in reasons)
     expected = {k: digest for k, digest in undisturbed.items() if k not in reasons}
     assert digests(tmp_path / "outputs", faulty) == expected
-    assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]
 
 
 # Tasks
@@ -341,10 +236,8 @@ def test_every_job_is_run_once_and_in_order(
     replicates = Replicates(waiting, num_workers, NO_LIMITS)
     seen: list[Job] = []
     for count, (bundle,) in enumerate(iter(lambda: replicates.next_task(0), None)):
-        assert 1 <= len(bundle) <= MAX_BUNDLE
-        assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), (
-            "nobody waits for one worker"
-        )
+        share = -(-(num_jobs - len(seen)) // (2 * num_workers))  # nobody waits for one worker
+        assert 1 <= len(bundle) <= min(MAX_BUNDLE, max(1, share))
         wall, done = tasks[count % len(tasks)]
         seen += bundle[:done]  # the worker stopped there
         replicates.end_task((bundle,), outcomes_of(bundle[:done], wall))
@@ -371,15 +264,29 @@ def test_bundles_are_as_long_as_a_task() -> None:
 def test_a_task_that_takes_long_begins_no_further_replicate(
     faulty: Condition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = [Job(faulty.id, faulty.to_json(), k) for k in range(3)]
-    monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)
-    assert [outcome.replicate for outcome in run_jobs(asked)] == [0, 1, 2]
     monkeypatch.setattr(jobs, "LONGEST_TASK_S", 0.0)
-    assert [outcome.replicate for outcome in run_jobs(asked)] == [0]
-    assert run_jobs([]) == []
+    outcomes = run_jobs([job(faulty, k) for k in range(3)])
+    assert [outcome.replicate for outcome in outcomes] == [0]
 
 
-def test_no_jobs_are_no_outcomes() -> None:
-    assert list(fan_out([], None)) == []
-    with Workers(2) as workers:
-        assert list(fan_out([], workers)) == []
+def test_conditions_that_differ_in_numbers_are_one_kind(
+    faulty: Condition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched, planner = [], type(faulty.planner)
+    evolve = planner.evolve
+    monkeypatch.setattr(planner, "evolve", lambda *a: (searched.append(a), evolve(*a))[1])
+    others = [faulty._replace(seed=seed) for seed in range(1, 4)]
+    kinds = one_of_each_kind(job(each, index) for each in [faulty, *others] for index in range(3))
+    warm_kernels(kinds, ReplicateLimits())
+    assert len(kinds) == len(searched) == 1
+
+
+@pytest.mark.parametrize("fault", ["raise:0", "slow:0"])
+def test_what_fails_or_takes_too_long_is_left_to_the_replicates(
+    fault: str, faulty: Condition, fail: Fail, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fail(fault)
+    monkeypatch.setattr(warm_kernels_module, "COMPILING_S", 1.0)
+    begun = time.monotonic()
+    warm_kernels([job(faulty)], ReplicateLimits(timeout_s=0.1))
+    assert time.monotonic() - begun < 60.0

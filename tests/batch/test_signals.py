@@ -19,17 +19,29 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from batch_samples import digests, run
-from test_interruptions import COMMAND, HANGING, HERE, PATIENCE_S, alive
+from batch_samples import WORDS, around_plug_in, digests, run
+from process_table import PATIENCE_S, eventually, of_group
 
 from evoexp.cli import KEPT
 from evoexp.commands.interruption import Interrupted, Interruption
 from evoexp.condition import Condition
+from evoexp.errors import Busy
 from evoexp.store.run_directory import RunDirectory
+from evoexp.store.tables import read_summaries
 from matrix import examples
 
+COMMAND = ["run", *WORDS, "runner.num_workers=2", "--no-report"]
+HANGING = "hang:6,7,8,9,10,11"  # these take an hour; the first task of each worker ends
 PROGRESS = re.compile(r".{0,20}replicates|.*\d+/12 +\d+ failed")
 LINE = f"evoexp: interrupted; {KEPT}"
+# The terminal becomes the process's own; signals are handled when Python has started.
+IN_TERMINAL = """
+import fcntl, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+from evoexp.cli import main
+print("begun", flush=True)
+sys.exit(main())
+"""
 
 
 class Terminal:
@@ -37,17 +49,12 @@ class Terminal:
 
     def __init__(self, outputs: Path, plug_in: Path, faults: str) -> None:
         self.temporary = Path(tempfile.mkdtemp())  # short: a socket's path is
-        paths = (str(plug_in), str(HERE), os.environ.get("PYTHONPATH", ""))
-        environment = os.environ | {
-            "EVOEXP_OUTPUTS": str(outputs),
-            "PYTHONPATH": os.pathsep.join(paths),
-            "FAULTY": faults,
-            "TMPDIR": str(self.temporary),
-        }
+        environment = around_plug_in(plug_in, outputs)
+        environment |= {"FAULTY": faults, "TMPDIR": str(self.temporary)}
         self.shown = ""
-        self._screen, own = pty.openpty()
+        self.screen, own = pty.openpty()
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _IN_TERMINAL, *COMMAND],
+            [sys.executable, "-c", IN_TERMINAL, *COMMAND],
             env=environment,
             stdin=own,
             stdout=own,
@@ -59,57 +66,36 @@ class Terminal:
     def look(self, seconds: float) -> None:
         """Read what is shown meanwhile."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0 and self._screen >= 0:
-            if select.select([self._screen], [], [], left)[0]:
+        while (left := end - time.monotonic()) > 0 and self.screen >= 0:
+            if select.select([self.screen], [], [], left)[0]:
                 try:
-                    self.shown += os.read(self._screen, 65536).decode()
+                    self.shown += os.read(self.screen, 65536).decode()
                 except OSError:  # nobody writes any more
                     return
 
-    def press_ctrl_c(self) -> None:
-        """Press it."""
-        with suppress(OSError):
-            os.write(self._screen, b"\x03")
-
-    def close(self) -> None:
-        """Close its window."""
-        os.close(self._screen)
-        self._screen = -1
+    def look_until(self, holds: Callable[[], object]) -> None:
+        """Read until something holds that is to happen before the command ends."""
+        end = time.monotonic() + PATIENCE_S
+        while not holds():
+            assert self.process.poll() is None and time.monotonic() < end, self.shown
+            self.look(0.02)
 
     def ended(self) -> int:
-        """Wait for the command; return its exit code."""
+        """Wait for the command and all of its processes; return its exit code."""
         end = time.monotonic() + PATIENCE_S
         while self.process.poll() is None:
             assert time.monotonic() < end, self.shown
             self.look(0.05)
         self.look(0.2)
+        assert eventually(lambda: not of_group(self.process.pid), PATIENCE_S / 4)
         return self.process.returncode
-
-    def left(self) -> list[str]:
-        """Return the processes that stay."""
-        end = time.monotonic() + PATIENCE_S / 4
-        while alive(self.process.pid) and time.monotonic() < end:
-            time.sleep(0.05)
-        return alive(self.process.pid)
-
-
-# The terminal becomes the process's own; signals are handled when Python has started.
-_IN_TERMINAL = """
-import fcntl, sys, termios
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-from evoexp.cli import main
-print("begun", flush=True)
-sys.exit(main())
-"""
 
 
 @contextmanager
 def terminal(outputs: Path, plug_in: Path, faults: str = HANGING) -> Iterator[Terminal]:
     window = Terminal(outputs, plug_in, faults)
     try:
-        while "begun" not in window.shown:
-            window.look(0.05)
-            assert window.process.poll() is None, window.shown
+        window.look_until(lambda: "begun" in window.shown)
         yield window
     finally:
         with suppress(ProcessLookupError):
@@ -119,12 +105,13 @@ def terminal(outputs: Path, plug_in: Path, faults: str = HANGING) -> Iterator[Te
 
 
 def once(window: Terminal) -> None:
-    window.press_ctrl_c()
+    with suppress(OSError):
+        os.write(window.screen, b"\x03")
 
 
 def repeatedly(window: Terminal) -> None:
     for _ in range(5):
-        window.press_ctrl_c()
+        once(window)
         window.look(0.04)
 
 
@@ -136,7 +123,18 @@ def terminate_all(window: Terminal) -> None:
     os.killpg(window.process.pid, signal.SIGTERM)
 
 
-WAYS = {once: 130, repeatedly: 130, terminate: 143, terminate_all: 143}
+def close(window: Terminal) -> None:
+    os.close(window.screen)
+    window.screen = -1
+
+
+WAYS = {once: 130, repeatedly: 130, terminate: 143, terminate_all: 143, close: 129}
+# processes there are at the least: it loads libraries, starts its server, has all of its workers
+STEPS = {"libraries": 1, "server": 2, "workers": 4, "logs": 4}
+EXAMPLES = (
+    *((repeatedly, "libraries"), (terminate_all, "server")),
+    *((way, "logs") for way in (once, terminate, close)),
+)
 
 
 def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path) -> None:
@@ -145,69 +143,42 @@ def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path)
     lines = re.sub("\x1b\\[[?0-9;]*[a-zA-Z]|\\^C", "", window.shown).replace("\r", "\n")
     said = [line for line in lines.split("\n") if line.strip() and not PROGRESS.match(line)]
     # a line that is wider than the terminal goes on below, between words
-    assert (said[0], " ".join(said[1:])) == ("begun", LINE), window.shown
-    assert window.left() == []
+    assert way is close or (said[0], " ".join(said[1:])) == ("begun", LINE), window.shown
     assert list(window.temporary.iterdir()) == [], "no socket is left"
     assert not list(folder.rglob("*.tmp"))
 
 
-@pytest.mark.parametrize("way", examples(WAYS, lambda way: way is terminate))
+EVERY = [(way, step) for way in WAYS for step in STEPS if way is not close or step == "logs"]
+
+
+@pytest.mark.parametrize(("way", "step"), examples(EVERY, EXAMPLES.__contains__))
 def test_a_batch_ends_in_one_line_and_goes_on(
     way: Callable[[Terminal], None],
+    step: str,
     faulty: Condition,
     undisturbed: dict[int, str],
     tmp_path: Path,
     plug_in: Path,
 ) -> None:
     outputs = tmp_path / "there" / "outputs"
+    directory = RunDirectory(outputs, faulty.id)
     outputs.mkdir(parents=True)
-    with terminal(outputs, plug_in) as window:
-        wait_for_logs(RunDirectory(outputs, faulty.id), 2, window)
+    least = 2 if step == "logs" else 0
+    with terminal(outputs, plug_in, HANGING if least else "hang:0,1,2,3") as window:
+        window.look_until(lambda: len(of_group(window.process.pid)) >= STEPS[step])
+        window.look_until(lambda: len(directory.completed()) >= least)
+        if least:
+            with pytest.raises(Busy, match="another process is writing it now"):
+                run(outputs, (faulty, 12))
         way(window)
         check_ended(window, way, outputs.parent)
-    kept = digests(outputs, faulty)
-    assert 2 <= len(kept) < 12
-    run(outputs, (faulty, 12))
-    assert digests(outputs, faulty) == undisturbed
-
-
-def wait_for_logs(directory: RunDirectory, count: int, window: Terminal) -> None:
-    end = time.monotonic() + PATIENCE_S
-    while len(directory.completed()) < count:
-        assert window.process.poll() is None, window.shown
-        assert time.monotonic() < end
-        window.look(0.02)
-
-
-STARTING = {"libraries": 1, "server": 2, "workers": 4}  # processes there are at the least
-EXAMPLES = ((repeatedly, "libraries"), (terminate_all, "server"))
-
-
-@pytest.mark.parametrize(
-    ("way", "step"),
-    examples([(way, step) for way in WAYS for step in STARTING], EXAMPLES.__contains__),
-)
-def test_a_batch_that_starts_ends_in_one_line(
-    way: Callable[[Terminal], None], step: str, tmp_path: Path, plug_in: Path
-) -> None:
-    """While it loads libraries, starts its server, or has all of its workers."""
-    with terminal(tmp_path / "outputs", plug_in, "hang:0,1,2,3") as window:
-        while len(alive(window.process.pid)) < STARTING[step]:
-            window.look(0.01)
-            assert window.process.poll() is None, window.shown
-        way(window)
-        check_ended(window, way, tmp_path)
-
-
-def test_a_terminal_that_closes_ends_the_batch(
-    faulty: Condition, tmp_path: Path, plug_in: Path
-) -> None:
-    outputs = tmp_path / "outputs"
-    with terminal(outputs, plug_in) as window:
-        wait_for_logs(RunDirectory(outputs, faulty.id), 2, window)
-        window.close()
-        assert window.ended() == 128 + signal.SIGHUP
-        assert window.left() == []
+    if least:
+        kept = digests(outputs, faulty)
+        assert least <= len(kept) < 12
+        assert read_summaries(directory)["replicate"].tolist() == sorted(kept)
+        run(outputs, (faulty, 12))
+        assert digests(outputs, faulty) == undisturbed
+        assert read_summaries(directory)["digest"].tolist() == list(undisturbed.values())
 
 
 # The handler by itself
@@ -216,8 +187,8 @@ def test_a_terminal_that_closes_ends_the_batch(
 @pytest.fixture
 def heard() -> Iterator[Interruption]:
     """Hear signals in this process for the length of a test."""
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM")
-    before = {getattr(signal, name): signal.getsignal(getattr(signal, name)) for name in names}
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
+    before = {number: signal.getsignal(number) for number in numbers}
     hooks = sys.unraisablehook, sys.excepthook, threading.excepthook
     interruption = Interruption()
     interruption.hear()
@@ -235,9 +206,7 @@ def test_a_library_that_catches_everything_does_not_keep_a_batch_alive(
     def go_on() -> None:
         with suppress(BaseException):
             signal.raise_signal(signal.SIGTERM)
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            pass
+        eventually(lambda: False)
 
     with pytest.raises(Interrupted):
         go_on()
@@ -273,12 +242,12 @@ def test_cleaning_up_is_not_interrupted(heard: Interruption) -> None:
     assert heard.exit_code == 130
 
 
-LEFT = """
-import os, signal, sys, threading
+COMMANDS = """
+import os, signal, sys, threading, time
 from evoexp import cli
 from evoexp.commands import interruption
 
-def command(words):
+def leave_threads(words):
     threading.Thread(target=threading.Event().wait).start()  # whom nobody will tell anything
     interrupted = threading.Event()
     broken = threading.Thread(target=lambda: interrupted.wait() and 1 / 0)
@@ -290,34 +259,41 @@ def command(words):
         interrupted.set()
         broken.join()
 
-interruption.ENDING_S = 0.5
-cli.command_module = lambda name: type("", (), {"main": command})
-sys.exit(cli.main())
+def wait_for_ever(words):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        threading.Event().wait(60)
+    finally:
+        threading.Event().wait()  # a library that waits for somebody who is gone
+
+def run(command):
+    cli.command_module = lambda name: type("", (), {"main": command})
+    sys.exit(cli.main())
+
+def close_for_ever():
+    interruption.Interruption().hear()
+    try:
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        time.sleep(600)
+
+def ignore():
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    interruption.Interruption().hear()
+    signal.raise_signal(signal.SIGHUP)
 """
 
 
-def test_threads_that_an_interruption_leaves_behind_keep_nobody_waiting_and_say_nothing() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", LEFT, "list"], capture_output=True, text=True, timeout=60
-    )
-    assert (done.returncode, done.stderr) == (-signal.SIGINT, "evoexp: interrupted\n")
-
-
-def test_closing_that_never_ends_ends_the_process() -> None:
-    code = (
-        "import signal, time\nfrom evoexp.commands import interruption\n"
-        "interruption.CLOSING_S = 0.5\ninterruption.Interruption().hear()\n"
-        "try:\n    signal.raise_signal(signal.SIGINT)\nfinally:\n    time.sleep(600)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
-
-
-def test_signals_that_a_process_was_started_to_ignore_stay_ignored() -> None:
-    code = (
-        "import signal\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "from evoexp.commands.interruption import Interruption\nInterruption().hear()\n"
-        "signal.raise_signal(signal.SIGHUP)\nprint('still here')"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout == "still here\n"
+@pytest.mark.parametrize(
+    ("code", "returncode", "complaint"),
+    [
+        ("interruption.ENDING_S = 0.5; run(leave_threads)", -2, "evoexp: interrupted\n"),
+        ("interruption.PATIENCE_S = 0.5; run(wait_for_ever)", 143, "evoexp: interrupted\n"),
+        ("interruption.CLOSING_S = 0.5; close_for_ever()", -2, ""),
+        ("ignore()", 0, ""),  # a signal that the process was started to ignore
+    ],
+)
+def test_nothing_keeps_an_interrupted_process(code: str, returncode: int, complaint: str) -> None:
+    words = [sys.executable, "-c", COMMANDS + code, "list"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S)
+    assert (done.returncode, done.stderr) == (returncode, complaint)

@@ -2,21 +2,19 @@
 
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
 from pathlib import Path
+from subprocess import PIPE, Popen
 from typing import Any
 
 import pytest
+from process_table import PATIENCE_S, are_gone, processes
 
 from evoexp.batch import workers as workers_module
 from evoexp.batch.workers import DIED_TWICE, WorkerError, Workers, in_order
 from worker_tasks import end, end_once, fork_and_die, loaded_packages, refuse
-
-PATIENCE_S = 60.0  # [s] for anything that a busy machine may take long for
 
 
 def test_results_come_in_order_and_each_task_is_done_once() -> None:
@@ -25,16 +23,21 @@ def test_results_come_in_order_and_each_task_is_done_once() -> None:
         assert list(in_order(workers, abs, [])) == []
         pids = set(in_order(workers, os.getpid, [()] * 20))
     assert 1 <= len(pids) <= 2
-    assert not [process for process in pids if is_running(process)]
+    assert are_gone(*pids)
 
 
 def test_workers_have_one_thread_per_library_whoever_started_them() -> None:
     names = ("OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
     before = [os.environ.get(name) for name in names]
     with Workers(2) as workers:
-        found = list(in_order(workers, os.getenv, ((name,) for name in names)))
-    assert found == ["1", "1"]
+        assert list(in_order(workers, os.getenv, ((name,) for name in names))) == ["1", "1"]
     assert [os.environ.get(name) for name in names] == before
+
+
+def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
+    with Workers(1) as workers:
+        (names,) = in_order(workers, loaded_packages, [()])
+    assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & names
 
 
 def test_an_error_of_a_task_is_raised_with_its_text() -> None:
@@ -74,25 +77,21 @@ def test_a_first_call_that_fails_or_ends_the_server_costs_no_result(call: tuple[
 
 def test_a_server_that_dies_is_started_again(tmp_path: Path) -> None:
     with Workers(2) as workers:
-        for loading in children():
-            os.kill(loading, signal.SIGKILL)
+        for process in processes():
+            if process.parent == os.getpid() and process.is_server:  # it is loading
+                os.kill(process.number, signal.SIGKILL)
         assert list(in_order(workers, abs, ((-k,) for k in range(4)))) == [0, 1, 2, 3]
         (server,) = in_order(workers, os.getppid, [()])
         os.kill(server, signal.SIGKILL)
-        assert not is_running(server)
+        assert are_gone(server)
         tasks = [(k, str(tmp_path), "kill") for k in range(4)]
         assert list(in_order(workers, end_once, tasks)) == list(range(4))
 
 
-def test_why_the_server_cannot_load_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_never_begin_are_not_started_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers_module, "LIBRARIES", ["no_such_module"])
-    with pytest.raises(ImportError, match="no_such_module"), Workers(2) as some:
-        list(in_order(some, abs, [(1,)]))
-
-
-def test_workers_that_never_begin_are_not_started_for_ever(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    with pytest.raises(ImportError, match="no_such_module"), Workers(2) as workers:
+        list(in_order(workers, abs, [(1,)]))
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(WorkerError, match="die before they have begun"), Workers(2) as workers:
         list(in_order(workers, abs, [(1,)]))
@@ -106,13 +105,12 @@ def test_a_dead_worker_is_noticed_whoever_inherited_its_socket() -> None:
     assert time.monotonic() - begun < 10 * PATIENCE_S
 
 
-@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="nobody can be stopped here")
 def test_workers_that_no_longer_answer_keep_nobody_waiting() -> None:
     with Workers(2) as workers:
         stopped = set(in_order(workers, os.getpid, [()] * 20))
         for process in stopped:
             os.kill(process, signal.SIGSTOP)
-    assert not [process for process in stopped if is_running(process)]
+    assert are_gone(*stopped)
 
 
 # The command's process
@@ -138,78 +136,15 @@ sys.exit(cli.main())
 @pytest.mark.examples(2)
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
 def test_workers_end_with_their_parent_whatever_they_do(name: str) -> None:
-    number = getattr(signal, name)
-    with subprocess.Popen(
-        [sys.executable, "-c", BUSY, "list"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    words, number = [sys.executable, "-c", BUSY, "list"], getattr(signal, name)
+    with Popen(words, stdout=PIPE, stderr=PIPE, text=True) as process:
         assert process.stdout is not None and process.stderr is not None
-        processes = {int(process.stdout.readline()) for _ in range(9)}
+        group = {int(process.stdout.readline()) for _ in range(9)}
         process.send_signal(number)
         complaint = process.stderr.read()
-        code_of_end = process.wait(PATIENCE_S)
-    orderly = name in ("SIGINT", "SIGTERM", "SIGHUP")
-    assert code_of_end == (128 + number if orderly else -number)
-    assert complaint == ("evoexp: interrupted\n" if orderly else "")
-    assert not [one for one in processes if is_running(one)]
-
-
-LOCKED = """
-import os, signal, sys, threading
-from evoexp import cli
-from evoexp.commands import interruption
-
-def command(words):
-    try:
-        os.kill(os.getpid(), signal.SIGTERM)
-        threading.Event().wait(60)
-    finally:
-        threading.Event().wait()  # a library that waits for somebody who is gone
-
-interruption.PATIENCE_S = 0.5
-cli.command_module = lambda name: type("", (), {"main": command})
-sys.exit(cli.main())
-"""
-
-
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer here")
-def test_what_an_interrupted_command_waits_for_is_interrupted_too() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", LOCKED, "list"], capture_output=True, text=True, timeout=PATIENCE_S
-    )
-    assert done.returncode == 128 + signal.SIGTERM
-    assert done.stderr == "evoexp: interrupted\n"
-
-
-def children() -> list[int]:
-    """Return the servers of workers that this process has started."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            parent = stat.read_text().rpartition(") ")[2].split()[1]
-            is_server = b"worker_server" in (stat.parent / "cmdline").read_bytes()
-            found += [int(stat.parent.name)] if int(parent) == os.getpid() and is_server else []
-    return found
-
-
-def is_running(number: int, patience_s: float = 20.0) -> bool:
-    """Return whether a process is still there after some time; a zombie is not."""
-    end = time.monotonic() + patience_s
-    while time.monotonic() < end:
-        try:
-            os.kill(number, 0)
-        except ProcessLookupError:
-            return False
-        stat = Path(f"/proc/{number}/stat")
-        if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
-            return False
-        time.sleep(0.1)
-    return True
-
-
-def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
-    with Workers(1) as workers:
-        (names,) = in_order(workers, loaded_packages, [()])
-    assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & names
+        returncode = process.wait(PATIENCE_S)
+    if name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        assert (returncode, complaint) == (128 + number, "evoexp: interrupted\n")
+    else:
+        assert (returncode, complaint) == (-number, "")
+    assert are_gone(*group)

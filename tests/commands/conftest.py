@@ -1,11 +1,16 @@
 """Run commands in this process, and small stored runs to run them on."""
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_samples import SERIAL, Evoexp, Said, content, exit_code
+
+from evoexp.configuration import compose
+from evoexp.store.run_directory import RunDirectory
 
 
 @pytest.fixture
@@ -64,6 +69,29 @@ def stored(stored_once: Path, outputs: Path) -> Path:
     """Return a copy of those outputs for this test."""
     shutil.copytree(stored_once, outputs)
     return outputs
+
+
+@pytest.fixture
+def run(stored: Path) -> RunDirectory:
+    """Return the stored run of the experiment's first condition, two replicates."""
+    (experiment,) = compose.expand(["experiment=rana_planar", *SERIAL])
+    return RunDirectory(stored, experiment.conditions[0].condition.id)
+
+
+@pytest.fixture
+def motion(tmp_path: Path) -> Path:
+    """Return a file with the straight motion of the two arms, 21 instants."""
+    ends = ([[45.0, 225.0], [225.0, 225.0]], [[135.0, 135.0], [315.0, 315.0]])
+    path = tmp_path / "motion.json"
+    path.write_text(json.dumps(np.linspace(*ends, 21).swapaxes(0, 1).tolist()))
+    return path
+
+
+@pytest.fixture(params=[80, 140])
+def width(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Have lines of that many columns."""
+    monkeypatch.setenv("COLUMNS", str(request.param))
+    return int(request.param)
 
 
 @pytest.fixture

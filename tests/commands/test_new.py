@@ -1,6 +1,5 @@
 """`evoexp new` writes a package that is found, runs, and keeps its obligations."""
 
-import ast
 import re
 import tomllib
 from collections.abc import Callable, Iterator
@@ -11,7 +10,6 @@ import pytest
 from command_samples import Evoexp, exit_code
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.configuration.search_path import find
 from evoexp.evolution.operators.operator import Crossover
 from evoexp.registry import component_class
 from evoexp.testing import CHECKS, Check, check_operator, conditions
@@ -41,23 +39,11 @@ def installed(package: Path) -> Iterator[None]:
 
 def test_the_files_have_the_new_name_everywhere(package: Path) -> None:
     for path in (path for path in package.rglob("*") if path.is_file()):
-        assert "my_planner" not in f"{path}{path.read_text()}"
-        assert "MyPlanner" not in path.read_text()
+        assert not re.search("my_planner|MyPlanner", f"{path}{path.read_text()}")
     for path in ("README.md", "pyproject.toml", f"src/{NAME}/planner.py", f"tests/test_{NAME}.py"):
         assert (package / path).is_file()
     for group in ("experiment", "ga", "planner"):
         assert (package / f"src/{NAME}/conf/{group}/{NAME}.yaml").is_file()
-
-
-def test_the_planner_is_short(package: Path) -> None:
-    text = (package / f"src/{NAME}/planner.py").read_text()
-    left_out: set[int] = set()  # imports and docstrings
-    for node in ast.walk(ast.parse(text)):
-        is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
-            left_out |= set(range(node.lineno, (node.end_lineno or 0) + 1))
-    lines = [line.strip() for k, line in enumerate(text.splitlines(), 1) if k not in left_out]
-    assert 30 < len([line for line in lines if line and not line.startswith("#")]) <= 50
 
 
 def test_every_number_has_unit_and_source(package: Path) -> None:
@@ -66,13 +52,6 @@ def test_every_number_has_unit_and_source(package: Path) -> None:
             code, _, comment = line.partition("#")
             value = re.sub(r"\"[^\"]*\"|=\S*", "", code.partition(":")[2])
             assert not NUMBER.search(value) or SOURCE.match("#" + comment), f"{path.name}: {line}"
-
-
-@pytest.mark.usefixtures("installed")
-def test_its_options_come_from_the_package(evoexp: Evoexp, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "160")
-    assert find("experiment", NAME).origin == f"{NAME} 0.1.0"
-    assert f"{NAME} 0.1.0" in evoexp("list").out
 
 
 @pytest.mark.usefixtures("installed")
@@ -107,34 +86,19 @@ def test_an_operator_enters_the_planners_of_the_papers(evoexp: Evoexp, tmp_path:
         assert guest.planner.ga.crossover.share == 0.5
 
 
-@pytest.mark.usefixtures("installed")
-def test_its_options_are_found_by_their_folder_too(evoexp: Evoexp, package: Path) -> None:
-    conf = package / f"src/{NAME}/conf"
-    said = evoexp(
-        "show", f"experiment={NAME}", "--only", "λ = 4", "--config-dir", str(conf), "--json"
-    )
-    assert f'"origin": "{conf}"' in said.out
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("My_planner", "a word of lower-case letters, digits and _ that begins with a letter"),
-        ("4arms", "a word of lower-case letters"),
-        ("my-planner", "a word of lower-case letters"),
-        ("my__planner", "a word of lower-case letters"),
-        ("class", "a word of lower-case letters"),
-        ("a/b", "a word of lower-case letters"),
-        ("", "a word of lower-case letters"),
-        ("coevolution", "a new name: a component or an option has this one"),
-        ("rana", "a new name: a component or an option has this one"),
-        ("evoexp", "a new name"),
-        ("json", "json: a module of this name is installed; choose another NAME"),
-    ],
+WORD = "a word of lower-case letters, digits and _ that begins with a letter"
+USED = "a new name: a component or an option has this one"
+NAMES = dict.fromkeys(
+    ("My_planner", "4arms", "my-planner", "my__planner", "class", "a/b", ""), WORD
 )
-def test_names_that_cannot_be(refused: Refused, tmp_path: Path, name: str, message: str) -> None:
-    assert message in refused("new", "planner", name, "--directory", str(tmp_path))
-    assert [path.name for path in tmp_path.iterdir()] == []
+NAMES |= {"coevolution": USED, "rana": USED, "evoexp": "a new name"}
+NAMES["json"] = "json: a module of this name is installed; choose another NAME"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_that_cannot_be(refused: Refused, tmp_path: Path, name: str) -> None:
+    assert NAMES[name] in refused("new", "planner", name, "--directory", str(tmp_path))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_there_stays(refused: Refused, tmp_path: Path) -> None:
@@ -142,7 +106,3 @@ def test_what_is_there_stays(refused: Refused, tmp_path: Path) -> None:
     said = refused("new", "planner", "mine", "--directory", str(tmp_path))
     assert said == f"{tmp_path}/mine: is there already; choose another NAME or --directory"
     assert list((tmp_path / "mine").iterdir()) == []
-
-
-def test_other_kinds_are_refused(refused: Refused) -> None:
-    assert refused("new", "robot", "mine") == "kind: must be one of planner, operator, was 'robot'"

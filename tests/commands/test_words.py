@@ -5,24 +5,12 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_samples import Evoexp
 
 from evoexp.commands.arguments import is_motion, is_override
-from store_lookup import find_runs
 
-Refused = Callable[..., str]
 PLANAR = ("experiment=rana_planar", "budget=smoke")
-
-
-@pytest.fixture
-def motion(tmp_path: Path) -> str:
-    """Return a file with the straight motion of the two arms, 21 instants."""
-    ends = ([[45.0, 225.0], [225.0, 225.0]], [[135.0, 135.0], [315.0, 315.0]])
-    path = tmp_path / "motion.json"
-    path.write_text(json.dumps(np.linspace(*ends, 21).swapaxes(0, 1).tolist()))
-    return str(path)
 
 
 @pytest.fixture
@@ -31,19 +19,11 @@ def conf(tmp_path: Path) -> str:
     folder = tmp_path / "conf"
     (folder / "experiment").mkdir(parents=True)
     (folder / "ga").mkdir()
+    chosen = {"robot": "two_planar_2r", "scenario": "rana_obstacles", "ga": "few"}
+    chosen |= dict.fromkeys(("planner", "objective", "collision"), "rana_planar")
     (folder / "experiment/mine.yaml").write_text(
         "# @package _global_\n# evoexp run experiment=mine\n# Arms and few of them.\ndefaults:\n"
-        + "".join(
-            f"  - override /{group}: {name}\n"
-            for group, name in (
-                ("robot", "two_planar_2r"),
-                ("scenario", "rana_obstacles"),
-                ("planner", "rana_planar"),
-                ("ga", "few"),
-                ("objective", "rana_planar"),
-                ("collision", "rana_planar"),
-            )
-        )
+        + "".join(f"  - override /{group}: {name}\n" for group, name in chosen.items())
     )
     (folder / "ga/few.yaml").write_text(
         "_target_: genetic\npopulation_size: 8\nnum_generations: 2\nnum_elites: 2\n"
@@ -78,9 +58,9 @@ def test_words_that_are_overrides(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     ],
 )
 def test_evaluate_takes_every_override_of_run(
-    evoexp: Evoexp, motion: str, words: tuple[str, ...]
+    evoexp: Evoexp, motion: Path, words: tuple[str, ...]
 ) -> None:
-    for given in ((motion, *PLANAR, *words), (*words, motion, *PLANAR)):
+    for given in ((str(motion), *PLANAR, *words), (*words, str(motion), *PLANAR)):
         said = evoexp("evaluate", *given, "--json")
         assert (said.code, said.err) == (0, ""), said.err
         rows = json.loads(said.out)
@@ -91,56 +71,25 @@ def test_evaluate_takes_every_override_of_run(
 
 @pytest.mark.parametrize("command", ["view", "play", "export"])
 def test_a_motion_is_shown_under_every_override(
-    evoexp: Evoexp, motion: str, outputs: Path, command: str
+    evoexp: Evoexp, motion: Path, outputs: Path, command: str
 ) -> None:
-    words = (*PLANAR, "~control", "--only", "via-point GA")
-    said = evoexp(command, motion, *words)
+    said = evoexp(command, str(motion), *PLANAR, "~control", "--only", "via-point GA")
     assert (said.code, said.err) == (0, "")
-    assert list((outputs / "motions").glob("motion.*"))
+    (file, *_) = sorted((outputs / "motions").glob("motion.*"))
+    assert command != "view" or "motion.json · via-point GA" in file.read_text()
 
 
-def test_a_motion_file_alone_lacks_an_experiment(refused: Refused, motion: str) -> None:
-    for command in ("evaluate", "view", "play", "export"):
-        assert refused(command, motion).startswith("experiment: must be chosen: ")
+MOTIONS = ("evaluate", "view", "play", "export")
 
 
-@pytest.mark.matrix
-def test_all_commands_search_a_folder_of_options(
-    evoexp: Evoexp, outputs: Path, motion: str, conf: str, tmp_path: Path
-) -> None:
-    folder = ("--config-dir", conf)
-    words = ("experiment=mine", "num_replicates=1", "runner=serial", *folder)
-    assert "mine" in evoexp("list", *folder).out
-    assert evoexp("run", *words, "report.formats=[png]", "report.dpi=20").code == 0
-    (run,) = find_runs(outputs)
-    command = shlex.split(run.manifest()["command"])
-    assert "nothing to run" in evoexp(*command[1:], "--no-report").out
-    (page,) = outputs.glob("reports/*/index.md")
-    assert f"--config-dir {conf}" in page.read_text()
-    assert evoexp("report", "mine", "report.formats=[png]", "report.dpi=20", *folder).code == 0
-    assert json.loads(evoexp("show", *words[:1], *folder, "--json").out)["result"]["done"] == 1
-    assert evoexp("evaluate", motion, *words[:1], *folder).code == 0
-    assert evoexp("view", motion, *words[:1], *folder, "-o", str(tmp_path / "a.html")).code == 0
-    assert evoexp("play", motion, *words[:1], *folder, "-o", str(tmp_path / "a.mcap")).code == 0
-    assert evoexp("export", motion, *words[:1], *folder, "-o", str(tmp_path / "b.json")).code == 0
-    assert evoexp("reproduce", run.hash12).code == 0
-
-
-@pytest.mark.parametrize("command", ["run", "report", "show", "evaluate", "view"])
+@pytest.mark.parametrize("command", ["run", "plan", "report", "show", "compare", *MOTIONS])
 def test_errors_list_the_options_of_all_folders(
-    refused: Refused, conf: str, motion: str, command: str
+    refused: Callable[..., str], conf: str, motion: Path, command: str
 ) -> None:
-    given = (motion,) if command in ("evaluate", "view") else ()
+    given = (str(motion),) if command in MOTIONS else ()
     said = refused(command, *given, "experiment=mime", "--config-dir", conf)
     assert said.startswith("experiment: no option 'mime'; did you mean 'mine'? (options: ")
     assert "(options: mine, lavoie, " in said
-
-
-def test_a_folder_that_is_none_is_refused(refused: Refused) -> None:
-    for command in ("run", "list", "show"):
-        words = ("experiment=rana_planar",) if command != "list" else ()
-        said = refused(command, *words, "--config-dir", "nowhere")
-        assert said == "--config-dir: must be a folder, was 'nowhere'"
 
 
 def test_an_experiment_that_is_a_file(evoexp: Evoexp, outputs: Path, conf: str) -> None:

@@ -4,18 +4,20 @@ The canonical forms of shipped conditions, as they come out of somebody's log, a
 random, with a fixed seed: whatever evoexp is asked to run goes through the same door.
 """
 
-import copy
 import json
 import random
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from confinement import confined, no_longer
+from confinement import confined
 from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.configuration.refusals import check_file
+from evoexp.configuration.search_path import searched_first
 from evoexp.errors import EvoexpError
+from hostile_data import at, mutated, refusal
 from matrix import counts, matrices_are_asked_for
 from shipped_conditions import EXAMPLES, KINDS, Kind, of_kind
 
@@ -26,88 +28,26 @@ VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, 1, -1, 2, 1.5, -0.5, 1e-320, 1e-9, 1e9, 1e308, -1e308),
     *(500, 10**4, 10**5, 10**6, 10**9, 2**31, 2**62, 2**63, 2**64, 10**30, 10**400),
     *(float("inf"), float("-inf"), float("nan")),
-    *(
-        "",
-        "x",
-        "arms",
-        "null",
-        "../x",
-        "/etc/passwd",
-        "\x1b[31m",
-        "λ",
-        "a" * 10_000,
-        "${oc.env:HOME}",
-    ),
+    *("", "x", "arms", "null", "../x", "/etc/passwd", "\x1b[31m", "λ", "a" * 10_000),
+    "${oc.env:HOME}",
     *([], [[]], [None], [1], [1, 2, 3], [0.0] * 7, [1e308] * 3, ["a"], [[1, 2], [3]], [0] * 5000),
     *({}, {"a": 1}, {"_target_": "os.system"}, {"_target_": 3}, {"_target_": "arms"}),
     *({"_target_": "genetic", "revision": 1}, {"sha256": "0" * 64}, {"file": "/etc/passwd"}),
 )
 
 
-def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yield the path of every value in plain data."""
-    items: Any = ()
-    if isinstance(value, dict):
-        items = value.items()
-    elif isinstance(value, list):
-        items = enumerate(value)
-    for key, item in items:
-        yield (*path, key)
-        yield from places(item, (*path, key))
+def prepare(config: Any) -> None:
+    Condition.from_json(json.dumps(config).encode()).prepare()
 
 
-def at(value: Any, path: tuple[Any, ...]) -> Any:
-    """Return the value at a path."""
-    for key in path:
-        value = value[key]
-    return value
-
-
-def mutated(config: Any, rng: random.Random) -> Any:
-    """Return a configuration that is changed in one to three places."""
-    config = copy.deepcopy(config)
-    for _ in range(rng.choice((1, 1, 1, 2, 3))):
-        known = list(places(config))
-        if not known:
-            return config
-        path = rng.choice(known)
-        node, last = at(config, path[:-1]), path[-1]
-        match rng.randrange(10):
-            case 0:
-                del node[last]
-            case 1 if isinstance(node, dict):
-                node[rng.choice(("x", "", "_target_", "λ", f"{last}_"))] = rng.choice(VALUES)
-            case 2 if isinstance(node, list):
-                node.extend(copy.deepcopy(node) * rng.choice((1, 3, 50)))
-            case 3:
-                node[last] = copy.deepcopy(at(config, rng.choice(known[: known.index(path) + 1])))
-            case 4 if type(node[last]) in (int, float) and abs(node[last]) < 1e300:
-                node[last] *= rng.choice((-1, 0, 2, 10, 1000, 10**6, 0.5, 1e-3, 1e-12))
-            case _:
-                node[last] = copy.deepcopy(rng.choice(VALUES))
-    return config
-
-
-def refusal(config: Any) -> str:
-    """Return the refusal of a configuration, an empty text if it can be prepared."""
-    try:
-        with no_longer():
-            Condition.from_json(json.dumps(config).encode()).prepare()
-    except EvoexpError as error:
-        text = str(error)
-        assert "\n" not in text and len(text) < 1500, text
-        return text
-    return ""
-
-
-def tries(kind: Kind) -> list[str]:
+def refusals(kind: Kind) -> list[str]:
     """Return the refusals of mutated configurations of a kind."""
     rng, base = random.Random(str(kind)), json.loads(of_kind(kind, "smoke").to_json())
     found = []
     for k in range(PER_KIND):
-        config = mutated(base, rng)
+        config = mutated(base, rng, VALUES)
         try:
-            found.append(refusal(config))
+            found.append(refusal(lambda config=config: prepare(config)))
         except BaseException as error:
             raise AssertionError(f"case {k}: {json.dumps(config)[:3000]}") from error
     return found
@@ -142,8 +82,8 @@ def test_what_once_harmed_is_refused(
 ) -> None:
     config = json.loads(of_kind(kind, "smoke").to_json())
     *parents, last = (int(part) if part.isdecimal() else part for part in path.split("."))
-    at(config, tuple(parents))[last] = value
-    assert reason in confined(lambda: refusal(config), tmp_path, MEMORY)
+    at(config, parents)[last] = value
+    assert reason in confined(lambda: refusal(lambda: prepare(config)), tmp_path, MEMORY)
 
 
 @pytest.mark.examples(4)
@@ -152,5 +92,67 @@ def test_a_mutated_configuration_is_refused_in_one_line_or_prepared(
     kind: Kind, tmp_path: Path
 ) -> None:
     of_kind(kind, "smoke").prepare()  # what is loaded late is loaded here
-    refusals = confined(lambda: tries(kind), tmp_path, MEMORY)
-    assert sum(map(bool, refusals)) > len(refusals) // 3
+    found = confined(lambda: refusals(kind), tmp_path, MEMORY)
+    assert sum(map(bool, found)) > len(found) // 3
+
+
+# Option files: they unfold to little, read no environment and run no code
+
+BASE = "experiment=rana_obstacles"
+NAMES = "abcdefghi"
+LAUGHS = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
+    f"{new}: &{new} [{', '.join([f'*{old}'] * 10)}]\n"
+    for old, new in zip(NAMES, NAMES[1:], strict=False)
+)
+GA = "_target_: genetic\npopulation_size: 8\nnum_generations: 2\nnum_elites: 1\n"
+GA += "crossover_rate: 0.5\nmutation_rate: 0.5\n"
+MANY = "at most 100,000 values"
+HOSTILE = {
+    "aliases that unfold": (LAUGHS, f"{MANY}, aliases unfolded"),
+    "aliases as keys": (LAUGHS.replace("i: &i", "<<: &i"), MANY),
+    "a large file": ("x: " + "y" * 2_000_000, "larger than 1 mb"),
+    "an alias of itself": ("a: &a [*a]\n", MANY),
+    "nested deeply": ("a: " + "[" * 20_000 + "]" * 20_000, "50 deep"),
+    "code": ("x: !!python/object/apply:os.system ['touch harm']\n", "not determine a constructor"),
+    "code by name": ("_target_: os.system\ncommand: touch harm\n", "a registered component"),
+    "the environment": (f"{GA}x: ${{oc.env:SECRET}}\n", "no function, as oc.env is"),
+    "the environment in words": (f"{GA}x: a${{oc.env:SECRET}}b\n", "no function"),
+    "a function of it": (f"{GA}x: ${{oc.decode:${{oc.env:SECRET}}}}\n", "no function"),
+    "a device": ("/dev/zero", "no option 'mine'"),
+}
+
+
+def expand_mine(folder: Path) -> None:
+    with searched_first([str(folder)]):
+        compose.expand([BASE, "budget=smoke", "ga=mine"])
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_an_option_that_harms_is_refused(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SECRET", "hush")
+    text, reason = HOSTILE[name]
+    file = tmp_path / "ga" / "mine.yaml"
+    file.parent.mkdir()
+    file.symlink_to(text) if text == "/dev/zero" else file.write_text(text)
+    found = confined(lambda: refusal(lambda: expand_mine(tmp_path)), tmp_path, 500)
+    assert reason in found and "hush" not in found
+    assert not (tmp_path / "harm").exists()
+
+
+def test_an_alias_counts_as_what_it_names_alone(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    many = f"x: [{', '.join('1' * 20_000)}]\n"
+    path.write_text(f"{many}a: &a [1, 2]\nb: [*a, *a, *a, *a, *a]\n")
+    check_file(path)
+    path.write_text(f"a: &a [{', '.join('1' * 20_000)}]\nb: [*a, *a, *a, *a, *a]\n")
+    with pytest.raises(EvoexpError, match="at most 100,000 values, aliases unfolded"):
+        check_file(path)
+
+
+def test_nothing_of_the_environment_enters_by_an_override(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SECRET", "hush")
+    with pytest.raises(EvoexpError, match="no function, as oc.env is") as caught:
+        compose.expand([BASE, "budget=smoke", "scenario.length_unit=${oc.env:SECRET}"])
+    assert "hush" not in str(caught.value)

@@ -1,59 +1,58 @@
 """A result does not depend on what the same process ran before, nor on what it runs next."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
+import hashlib
+import multiprocessing
+import random
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
+from evoexp.attachments import keep_all
+from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
+from masked_logs import masked_log
 from matrix import counts
 from shipped_conditions import KINDS, of_kind
 
-SCRIPT = Path(__file__).parent / "shuffled_conditions.py"
+Results = list[tuple[str, str]]  # condition, hash of its log without its times
 
 
-def results(directory: Path, conditions: list[Condition], *seeds: int) -> list[dict[str, str]]:
-    """Return condition → its log's hash, of each alone and of each order."""
-    (directory / "files").mkdir()
-    for condition in conditions:
-        for name, content in condition.files().items():
-            (directory / "files" / Path(name).name).write_bytes(content)
-    lines = [condition.to_json() for condition in conditions]
-    (directory / "conditions").write_bytes(b"\n".join(lines))
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT), str(directory), *map(str, seeds)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+def result(line: bytes) -> tuple[str, str]:
+    """Run replicate 0 of a condition in this process."""
+    condition = Condition.from_json(line)
+    content = run_replicate(condition, 0).content
+    return condition.id, hashlib.sha256(masked_log(content)).hexdigest()
 
 
-def check(directory: Path, conditions: list[Condition], *seeds: int) -> None:
+def results(lines: list[bytes], files: list[bytes], num_orders: int) -> list[Results]:
+    """Run each condition in a fork of this process, then all of them here, in several orders."""
+    keep_all(files)
+    with multiprocessing.get_context("fork").Pool(1, maxtasksperchild=1) as pool:
+        alone = pool.map(result, lines, chunksize=1)
+    orders = [random.Random(seed).sample(lines, len(lines)) for seed in range(1, num_orders + 1)]
+    return [alone, *(list(map(result, order)) for order in orders)]
+
+
+def check(conditions: list[Condition], num_orders: int) -> None:
     """Compare every order with each condition alone in its process."""
-    alone, *orders = results(directory, conditions, *seeds)
-    assert len(alone) == len(conditions)
-    assert len(set(alone.values())) == len(conditions), "results tell conditions apart"
-    for seed, order in zip(seeds, orders, strict=True):
-        assert list(order) != list(alone)
-        assert order == alone, f"order {seed}"
+    lines = [condition.to_json() for condition in conditions]
+    files = [content for each in conditions for content in each.files().values()]
+    context = multiprocessing.get_context("spawn")  # in which nothing has run
+    with ProcessPoolExecutor(1, context) as pool:
+        alone, *orders = pool.submit(results, lines, files, num_orders).result()
+    assert len(dict(alone)) == len({digest for _, digest in alone}) == len(conditions)
+    assert len(orders) == num_orders
+    for order in orders:
+        assert order != alone
+        assert dict(order) == dict(alone)
 
 
-SAMPLE = (  # circles, boxes of a machine's body, grids with a second stage, a reference
-    ("rana_obstacles", 0),
-    ("corsepius_ball", 0),
-    ("chen_mission", 0),
-    ("chen_placement", 3),
-)
-
-
-def test_a_sample(tmp_path: Path) -> None:
-    check(tmp_path, [of_kind(example, "smoke") for example in SAMPLE], 1)
+def test_a_sample() -> None:
+    """Circles, boxes of a machine's body, grids with a second stage, a reference."""
+    names = {"rana_obstacles": 0, "corsepius_ball": 0, "chen_mission": 0, "chen_placement": 3}
+    check([of_kind(example, "smoke") for example in names.items()], 1)
 
 
 @pytest.mark.matrix
-def test_all_kinds(tmp_path: Path) -> None:
-    check(tmp_path, [of_kind(kind, "smoke") for kind in KINDS], *range(1, 1 + counts(1, 3)))
+def test_all_kinds() -> None:
+    check([of_kind(kind, "smoke") for kind in KINDS], counts(1, 3))

@@ -1,7 +1,8 @@
-"""A replicate that would take too much memory, or too long a log, is refused before it begins."""
+"""What takes too long or too much memory is refused before it begins, or costs itself alone."""
 
 import collections
 import json
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import pytest
 
 from evoexp.batch import memory_limit
 from evoexp.batch.memory_limit import allowed_memory, machine_memory, refuse_large
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.batch.reproduction import reproduce_log
 from evoexp.batch.runner import Batch
 from evoexp.batch.runner_settings import RunnerSettings
@@ -20,50 +23,57 @@ from evoexp.store import log as log_module
 from evoexp.store.log import Log, LogTooLarge
 from shipped_conditions import of_kind
 
-SHARE = RunnerSettings(num_workers=None)
+
+def test_time_is_limited_and_nothing_rings_afterwards() -> None:
+    with limited(ReplicateLimits(0.2), in_worker=False):
+        pass
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    with pytest.raises(TookTooLong), limited(ReplicateLimits(0.2), in_worker=False):
+        signal.pause()
 
 
-def changed(path: str, value: Any) -> Condition:
-    """Return a small condition with another setting."""
+def test_memory_is_limited_in_workers_only() -> None:
+    limits = ReplicateLimits(None, 10**8)
+    with limited(limits, in_worker=False):
+        assert np.ones(10**8, dtype=np.uint8).size == 10**8
+    with pytest.raises(MemoryError), limited(limits, in_worker=True):
+        np.ones(3 * 10**8, dtype=np.uint8)
+    assert np.ones(3 * 10**8, dtype=np.uint8).size == 3 * 10**8
+
+
+def changed(name: str, value: Any) -> Condition:
+    """Return a small condition with another setting of its planner's `ga`."""
     config = json.loads(of_kind(("rana_obstacles", 0), "smoke").to_json())
-    node, (*parents, last) = config, path.split(".")
-    for key in parents:
-        node = node[key]
-    node[last] = value
+    config["planner"]["ga"][name] = value
     return Condition.from_json(json.dumps(config).encode())
 
 
-def batch(condition: Condition, outputs: Path, settings: RunnerSettings) -> Batch:
-    """Return a batch of one replicate."""
-    return Batch([(condition, 1, {"label": "mine"})], settings, outputs)
+def prepare(condition: Condition, outputs: Path, **settings: Any) -> None:
+    Batch([(condition, 1, {"label": "mine"})], RunnerSettings(**settings), outputs).prepare()
 
 
 def test_a_population_that_no_machine_holds_is_refused_before_anything_is_written(
     tmp_path: Path,
 ) -> None:
-    condition = changed("planner.ga.population_size", 10**9)
     with pytest.raises(SettingError) as refusal:
-        batch(condition, tmp_path, SHARE).prepare()
-    text = str(refusal.value)
-    assert text.startswith("runner.memory_gb: must be at least ")
-    assert "the estimate of a replicate of condition mine, was " in text
+        prepare(changed("population_size", 10**9), tmp_path, num_workers=None)
+    assert str(refusal.value).startswith("runner.memory_gb: must be at least ")
+    assert "the estimate of a replicate of condition mine, was " in str(refusal.value)
     assert not list(tmp_path.iterdir())
 
 
 def test_the_setting_raises_and_lowers_the_limit(tmp_path: Path) -> None:
-    condition = changed("planner.ga.population_size", 10**5)
+    condition = changed("population_size", 10**5)
     planner, problem = condition.prepare()
     gigabytes = planner.memory(problem) / 1e9
-    little = batch(condition, tmp_path, RunnerSettings(num_workers=1, memory_gb=gigabytes / 2))
     with pytest.raises(SettingError, match=r"runner\.memory_gb: must be at least "):
-        little.prepare()
-    batch(condition, tmp_path, RunnerSettings(num_workers=1, memory_gb=1e6)).prepare()
+        prepare(condition, tmp_path, num_workers=1, memory_gb=gigabytes / 2)
+    prepare(condition, tmp_path, num_workers=1, memory_gb=1e6)
 
 
 def test_workers_share_the_memory_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert machine_memory() > 1e8
     monkeypatch.setattr(memory_limit, "machine_memory", lambda: 8e9)
-    assert allowed_memory(SHARE, 4) == 2e9
+    assert allowed_memory(RunnerSettings(num_workers=None), 4) == 2e9
     assert allowed_memory(RunnerSettings(num_workers=4, memory_gb=3.0), 4) == 3e9
 
 
@@ -75,31 +85,26 @@ def test_a_container_has_less_memory_than_its_machine(
     path.write_text("123456789\n")
     assert machine_memory() == 123456789
     path.write_text("max\n")
-    assert machine_memory() >= whole
+    assert machine_memory() >= whole > 1e8
 
 
 def test_more_generations_than_a_log_holds_are_refused() -> None:
-    condition = changed("planner.ga.num_generations", 10**9)
     must = "planner: must be of fewer than 512,000 generations: a log holds 128 MB"
     with pytest.raises(SettingError, match=must):
-        refuse_large(condition, 1e15)
+        refuse_large(changed("num_generations", 10**9), 1e15)
 
 
 def test_a_log_from_elsewhere_is_not_run_again_beyond_the_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from evoexp.batch.replicate import run_replicate
-
     path = tmp_path / "0000.mcap"
-    path.write_bytes(run_replicate(changed("planner.ga.num_generations", 2), 0).content)
+    path.write_bytes(run_replicate(changed("num_generations", 2), 0).content)
     monkeypatch.setattr("evoexp.batch.reproduction.machine_memory", lambda: 1000)
     with pytest.raises(SettingError, match=r"runner\.memory_gb"):
         reproduce_log(path)
 
 
-def test_a_log_that_no_reader_would_take_ends_its_replicate(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_log_too_large_for_readers_ends_its_replicate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(log_module, "MAX_LOG", 10_000)
     log = Log("0" * 64, b"{}", 0, np.random.Generator(np.random.PCG64(0)))
     row = (1.0, 1.0, 1.0, 0.0, 1, 1, 1, True, {}, np.ones(1), np.ones(1))

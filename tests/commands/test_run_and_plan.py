@@ -1,0 +1,223 @@
+"""`evoexp run`, `evoexp plan` and `evoexp reproduce` on small experiments."""
+
+import json
+import os
+import re
+import shlex
+from hashlib import sha256
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from command_samples import SERIAL, Evoexp, content, exit_code
+
+from evoexp import load
+from evoexp.commands import plan
+from evoexp.commands.plan import OTHER_SETTINGS, Times, bounds
+from evoexp.configuration import compose
+from evoexp.store.run_directory import RunDirectory
+from store_lookup import find_runs
+
+PLANAR = ("experiment=rana_planar", *SERIAL)
+DRAFT = ("report.formats=[png]", "report.dpi=20")
+
+
+def test_a_run_says_what_is_there_and_runs_nothing_twice(
+    evoexp: Evoexp, outputs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    first = evoexp("run", *PLANAR, "--no-report")
+    assert (first.code, first.err) == (0, "")
+    assert re.search(r"^replicates: 6 of 6 done, 0 failed, ETA 0 s$", first.out, re.MULTILINE)
+    for label, condition in compose.expand(PLANAR)[0].conditions:
+        assert condition.id[:12] in first.out and label.split(" ")[0] in first.out
+    assert first.out.count("2 of 2") == 3 and "…" not in first.out
+    assert max(map(len, first.out.splitlines())) <= 80
+    again = evoexp("run", *PLANAR, "--no-report")
+    assert again.code == 0
+    assert again.out.startswith("nothing to run: every replicate is there\n")
+    assert again.out.split("\n", 1)[1] == first.out[first.out.index("rana_planar@smoke") :]
+    assert not (outputs / "reports").exists()
+
+
+def test_conditions_that_become_one_are_one_row_everywhere(
+    evoexp: Evoexp, outputs: Path, wide_terminal: None
+) -> None:
+    words = ("experiment=rana_planar", "control=cma_es", "ga.num_generations=20", *SERIAL)
+    words = tuple(word for word in words if word != "ga.num_generations=2")  # the cap counts
+    said = evoexp("run", *words, *DRAFT)
+    (condition,) = (c for _, c in compose.expand(words)[0].conditions)
+    table = [line for line in said.out.splitlines() if condition.id[:12] in line]
+    assert len(table) == 1 and table[0].split("│")[1].strip() == "cma_es"
+    assert "via-point GA" not in said.out
+    # the store, the Python door, and all pages and tables say the same
+    (run,) = find_runs(outputs)
+    row = pd.read_parquet(run.summary_path).iloc[0]
+    named = {"experiment": "rana_planar", "label": "cma_es", "budget": "smoke"}
+    assert {name: row[name] for name in named} == named and row["control"] == "cma_es"
+    assert set(load("rana_planar", *words[1:], budget="smoke").summaries["label"]) == {"cma_es"}
+    (listed,) = json.loads(evoexp("list", "--json").out)["runs"]
+    assert {name: listed[name] for name in named} == named and listed["changed"]
+    shown = json.loads(evoexp("show", run.hash12, "--json").out)["origin"]
+    assert {name: shown[name] for name in named} == named
+    (planned,) = json.loads(evoexp("plan", *words, "--json").out)
+    (compared,) = json.loads(evoexp("compare", "rana_planar", *words[1:], "--json").out)
+    assert planned["label"] == compared["condition"] == "cma_es"
+    (page,) = (outputs / "reports").glob("rana_planar@smoke+*/index.md")
+    assert f"{run.hash12}" in page.read_text() and "random search" not in page.read_text()
+    assert evoexp("site").code == 0
+    home = (outputs / "reports" / "index.html").read_text()
+    assert "cma_es" in home and "via-point GA" not in home
+
+
+def test_terminal_and_report_have_all_stored_replicates(evoexp: Evoexp, stored: Path) -> None:
+    said = evoexp("run", *PLANAR, "num_replicates=1", "report=paper", *DRAFT)
+    assert said.out.count("2 of 2") == 3
+    assert "of 1 asked for: all that are stored, here and in the report" in said.out
+    (page,) = (stored / "reports").glob("*/index.md")
+    assert "| `num_replicates` | 2 |" in page.read_text()
+    said = evoexp("run", *PLANAR, "--no-report")
+    assert "asked for: all" not in said.out
+
+
+def test_a_run_ends_with_its_report(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code("run", *PLANAR, "num_replicates=1", "report=paper", *DRAFT) == 0
+    (line,) = [each for each in capsys.readouterr().out.splitlines() if "report: " in each]
+    page = Path(line.removeprefix("report: "))
+    assert page == outputs / "reports" / compose.expand(PLANAR)[0].report_name / "index.html"
+    assert "ga.population_size=8" in page.with_suffix(".md").read_text()
+    assert len({path.read_bytes() for path in page.parent.glob("*.png")}) > 3, "figures are drawn"
+
+
+def test_a_report_is_drawn_again_where_something_changed(evoexp: Evoexp, outputs: Path) -> None:
+    words = ("run", *PLANAR, "num_replicates=1", *DRAFT, "--only", "via-point GA")
+    assert "(as it was)" not in evoexp(*words).out
+    (page,) = outputs.glob("reports/*/index.md")
+    content, drawn = page.read_bytes(), page.stat().st_mtime_ns
+    assert "index.html (as it was)\n" in evoexp(*words).out
+    assert page.stat().st_mtime_ns == drawn
+    assert evoexp("report", "--check", *words[1:]).code == 0
+    (log,) = outputs.glob("runs/*/replicates/0000.mcap")
+    for change in (
+        lambda: page.write_bytes(b"altered"),
+        lambda: page.with_suffix(".html").unlink(),
+        lambda: os.utime(log, ns=(1, 1)),
+    ):
+        change()
+        assert "(as it was)" not in evoexp(*words).out
+        assert page.read_bytes() == content
+    assert "(as it was)" in evoexp(*words).out
+    assert "(as it was)" not in evoexp(*words, "report.confidence=0.9").out
+
+
+def test_several_experiments_share_a_batch_and_a_condition_runs_once(
+    evoexp: Evoexp, outputs: Path
+) -> None:
+    experiments = ("-m", "experiment=rana_planar,rana_three_arms", "control=null")
+    said = evoexp("run", *experiments, *SERIAL, "num_replicates=1", "--no-report")
+    assert said.code == 0
+    assert "replicates: 2 of 2 done" in said.out, "all labels of rana_planar are one condition"
+    assert len(find_runs(outputs)) == 2
+    assert all(f"{name}@smoke+" in said.out for name in ("rana_planar", "rana_three_arms"))
+
+
+def test_the_manifest_holds_a_command_that_runs_it_again(evoexp: Evoexp, outputs: Path) -> None:
+    label = "random search · seed=1"
+    swept = ("num_replicates=1", "-m", "seed=0,1", "--only", label, "--no-report")
+    assert evoexp("run", *PLANAR, *swept).code == 0
+    (run,) = find_runs(outputs)
+    manifest = run.manifest()
+    assert (manifest["experiment"], manifest["label"]) == ("rana_planar", label)
+    words = shlex.split(manifest["command"])
+    assert words[:2] == ["evoexp", "run"]
+    assert "nothing to run" in evoexp(*words[1:], "--no-report").out
+    assert len(find_runs(outputs)) == 1
+
+
+def test_reproduce_matches(evoexp: Evoexp, stored: Path) -> None:
+    for run in find_runs(stored):
+        said = evoexp("reproduce", run.hash12[:8])
+        assert (said.code, said.err) == (0, "")
+        assert said.out.count("MATCH") == 3 and said.out.endswith("2 of 2 MATCH\n")
+        for words in ((run.hash12, "--replicate", "1"), (str(run.log_path(0)),)):
+            one = evoexp("reproduce", *words)
+            assert (one.code, one.out.splitlines()[-1]) == (0, "1 of 1 MATCH")
+
+
+def test_counts_of_a_stored_experiment(evoexp: Evoexp, stored: Path) -> None:
+    first, second, *_ = find_runs(stored)
+    first.log_path(1).write_bytes(b"cut")
+    second.log_path(0).unlink()
+    second.write_failure(0, "MemoryError", "Traceback")
+    before = content(stored)
+    said = evoexp("plan", *PLANAR, "--json")
+    assert said.code == 0
+    rows = {row["hash"]: row for row in json.loads(said.out)}
+    cut, failed = rows[first.condition_id], rows[second.condition_id]
+    assert (cut["planned"], cut["cached"], cut["missing"], cut["damaged"]) == (2, 1, 1, 1)
+    assert (failed["cached"], failed["missing"], failed["failed"]) == (1, 0, 1)
+    said = evoexp("plan", *PLANAR).out
+    assert "1 replicate to run; " in said and "; 1 failed before, which start with --retry" in said
+    assert cut["cpu_s_each"] > 0.0 and cut["cpu_s_from"] == "1 of its own"
+    changed = {path for path, data in content(stored).items() if before.get(path) != data}
+    assert {path.suffix for path in changed} <= {".parquet"}
+
+
+def test_times_come_from_other_runs_of_the_scene(evoexp: Evoexp, stored: Path) -> None:
+    longer = [word.replace("num_generations=2", "num_generations=8") for word in PLANAR]
+    said = evoexp("plan", *longer, "--json")
+    rows = json.loads(said.out)
+    assert all("1 other runs of the scene" in row["cpu_s_from"] for row in rows)
+    assert all(row["cpu_s_least"] < row["cpu_s_each"] < row["cpu_s_most"] for row in rows)
+    assert " to " in evoexp("plan", *longer).out
+    known = json.loads(evoexp("plan", *PLANAR, "--json").out)
+    for row, own in zip(rows, known, strict=True):
+        assert row["cached"] == 0 and row["cpu_s_each"] > own["cpu_s_each"] > 0.0
+
+
+def test_every_stored_run_is_read_once_for_any_number_of_conditions(
+    evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+    table = plan.summary_table
+    monkeypatch.setattr(plan, "summary_table", lambda r: (read.append(r.hash12), table(r))[1])
+    assert len(json.loads(evoexp("plan", "-m", *PLANAR, "seed=range(1,9)", "--json").out)) == 24
+    assert sorted(read) == sorted(run.hash12 for run in find_runs(stored))
+
+
+@pytest.mark.parametrize(
+    ("stored", "wanted", "least", "most"),  # stored: number of evaluations → seconds
+    [
+        ({100: 1.0}, 100, 1.0, 1.0),
+        ({100: 1.0}, 1000, 1.0, 10.0),  # a part of the time is the same for any number
+        ({100: 1.0}, 10, 0.1, 1.0),
+        ({100: 1.0, 1000: 5.0}, 1000, 5.0, 5.0),  # the nearest number of evaluations
+        ({100: 1.0, 1000: 5.0}, 2000, 5.0, 10.0),
+    ],
+)
+def test_a_guess_is_a_range(
+    stored: dict[int, float], wanted: int, least: float, most: float
+) -> None:
+    times = [Times([seconds], [count], False) for count, seconds in stored.items()]
+    found = bounds(times, wanted)
+    assert found == pytest.approx((least / OTHER_SETTINGS, most * OTHER_SETTINGS))
+    early = [each._replace(stopped_early=True) for each in times]
+    assert bounds(early, wanted)[0] <= found[0] and bounds(early, wanted)[1] == found[1]
+
+
+def test_nothing_is_known_where_nothing_is_stored(evoexp: Evoexp, outputs: Path) -> None:
+    said = evoexp("plan", *PLANAR)
+    assert said.code == 0 and not outputs.exists()
+    assert "6 replicates to run; of unknown length; at most " in said.out
+
+
+def test_runs_of_other_revisions_are_named(evoexp: Evoexp, run: RunDirectory, stored: Path) -> None:
+    text = (run.path / "config.json").read_bytes().replace(b'"revision":1', b'"revision":0')
+    name = sha256(text).hexdigest()[:12]
+    (stored / "runs" / name).mkdir()
+    (stored / "runs" / name / "config.json").write_bytes(text)
+    rows = {row["hash"]: row for row in json.loads(evoexp("plan", *PLANAR, "--json").out)}
+    assert rows[run.condition_id]["other_revision"] == [name]
+    assert sum(len(row["other_revision"]) for row in rows.values()) == 1
+    found = json.loads(evoexp("clean", "old_revision", "--json").out)
+    assert [Path(each["path"]).name for each in found] == [name]

@@ -10,6 +10,7 @@ raises the exception again when it was lost, or when closing takes longer than `
 No result is lost: finished files are complete at any moment.
 """
 
+import atexit
 import os
 import signal
 import sys
@@ -68,6 +69,8 @@ class Interruption:
                 if signal.getsignal(number) == self._hear:
                     signal.signal(number, signal.SIG_IGN)
             signal.setitimer(signal.ITIMER_REAL, ENDING_S)
+            # all threads have ended then, and soon no handler of Python's hears the timer any more
+            atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
         if self.number is None and not self._has_ended:

@@ -1,7 +1,4 @@
-"""A headless Chromium, driven over the pipe of its DevTools protocol.
-
-No driver, no further packages.
-"""
+"""A headless Chromium, driven over the pipe of its DevTools protocol, without any driver."""
 
 import base64
 import json
@@ -13,25 +10,13 @@ import time
 from pathlib import Path
 from typing import Any
 
-CHROMIUM = next(
-    (
-        path
-        for name in ("chromium", "chromium-browser", "google-chrome")
-        if (path := shutil.which(name))
-    ),
-    None,
-)
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
 FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-    "--window-size=1000,700",
+    *("--headless=new", "--no-sandbox", "--no-first-run", "--window-size=1000,700"),
+    *("--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    "--remote-debugging-pipe",
 )
 PATIENCE = 120.0  # [s] for any one answer, on a busy machine
 SPEED = "GPU stall due to ReadPixels"  # a driver's word on how fast pictures are read back
@@ -43,16 +28,9 @@ class Browser:
     def __init__(self, profile: Path) -> None:
         """Start it with an empty profile."""
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
-        command = (
-            f'exec "$@" 3<&{read_there} 4>&{write_there}'  # the protocol's pipes have these numbers
-        )
-        words = [
-            str(CHROMIUM),
-            *FLAGS,
-            "--remote-debugging-pipe",
-            f"--user-data-dir={profile}",
-            "about:blank",
-        ]
+        # the protocol's pipes have these numbers
+        command = f'exec "$@" 3<&{read_there} 4>&{write_there}'
+        words = [str(CHROMIUM), *FLAGS, f"--user-data-dir={profile}", "about:blank"]
         self._process = subprocess.Popen(
             ["bash", "-c", command, "bash", *words],
             pass_fds=(read_there, write_there),
@@ -66,9 +44,8 @@ class Browser:
         self.requests: list[str] = []
         self.complaints: list[str] = []
         target = self._call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)[
-            "sessionId"
-        ]
+        attached = self._call("Target.attachToTarget", targetId=target, flatten=True)
+        self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Network", "Log"):
             self._call(f"{domain}.enable")
 
@@ -93,9 +70,8 @@ class Browser:
 
     def run(self, script: str) -> Any:
         """Return the value of an expression in the page."""
-        answer = self._call(
-            "Runtime.evaluate", expression=script, returnByValue=True, userGesture=True
-        )
+        how = {"returnByValue": True, "userGesture": True}
+        answer = self._call("Runtime.evaluate", expression=script, **how)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 

@@ -1,8 +1,11 @@
-"""Single conditions of shipped experiments: composing all 25 of an experiment takes seconds."""
+"""Single conditions of shipped experiments, and scripts of the checkout, as tests load them."""
 
 import functools
 import tempfile
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -14,11 +17,9 @@ from evoexp.configuration.search_path import find
 
 @functools.cache
 def alone(*words: str, label: str | int = "") -> Experiment:
-    """Return an experiment of which one condition is left, composed once in a process.
+    """Return an experiment of which one condition is left, by its label or number; else the first.
 
-    Args:
-        words: As on the command line, `experiment=NAME` the first of them, if any.
-        label: Of the condition, or its number; the first if empty.
+    Words are as on the command line, `experiment=NAME` the first of them, if any.
     """
     group, _, name = words[0].partition("=")
     if group != "experiment":
@@ -36,3 +37,13 @@ def alone(*words: str, label: str | int = "") -> Experiment:
 def composed(*words: str, label: str | int = "") -> Condition:
     """Return one condition of an experiment; see `alone`."""
     return alone(*words, label=label).conditions[0].condition
+
+
+def script(name: str) -> Any:
+    """Return a script of the checkout as a module."""
+    loader = SourceFileLoader(name, str(Path(__file__).parents[1] / "scripts" / name))
+    spec = spec_from_loader(name, loader)
+    assert spec is not None
+    module = module_from_spec(spec)
+    loader.exec_module(module)
+    return module

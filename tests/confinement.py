@@ -24,16 +24,13 @@ Result = TypeVar("Result")
 
 SECONDS = 20.0  # [CPU s] a hostile example takes far less
 MEGABYTE = 2**20
-_STARTS = ("os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.startfile", "subprocess.Popen")
-_FORBIDDEN = (*_STARTS, "socket.connect", "pty.spawn")
+_FORBIDDEN = (
+    *("os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.startfile", "subprocess.Popen"),
+    *("socket.connect", "pty.spawn"),
+)
 _CHANGES = (
-    "os.remove",
-    "os.rename",
-    "os.rmdir",
-    "os.mkdir",
-    "os.symlink",
-    "os.link",
-    "os.truncate",
+    *("os.remove", "os.rename", "os.rmdir", "os.mkdir"),
+    *("os.symlink", "os.link", "os.truncate"),
 )
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
@@ -59,15 +56,9 @@ def no_longer(seconds: float = SECONDS) -> Iterator[None]:
 
 
 def confined(task: Callable[[], Result], folder: Path, memory_mb: int) -> Result:
-    """Return the result of a task that ran in a child process.
+    """Return the result of a task that ran in a child process, with so much more memory [MiB].
 
-    Args:
-        task: Gives a result that can be pickled.
-        folder: The only place where the task may write; it is the current one.
-        memory_mb: [MiB] of address space that the task may take.
-
-    Raises:
-        AssertionError: If the task failed, was killed, or did what data must not bring about.
+    It fails if it does what data must not bring about, or writes anywhere but in the folder.
     """
     sys.stdout.flush()
     reader, writer = os.pipe()
@@ -85,13 +76,12 @@ def confined(task: Callable[[], Result], folder: Path, memory_mb: int) -> Result
     outcome, deeds = pickle.loads(content)
     assert not deeds, deeds[:5]
     if isinstance(outcome, _Failure):
-        raise AssertionError(outcome.trace)
+        raise AssertionError(outcome)
     return outcome  # type: ignore[no-any-return]
 
 
-class _Failure:
-    def __init__(self, trace: str) -> None:
-        self.trace = trace
+class _Failure(str):
+    """The trace of an exception."""
 
 
 def _attempt(task: Callable[[], Any], folder: Path, memory_mb: int) -> tuple[Any, list[str]]:
@@ -110,29 +100,19 @@ def _attempt(task: Callable[[], Any], folder: Path, memory_mb: int) -> tuple[Any
 
 def _watcher(folder: Path, deeds: list[str]) -> Callable[[str, tuple[Any, ...]], None]:
     """Return an audit hook that notes deeds which data must not bring about."""
-    cache = str(cache_root().resolve())
-    allowed = (
-        str(folder.resolve()),
-        cache,
-        tempfile.gettempdir() + "/tmp",
-        "/dev/null",
-    )  # `tempfile`'s
+    temporary = tempfile.gettempdir() + "/tmp"  # `tempfile`'s
+    allowed = (str(folder.resolve()), str(cache_root().resolve()), temporary, "/dev/null")
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
-        if event in _FORBIDDEN:
+        is_change = event in _CHANGES or (event == "open" and _writes(*arguments[1:]))
+        place = "/dev/null"
+        if is_change and not isinstance(arguments[0], int):
+            place = os.path.abspath(os.fsdecode(arguments[0]))
+        if event in _FORBIDDEN or not place.startswith(allowed):
             deeds.append(f"{event}{arguments!r:.200}")
-        elif event in _CHANGES or (event == "open" and _writes(arguments)):
-            place = (
-                os.path.abspath(os.fsdecode(arguments[0]))
-                if not isinstance(arguments[0], int)
-                else "/dev/null"
-            )
-            if not place.startswith(allowed):
-                deeds.append(f"{event}{arguments!r:.200}")
 
     return watch
 
 
-def _writes(arguments: tuple[Any, ...]) -> bool:
-    _, mode, flags = arguments
+def _writes(mode: str | None, flags: int) -> bool:
     return bool(flags & _WRITES) if mode is None else any(letter in mode for letter in "wax+")

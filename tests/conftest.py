@@ -1,7 +1,4 @@
-"""Settings of every test, and which tests run.
-
-Property tests draw the same examples each time, and no time is an assertion.
-"""
+"""Which tests run; property tests draw the same examples each time, and no time is asserted."""
 
 import functools
 import gc
@@ -17,10 +14,9 @@ from hypothesis import settings
 
 from matrix import EXHAUSTIVE, MATRICES, matrices_are_asked_for
 
-settings.register_profile("evoexp", deadline=None, derandomize=True, database=None)
-settings.register_profile(
-    "exhaustive", deadline=None, derandomize=True, database=None, max_examples=2000
-)
+SAME = {"deadline": None, "derandomize": True, "database": None}
+settings.register_profile("evoexp", **SAME)
+settings.register_profile("exhaustive", **SAME, max_examples=2000)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -44,10 +40,8 @@ def pytest_pycollect_makeitem(collector: pytest.Collector, name: str, obj: Any) 
     """Leave out tests marked `matrix` or `exhaustive` unless asked for; see `matrix.examples`."""
     marked = {mark.name for mark in getattr(obj, "pytestmark", ()) if name.startswith("test")}
     marked.update(mark.name for mark in collector.iter_markers())
-    is_left_out = ("matrix" in marked and not matrices_are_asked_for()) or (
-        "exhaustive" in marked and EXHAUSTIVE not in os.environ
-    )
-    return [] if is_left_out else None
+    asked = {"matrix": matrices_are_asked_for(), "exhaustive": EXHAUSTIVE in os.environ}
+    return [] if any(name in marked and not is_asked for name, is_asked in asked.items()) else None
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -58,8 +52,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
     left_out = set[pytest.Item]()
     for every in cases.values():
-        marker = every[0].get_closest_marker("examples")
-        count = marker.args[0] if marker else len(every)
+        (count,) = next(every[0].iter_markers("examples")).args
         left_out.update(set(every) - {every[k * len(every) // count] for k in range(count)})
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))

@@ -24,25 +24,14 @@ Row = dict[str, Any]
 def with_message(
     content: bytes, topic: str, change: Callable[[Row], Row | None], which: int = -1
 ) -> bytes:
-    """Return a log with another message.
-
-    Args:
-        content: The log.
-        topic: Of the message.
-        change: Returns the message's new fields; None: the message is left out.
-        which: Number of the message on its topic.
-    """
+    """Return a log with another message, the `which`-th of its topic; None leaves it out."""
     parts = take_apart(content)
     chunks = [(part, records(part.body)) for part in parts if part.opcode == Opcode.CHUNK]
-    channels = [parsed(Channel, body) for _, inner in chunks for op, body in inner if op == 4]
+    every = [(inner, k) for _, inner in chunks for k in range(len(inner))]
+    channels = [parsed(Channel, i[k][1]) for i, k in every if i[k][0] == Opcode.CHANNEL]
     number = next(each.id for each in channels if each.topic == topic)
-    places = [
-        (inner, k)
-        for _, inner in chunks
-        for k, (op, body) in enumerate(inner)
-        if op == Opcode.MESSAGE and MESSAGE.unpack_from(body)[0] == number
-    ]
-    inner, k = places[which]
+    messages = [(inner, k) for inner, k in every if inner[k][0] == Opcode.MESSAGE]
+    inner, k = [(i, k) for i, k in messages if MESSAGE.unpack_from(i[k][1])[0] == number][which]
     body = inner[k][1]
     row = change(orjson.loads(body[MESSAGE.size :]))
     changed = [] if row is None else [(Opcode.MESSAGE, body[: MESSAGE.size] + orjson.dumps(row))]
@@ -55,17 +44,11 @@ def with_message(
 def with_attachment(
     content: bytes, name: str, data: bytes | None, *, beside: bool = False
 ) -> bytes:
-    """Return a log with another attachment of a name; None: without it.
-
-    Args:
-        content: The log.
-        name: Of the attachment, which may be a new one.
-        data: Its content.
-        beside: Whether one that is there stays, behind the other one.
-    """
+    """Return a log with another attachment of a name, before the old one or in its place."""
     parts = take_apart(content)
     one = [] if data is None else [Part(Opcode.ATTACHMENT, written(attachment(name, data)))]
-    there = [p for p in parts if p.opcode == Opcode.ATTACHMENT and _name(p) == name]
+    every = [part for part in parts if part.opcode == Opcode.ATTACHMENT]
+    there = [part for part in every if parsed(Attachment, part.body).name == name]
     at = parts.index(there[0]) if there else 0
     rest = [part for part in parts if part not in there or beside]
     return put_together([*rest[:at], *one, *rest[at:]])
@@ -81,18 +64,9 @@ def with_metadata(content: bytes, name: str, **values: Any) -> bytes:
     """Return a log with other values in one of its metadata records."""
     parts = take_apart(content)
     for part in parts:
-        if part.opcode == Opcode.METADATA and _metadata(part).name == name:
-            metadata = _metadata(part)
-            metadata.metadata |= {
-                key: orjson.dumps(value).decode() for key, value in values.items()
-            }
-            part.body = written(metadata)
+        if part.opcode == Opcode.METADATA:
+            metadata = parsed(Metadata, part.body)
+            if metadata.name == name:
+                metadata.metadata |= {k: orjson.dumps(v).decode() for k, v in values.items()}
+                part.body = written(metadata)
     return put_together(parts)
-
-
-def _name(part: Part) -> str:
-    return str(parsed(Attachment, part.body).name)
-
-
-def _metadata(part: Part) -> Any:
-    return parsed(Metadata, part.body)

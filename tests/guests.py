@@ -13,19 +13,11 @@ from evoexp import registry
 def write_distribution(
     directory: Path, name: str, version: str = "1.0", **groups: Mapping[str, str]
 ) -> None:
-    """Write the metadata of a distribution.
-
-    Args:
-        directory: To be put on the path.
-        name: As its author spells it.
-        version: Of the distribution.
-        groups: `components`, `pages` or `conf`: name → target.
-    """
+    """Write the metadata of a distribution; groups of `evoexp.…` are name → target."""
     information = directory / f"{name.replace('-', '_')}-{version}.dist-info"
     information.mkdir(parents=True)
-    (information / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
-    )
+    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"
+    (information / "METADATA").write_text(metadata)
     lines = []
     for group, points in groups.items():
         lines += [f"[evoexp.{group}]", *(f"{key} = {target}" for key, target in points.items())]

@@ -3,20 +3,15 @@
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 VOID = {"meta", "link", "img", "input", "br", "hr"}
 ADDRESSES = {"href", "src", "srcset", "action", "poster", "data"}
 
 
-class Element:
-    """An element: its tag, its attributes, and the text in it."""
-
-    def __init__(
-        self, tag: str, attributes: dict[str, str | None], inside: tuple[str, ...]
-    ) -> None:
-        """Begin it, inside of others, of which the tags are given."""
-        self.tag, self.attributes, self.inside, self.text = tag, attributes, inside, ""
+class Element(SimpleNamespace):
+    """An element: its tag, its attributes, the tags that it is inside of, and the text in it."""
 
 
 class Page(HTMLParser):
@@ -34,7 +29,8 @@ class Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Open an element."""
         assert len(dict(attrs)) == len(attrs), (tag, attrs)
-        element = Element(tag, dict(attrs), tuple(each.tag for each in self._open))
+        inside = tuple(each.tag for each in self._open)
+        element = Element(tag=tag, attributes=dict(attrs), inside=inside, text="")
         self.elements.append(element)
         if tag not in VOID:
             self._open.append(element)
@@ -51,21 +47,16 @@ class Page(HTMLParser):
 
     def all(self, tag: str, **attributes: str) -> list[Element]:
         """Return the elements of a tag that have some attributes."""
-        wanted = {name.rstrip("_"): value for name, value in attributes.items()}
-        return [
-            each
-            for each in self.elements
-            if each.tag == tag and wanted.items() <= each.attributes.items()
-        ]
+        items = {name.rstrip("_"): value for name, value in attributes.items()}.items()
+        return [e for e in self.elements if e.tag == tag and items <= e.attributes.items()]
 
     def tables(self, kind: str = "sortable") -> list[list[list[str]]]:
         """Return the tables of a class as rows of cells."""
         found: list[list[list[str]]] = []
         shown = False
         for each in self.elements:
-            if each.tag == "table":
-                shown = each.attributes.get("class") == kind
-                found += [[]] if shown else []
+            if each.tag == "table" and (shown := each.attributes.get("class") == kind):
+                found.append([])
             elif each.tag == "tr" and shown:
                 found[-1].append([])
             elif each.tag in ("td", "th") and shown:
@@ -74,18 +65,11 @@ class Page(HTMLParser):
 
     def addresses(self) -> list[str]:
         """Return every address that the page refers to."""
-        return [
-            str(value)
-            for each in self.elements
-            for name, value in each.attributes.items()
-            if name in ADDRESSES
-        ]
+        every = [pair for each in self.elements for pair in each.attributes.items()]
+        return [str(value) for name, value in every if name in ADDRESSES]
 
     def check(self, folder: Path) -> None:
-        """Assert that every address is a file of the folder or a place of the page; nothing runs.
-
-        No element has a script of its own.
-        """
+        """Assert that addresses are files of the folder or places of the page; nothing runs."""
         ids = [e.attributes["id"] for e in self.elements if "id" in e.attributes]
         assert len(ids) == len(set(ids)), ids
         for address in self.addresses():

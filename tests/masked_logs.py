@@ -9,18 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
-from mcap.records import (
-    AttachmentIndex,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    McapRecord,
-    Message,
-    MessageIndex,
-    Metadata,
-    MetadataIndex,
-)
+from mcap import records as mcap
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from evoexp.store.log import SUMMARY
@@ -65,32 +54,27 @@ def masked_store(outputs: Path) -> dict[str, Any]:
 
 def differing(one: dict[str, Any], two: dict[str, Any]) -> list[str]:
     """Return the names under which two stores do not hold the same."""
-    return sorted(
-        name for name in one.keys() | two.keys() if one.get(name, ...) != two.get(name, ...)
-    )
+    names = sorted(one.keys() | two.keys())
+    return [name for name in names if one.get(name, ...) != two.get(name, ...)]
 
 
-def _masked(record: McapRecord) -> Any:
+def _masked(record: mcap.McapRecord) -> Any:
     """Return a record without times, places and checksums."""
     match record:
-        case Metadata(name=name) if name == SUMMARY:
+        case mcap.Metadata(name=name) if name == SUMMARY:
             assert record.metadata.keys() >= set(TIMES)
             record.metadata |= dict.fromkeys(TIMES, "0")
-        case Chunk():
-            return [_untimed(each) for each in breakup_chunk(record)]
-        case MetadataIndex():
+        case mcap.Chunk():
+            return list(map(_masked, breakup_chunk(record)))
+        case mcap.Message():
+            record.publish_time = 0
+        case mcap.MetadataIndex():
             return record.name
-        case AttachmentIndex():
+        case mcap.AttachmentIndex():
             record.offset = 0
-        case ChunkIndex():
+        case mcap.ChunkIndex():
             span = record.message_start_time, record.message_end_time
             return span, sorted(record.message_index_offsets), record.uncompressed_size
-        case DataEnd() | Footer() | MessageIndex():
+        case mcap.DataEnd() | mcap.Footer() | mcap.MessageIndex():
             return type(record).__name__
-    return record
-
-
-def _untimed(record: McapRecord) -> McapRecord:
-    if isinstance(record, Message):
-        record.publish_time = 0
     return record

@@ -16,12 +16,7 @@ def matrices_are_asked_for() -> bool:
 
 
 def examples(values: Iterable[Any], always: Callable[[Any], bool]) -> list[Any]:
-    """Return values as parameters; the others are marked `matrix`, or left out.
-
-    Args:
-        values: As `parametrize` takes them.
-        always: Tells the values that run without --all.
-    """
+    """Return values as parameters; those that are not `always` run are marked, or left out."""
     found = []
     for value in values:
         given, is_example = value if isinstance(value, tuple) else (value,), always(value)

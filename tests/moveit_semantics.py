@@ -1,9 +1,8 @@
 """A slow, plain reader of planning scenes, after MoveIt's own code and by Pinocchio alone.
 
-It is there to judge evoexp's reader and shares nothing with it. Followed are, in moveit_core:
-`Transforms::setTransform`, `PlanningScene::getFrameTransform` and
-`PlanningScene::processCollisionObjectAdd`. Only an empty `frame_id` is taken further than there,
-for the planning frame.
+It shares nothing with evoexp's reader. Followed are, in moveit_core: `Transforms::setTransform`,
+`PlanningScene::getFrameTransform` and `PlanningScene::processCollisionObjectAdd`. Only an empty
+`frame_id` is taken further than there, for the planning frame.
 """
 
 from typing import Any, NamedTuple
@@ -42,13 +41,7 @@ class MoveitScene:
     """A planning scene of a robot, as MoveIt holds it."""
 
     def __init__(self, urdf: str, model_frame: str, root: Any) -> None:
-        """Take a robot.
-
-        Args:
-            urdf: Its text.
-            model_frame: The planning frame.
-            root: `pin.SE3` of the robot's root in the planning frame.
-        """
+        """Take a robot whose root has a pose in the planning frame."""
         model = pin.buildModelFromXML(urdf)
         data = model.createData()
         pin.framesForwardKinematics(model, data, pin.neutral(model))
@@ -81,22 +74,20 @@ class MoveitScene:
 
     def object(self, item: dict[str, Any]) -> list[PlacedShape]:
         """Return the shapes of an object."""
-        origin = self.frame(item.get("header", {}).get("frame_id", "")) * transform(
-            item.get("pose")
-        )
-        found = []
-        for shape, pose in zip(
-            item.get("primitives", []), item.get("primitive_poses", []), strict=True
-        ):
+        frame = self.frame(item.get("header", {}).get("frame_id", ""))
+        origin, found, none = frame * transform(item.get("pose")), [], np.empty(0)
+
+        def placed(kind: str, poses: str) -> Any:
+            return zip(item.get(kind, []), item.get(poses, []), strict=True)
+
+        for shape, pose in placed("primitives", "primitive_poses"):
             kind = {1: "box", 2: "sphere", 3: "cylinder", 4: "cone"}.get(shape["type"])
-            kind = kind or str(shape["type"]).lower()
-            placed = origin * transform(pose)
-            found.append(PlacedShape(item["id"], kind, shape["dimensions"], np.empty(0), placed))
-        for shape, pose in zip(item.get("planes", []), item.get("plane_poses", []), strict=True):
-            placed = origin * transform(pose)
-            found.append(PlacedShape(item["id"], "plane", shape["coef"], np.empty(0), placed))
-        for shape, pose in zip(item.get("meshes", []), item.get("mesh_poses", []), strict=True):
-            corners = np.array([numbers(corner, "xyz") for corner in shape["vertices"]])
-            placed = origin * transform(pose)
-            found.append(PlacedShape(item["id"], "mesh", [], corners, placed))
+            kind, at = kind or str(shape["type"]).lower(), origin * transform(pose)
+            found.append(PlacedShape(item["id"], kind, shape["dimensions"], none, at))
+        for shape, pose in placed("planes", "plane_poses"):
+            at = origin * transform(pose)
+            found.append(PlacedShape(item["id"], "plane", shape["coef"], none, at))
+        for shape, pose in placed("meshes", "mesh_poses"):
+            corners, at = [numbers(c, "xyz") for c in shape["vertices"]], origin * transform(pose)
+            found.append(PlacedShape(item["id"], "mesh", [], np.array(corners), at))
         return found

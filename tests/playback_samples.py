@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from composed import composed
 from evoexp.condition import Condition
@@ -53,33 +54,27 @@ def refuted() -> Recording:
     own = condition("two arms")
     _, problem = own.prepare()
     share = np.abs(np.sin(np.linspace(0.0, 2.0 * np.pi, 21)))[:, None]
-    parts = [
-        problem.start[a:b] + share * (problem.goal - problem.start)[a:b]
-        for a, b in problem.arm_slices
-    ]
-    return record(own, np.concatenate([part.ravel() for part in parts]), Heading("refuted"))
+    way = problem.start + share * (problem.goal - problem.start)
+    parts = [way[:, a:b].ravel() for a, b in problem.arm_slices]
+    return record(own, np.concatenate(parts), Heading("refuted"))
 
 
 def matrix(row: np.ndarray) -> np.ndarray:
     """Return a position and a quaternion as a matrix, without Pinocchio."""
-    x, y, z, w = row[3:] / np.sqrt((row[3:] ** 2).sum())
     m = np.eye(4)
-    m[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
+    m[:3, :3] = Rotation.from_quat(row[3:]).as_matrix()
     m[:3, 3] = row[:3]
     return m
 
 
 def half_extent(drawn: Outline) -> np.ndarray:
     """Return half the edges of the box around a shape, in its own frame."""
-    kind, size = drawn.kind, drawn.size
-    if kind == "box":
-        return 0.5 * np.array(size)
-    if kind == "sphere":
-        return np.full(3, size[0])
-    if kind == "ellipsoid":
-        return np.array(size)
-    return np.array([size[0], size[0], 0.5 * size[1] + (size[0] if kind == "capsule" else 0.0)])
+    kind, (a, *others) = drawn.kind, drawn.size
+    half_height = 0.5 * others[0] if others else 0.0
+    extents = {
+        "box": 0.5 * np.array(drawn.size),
+        "sphere": np.full(3, a),
+        "ellipsoid": np.array(drawn.size),
+        "capsule": np.array([a, a, half_height + a]),
+    }
+    return extents.get(kind, np.array([a, a, half_height]))

@@ -23,13 +23,8 @@ from evoexp.store.run_directory import RunDirectory
 
 SMALL = ("budget=smoke", "ga.population_size=12", "ga.num_generations=4", "num_replicates=2")
 REPORT = {
-    "formats": ("svg", "png"),
-    "dpi": 60,
-    "confidence": 0.95,
-    "significance": 0.05,
-    "num_resamples": 200,
-    "samples_per_segment": 10,
-    "threshold_ratio": 1.25,
+    **{"formats": ("svg", "png"), "dpi": 60, "confidence": 0.95, "significance": 0.05},
+    **{"num_resamples": 200, "samples_per_segment": 10, "threshold_ratio": 1.25},
 }
 
 
@@ -48,19 +43,15 @@ def store(outputs: Path, experiment: Experiment) -> None:
     """Run and store every replicate of an experiment."""
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs, condition.id)
-        run.create(
-            condition.to_json(), manifest(condition.id) | {"label": label}, condition.files()
-        )
+        notes = manifest(condition.id) | {"label": label}
+        run.create(condition.to_json(), notes, condition.files())
         for replicate in range(condition.num_replicates(experiment.num_replicates)):
             run.write_logs({replicate: run_replicate(condition, replicate).content})
 
 
 @functools.cache
 def smoke_experiment(name: str, *overrides: str) -> Experiment:
-    """Return an experiment with two replicates of ten generations.
-
-    Composing it is most of the work.
-    """
+    """Return an experiment with two replicates of ten generations, composed once."""
     return compose.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
 
 
@@ -69,9 +60,12 @@ def smoke_results(outputs: Path, name: str, *overrides: str) -> Results:
     """Return what two replicates of every condition gave."""
     experiment = smoke_experiment(name, *overrides)
     store(outputs, experiment)
-    return gather(
-        outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, ""
-    )
+    return gathered(outputs, experiment)
+
+
+def gathered(outputs: Path, experiment: Experiment) -> Results:
+    count, name, budget = experiment.num_replicates, experiment.name, experiment.budget
+    return gather(outputs, experiment.conditions, count, name, budget, "")
 
 
 def made_up(experiment: Experiment, columns: Callable[[str], dict[str, Any]]) -> Results:
@@ -94,9 +88,8 @@ def smoke_report(outputs: Path, name: str) -> Path:
     smoke_results(outputs, name)
     experiment = smoke_experiment(name)
     request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
-    return build.write_report(
-        build.derived(request, page_settings(name), outputs, experiment.num_replicates)
-    ).parent
+    derived = build.derived(request, page_settings(name), outputs, experiment.num_replicates)
+    return build.write_report(derived).parent
 
 
 def figure_stems(directory: Path) -> set[str]:
@@ -121,15 +114,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def results(stored: Path) -> Results:
     """Return what is stored of the two planar arms and of random search beside them."""
-    experiment = expand("rana_planar")
-    return gather(
-        stored,
-        experiment.conditions,
-        experiment.num_replicates,
-        experiment.name,
-        experiment.budget,
-        "",
-    )
+    return gathered(stored, expand("rana_planar"))
 
 
 @pytest.fixture

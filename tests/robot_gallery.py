@@ -62,79 +62,50 @@ def _named(pattern: str, words: str) -> tuple[str, ...]:
     return tuple(pattern.format(word) for word in words.split())
 
 
-_KINOVA = _numbered("j2s6s200_joint_{}", 6)
-_TIAGO = _numbered("arm_{}_joint", 7)
+def _data(name: str, kind: str) -> str:
+    return f"{name}_description/{kind}/{name}.{kind}"
+
+
+_KINOVA, _Z1 = _numbered("j2s6s200_joint_{}", 6), _numbered("joint{}", 6)
+_TIAGO, _LEFT = _numbered("arm_{}_joint", 7), _numbered("arm_left_{}_joint", 7)
 _TIAGO_URDF = "tiago_description/robots/tiago"
-_LEFT = _numbered("arm_left_{}_joint", 7)
-_TALOS_TOOL = "gripper_left_fingertip_1_link"
-_G1 = _named(
-    "left_{}_joint",
-    "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_roll wrist_pitch wrist_yaw",
-)
-_G1_URDF = "g1_description/urdf/g1_29dof"
-_PR2 = _named(
-    "l_{}_joint",
-    "shoulder_pan shoulder_lift upper_arm_roll elbow_flex forearm_roll wrist_flex wrist_roll",
-)
+_TALOS, _TALOS_TOOL = "talos_data/robots/talos", "gripper_left_fingertip_1_link"
+_SHOULDER = "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_roll wrist_pitch wrist_yaw"
+_G1, _G1_URDF = _named("left_{}_joint", _SHOULDER), "g1_description/urdf/g1_29dof"
+_PAN = "shoulder_pan shoulder_lift upper_arm_roll elbow_flex forearm_roll wrist_flex wrist_roll"
+_PR2 = _named("l_{}_joint", _PAN)
+_SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 _ROMEO = _named("L{}", "ShoulderPitch ShoulderYaw ElbowRoll ElbowYaw WristRoll WristYaw WristPitch")
-ROBOTS = (
-    GalleryRobot("UR3", "ur_description/urdf/ur3_robot.urdf"),
-    GalleryRobot("UR3 with gripper", "ur_description/urdf/ur3_gripper.urdf"),
-    GalleryRobot("UR5", "ur_description/urdf/ur5_robot.urdf"),
-    GalleryRobot("UR5 with gripper", "ur_description/urdf/ur5_gripper.urdf"),
-    GalleryRobot("UR10", "ur_description/urdf/ur10_robot.urdf"),
-    GalleryRobot(
-        "Panda",
-        "panda_description/urdf/panda.urdf",
-        _numbered("panda_joint{}", 7),
-        "panda_hand",
-        thickness=0.12,
-    ),
-    GalleryRobot("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
-    GalleryRobot(
-        "ANYmal with Kinova", "anymal_b_simple_description/robots/anymal-kinova.urdf", _KINOVA
-    ),
-    GalleryRobot("xArm 7", "xarm_description/urdf/xarm7.urdf"),
-    GalleryRobot("Unitree Z1", "z1_description/urdf/z1.urdf", _numbered("joint{}", 6)),
-    GalleryRobot("Unitree B1 with Z1", "b1_description/urdf/b1-z1.urdf", _numbered("joint{}", 6)),
-    GalleryRobot("Unitree G1", f"{_G1_URDF}_rev_1_0.urdf", _G1, thickness=0.04),
-    GalleryRobot("Unitree G1 with hands", f"{_G1_URDF}_with_hand_rev_1_0.urdf", _G1, "", 0.04),
-    GalleryRobot("SO-100", "so_arm_description/urdf/so100.urdf", thickness=0.03),
-    GalleryRobot(
-        "SO-101",
-        "so_arm_description/urdf/so101.urdf",
-        _named("{}", "shoulder_pan shoulder_lift elbow_flex wrist_flex wrist_roll"),
-        thickness=0.03,
-    ),
-    GalleryRobot(
-        "Talos arm", "talos_data/robots/talos_left_arm.urdf", (), _TALOS_TOOL, thickness=0.08
-    ),
-    GalleryRobot(
-        "Talos",
-        "talos_data/robots/talos_reduced.urdf",
-        _LEFT,
-        _TALOS_TOOL,
-        thickness=0.08,
-        srdf="talos_data/srdf/talos.srdf",
-    ),
-    GalleryRobot("Tiago", f"{_TIAGO_URDF}.urdf", _TIAGO),
-    GalleryRobot("Tiago without hand", f"{_TIAGO_URDF}_no_hand.urdf", _TIAGO),
-    GalleryRobot("Tiago with two arms", f"{_TIAGO_URDF}_dual.urdf", _LEFT),
-    GalleryRobot("Tiago Pro", "tiago_pro_description/robots/tiago_pro.urdf", _LEFT),
-    GalleryRobot(
-        "Baxter", "baxter_description/urdf/baxter.urdf", _named("left_{}", "s0 s1 e0 e1 w0 w1 w2")
-    ),
-    GalleryRobot(
-        "PR2", "pr2_description/urdf/pr2.urdf", _PR2, srdf="pr2_description/srdf/pr2.srdf"
-    ),
-    GalleryRobot(
-        "Romeo",
-        "romeo_description/urdf/romeo.urdf",
-        _ROMEO,
-        thickness=0.04,
-        srdf="romeo_description/srdf/romeo.srdf",
-    ),
-    GalleryRobot("Centauro", "centauro_description/urdf/centauro.urdf", _numbered("j_arm1_{}", 6)),
+_BAXTER, _PANDA = _named("left_{}", "s0 s1 e0 e1 w0 w1 w2"), _numbered("panda_joint{}", 7)
+ROBOTS = tuple(
+    GalleryRobot(*row)
+    for row in (
+        ("UR3", "ur_description/urdf/ur3_robot.urdf"),
+        ("UR3 with gripper", "ur_description/urdf/ur3_gripper.urdf"),
+        ("UR5", "ur_description/urdf/ur5_robot.urdf"),
+        ("UR5 with gripper", "ur_description/urdf/ur5_gripper.urdf"),
+        ("UR10", "ur_description/urdf/ur10_robot.urdf"),
+        ("Panda", "panda_description/urdf/panda.urdf", _PANDA, "panda_hand", 0.12),
+        ("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
+        ("ANYmal with Kinova", "anymal_b_simple_description/robots/anymal-kinova.urdf", _KINOVA),
+        ("xArm 7", "xarm_description/urdf/xarm7.urdf"),
+        ("Unitree Z1", "z1_description/urdf/z1.urdf", _Z1),
+        ("Unitree B1 with Z1", "b1_description/urdf/b1-z1.urdf", _Z1),
+        ("Unitree G1", f"{_G1_URDF}_rev_1_0.urdf", _G1, "", 0.04),
+        ("Unitree G1 with hands", f"{_G1_URDF}_with_hand_rev_1_0.urdf", _G1, "", 0.04),
+        ("SO-100", "so_arm_description/urdf/so100.urdf", (), "", 0.03),
+        ("SO-101", "so_arm_description/urdf/so101.urdf", _SO101, "", 0.03),
+        ("Talos arm", f"{_TALOS}_left_arm.urdf", (), _TALOS_TOOL, 0.08),
+        ("Talos", f"{_TALOS}_reduced.urdf", _LEFT, _TALOS_TOOL, 0.08, "talos_data/srdf/talos.srdf"),
+        ("Tiago", f"{_TIAGO_URDF}.urdf", _TIAGO),
+        ("Tiago without hand", f"{_TIAGO_URDF}_no_hand.urdf", _TIAGO),
+        ("Tiago with two arms", f"{_TIAGO_URDF}_dual.urdf", _LEFT),
+        ("Tiago Pro", "tiago_pro_description/robots/tiago_pro.urdf", _LEFT),
+        ("Baxter", "baxter_description/urdf/baxter.urdf", _BAXTER),
+        ("PR2", _data("pr2", "urdf"), _PR2, "", 0.06, _data("pr2", "srdf")),
+        ("Romeo", _data("romeo", "urdf"), _ROMEO, "", 0.04, _data("romeo", "srdf")),
+        ("Centauro", "centauro_description/urdf/centauro.urdf", _numbered("j_arm1_{}", 6)),
+    )
 )
 
 
@@ -157,12 +128,8 @@ class PlannedReach(NamedTuple):
 
 
 def planned_reach(robot: GalleryRobot) -> PlannedReach:
-    """Draw starts and goals until both planners have certified motions, or `DRAWS` are drawn.
-
-    Raises:
-        EvoexpError: If no start and goal are free of collision.
-    """
-    found, refusal = None, None
+    """Draw starts and goals until both planners have certified motions, or `DRAWS` are drawn."""
+    found, refusal = None, EvoexpError()
     for draw in range(DRAWS):
         try:
             reach = find_reach(robot, draw)
@@ -173,21 +140,12 @@ def planned_reach(robot: GalleryRobot) -> PlannedReach:
         if found.postures is not None and found.strings is not None:
             break
     if found is None:
-        assert refusal is not None
         raise refusal
     return found
 
 
 def find_reach(robot: GalleryRobot, draw: int = 0) -> Reach:
-    """Draw a start and a goal that are free of collision.
-
-    Args:
-        robot: The robot.
-        draw: Seed of the draw.
-
-    Raises:
-        EvoexpError: The last refusal, if none of the configurations drawn is free.
-    """
+    """Draw a start and a goal that are free of collision; `draw` is the seed."""
     built = _condition((*robot.words, *POSTURES, NO_OBSTACLE)).robot
     assert isinstance(built, Robot)
     assembly = built.build()
@@ -196,8 +154,8 @@ def find_reach(robot: GalleryRobot, draw: int = 0) -> Reach:
     low, high = model.lowerPositionLimit / units, model.upperPositionLimit / units
     reach = np.minimum(high - low, np.where(assembly.table.slides, np.inf, 360.0))
     middle = np.clip(np.zeros(model.nq), low + 0.1 * reach, high - 0.1 * reach)
-    start = _free(robot, assembly, middle, 0.25 * reach, rng, low, high)
-    goal = _free(robot, assembly, start, STRIDE * reach, rng, low, high, at_least=0.3)
+    start = _free(robot, assembly, middle, 0.25 * reach, rng, (low, high))
+    goal = _free(robot, assembly, start, STRIDE * reach, rng, (low, high), at_least=0.3)
     lists = tuple(f"scenario.{n}=[{_listed(q)}]" for n, q in (("q_start", start), ("q_goal", goal)))
     ball = _ball(assembly, start, goal)
     strings = _condition(
@@ -237,24 +195,22 @@ def _free(
     around: FloatArray,
     spread: FloatArray,
     rng: np.random.Generator,
-    low: FloatArray,
-    high: FloatArray,
+    limits: tuple[FloatArray, FloatArray],
     at_least: float = 0.0,
 ) -> FloatArray:
     """Draw configurations around one until the planner takes one as a start."""
-    refusal: EvoexpError | None = None
+    (low, high), refusal = limits, EvoexpError()
+    inside = 0.02 * (high - low)
     for attempt in range(TRIES):
         drawn = rng.uniform(-1.0, 1.0, len(around)) * spread
         drawn += np.sign(drawn) * at_least * spread
         still = attempt == 0 and at_least == 0.0
-        inside = 0.02 * (high - low)
         q = np.clip(around + (0.0 if still else 1.0) * drawn, low + inside, high - inside)
         try:
             _reaching(robot, assembly, q, q).prepare()
             return np.asarray(q)
         except EvoexpError as error:
             refusal = error
-    assert refusal is not None
     raise refusal
 
 
@@ -268,15 +224,8 @@ def _reaching(
     """Return the task to reach the point where the tool is at a configuration [deg, m]."""
     point = _tool_at(assembly, goal)
     phase = f"{{name: reach, goal: {{kind: point, point: {_listed(point)}}}}}"
-    return _condition(
-        (
-            *robot.words,
-            *POSTURES,
-            obstacles,
-            f"scenario.q_start={_listed(start)}",
-            f"scenario.phases=[{phase}]",
-        )
-    )
+    task = (f"scenario.q_start={_listed(start)}", f"scenario.phases=[{phase}]")
+    return _condition((*robot.words, *POSTURES, obstacles, *task))
 
 
 def _condition(words: Sequence[str]) -> Condition:

@@ -1,8 +1,4 @@
-"""Every condition of every shipped experiment, composed once: composing is what takes long.
-
-Nothing is composed while tests are collected: they are parametrised over rows of the shipped table,
-or over `KINDS`, and ask for conditions when they run.
-"""
+"""Every condition of every shipped experiment, composed once, and when a test asks for it."""
 
 import functools
 import os
@@ -49,16 +45,12 @@ def of_kind(kind: Kind, budget: str) -> Condition:
 
 @functools.cache
 def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
-    """Return (experiment, label) → condition.
-
-    Test processes begin at both ends of the list: each finds on disk what another has composed.
-    """
+    """Return (experiment, label) → condition."""
     names = options("experiment")
+    # test processes begin at both ends: each finds on disk what another has composed
     from_behind = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
     found = {name: expanded(name, budget) for name in (reversed(names) if from_behind else names)}
-    return {
-        (name, label): condition for name in names for label, condition in found[name].conditions
-    }
+    return {(name, label): c for name in names for label, c in found[name].conditions}
 
 
 @functools.cache
@@ -79,12 +71,7 @@ def different_conditions(budget: str) -> dict[str, Condition]:
 
 @functools.cache
 def kinds_of_conditions(budget: str) -> list[Condition]:
-    """Return `different_conditions`, of those that differ in numbers and files only the last.
-
-    Sweeps are long and alike, and so are problems of a data set.
-    """
+    """Return `different_conditions`, of those that differ in numbers and files only the last."""
     numbers = re.compile(r'"[0-9a-f]{64}"|-?\d+(\.\d+)?([eE][-+]?\d+)?')
-    found = {
-        numbers.sub("0", c.to_json().decode()): c for c in different_conditions(budget).values()
-    }
-    return list(found.values())
+    every = different_conditions(budget).values()
+    return list({numbers.sub("0", c.to_json().decode()): c for c in every}.values())

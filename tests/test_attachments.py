@@ -1,7 +1,4 @@
-"""Files of a condition: identity by content, attached to logs.
-
-Found again from a log or a stored run alone.
-"""
+"""Files of a condition: identity by content, found again from a log or a stored run alone."""
 
 from pathlib import Path
 
@@ -12,16 +9,15 @@ from evoexp.batch.jobs import Job, run_jobs
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
+from evoexp.testing import conditions
 
 MAP = "....\n.##.\n....\n....\n"
 GROUPS = ("robot=floor_platform", "scenario=chen", "planner=grid_path_ga", "collision=chen")
 OVERRIDES = [*GROUPS, "objective=chen_path_a", "ga=chen_path", "budget=smoke"]
-OVERRIDES += ["scenario.size=[4,4]", "scenario.start=[0,0]"]
-OVERRIDES += ["scenario.goal=[3,3]", "scenario.obstacles=[]"]
+OVERRIDES += ["scenario.size=[4,4]", "scenario.start=[0,0]", "scenario.goal=[3,3]"]
 
 
 @pytest.fixture
@@ -32,9 +28,8 @@ def path(tmp_path: Path) -> Path:
 
 
 def condition_with(path: Path) -> Condition:
-    return (
-        compose.expand([*OVERRIDES, f"scenario.map={{file: '{path}'}}"])[0].conditions[0].condition
-    )
+    words = (*OVERRIDES, "scenario.obstacles=[]", f"scenario.map={{file: '{path}'}}")
+    return next(iter(conditions(*words).values()))
 
 
 def forget() -> None:
@@ -77,13 +72,8 @@ def test_a_stored_run_has_its_files(path: Path, tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        SettingError,
-        match=r"scenario\.map\.file: must be a file that can be read .*, was .*nowhere",
-    ):
+    refusal = r"scenario\.map\.file: must be a file that can be read "
+    with pytest.raises(SettingError, match=refusal + ".*, was .*nowhere"):
         condition_with(tmp_path / "nowhere.txt")
-    with pytest.raises(
-        SettingError,
-        match=r"scenario\.map\.file: must be a file that can be read \(is a directory\)",
-    ):
+    with pytest.raises(SettingError, match=refusal + r"\(is a directory\)"):
         condition_with(tmp_path)

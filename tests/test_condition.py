@@ -1,9 +1,11 @@
 """A condition: canonical form, hash, what it refuses, and the names it may use."""
 
+import ast
 import copy
 import importlib.metadata
 import json
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,6 @@ from evoexp.errors import (
     UnknownSetting,
 )
 from evoexp.registry import component_class
-from evoexp.validation import Component
 from evoexp.version import __version__
 from guests import on_path, write_distribution
 from shipped_conditions import (
@@ -30,35 +31,16 @@ from shipped_conditions import (
     shipped_conditions,
 )
 
+SOURCE = Path(__file__).parents[1] / "src" / "evoexp"
 Path_ = tuple[str | int, ...]
 
-WORDS = (  # that one setting takes
-    ("natural", "clamped"),
-    ("one_sided", "symmetric"),
-    ("genome", "index"),
-    ("tails", "segment"),
-    ("sum", "larger"),
-    ("inverse", "difference"),
-    ("threshold", "finite"),
-    ("tournament", "roulette", "rank"),
-    ("one_point", "uniform", "arithmetic", "blx_alpha"),
-    ("non_uniform", "gaussian", "uniform_reset"),
-    ("uniform", "gaussian"),
-    ("equal", "gaussian"),
-    ("comma", "plus"),
-    ("gene", "individual"),
-    ("chords", "none"),
-    ("linear", "cubic"),
-    ("binary", "gray"),
-    ("left", "right"),
-    ("world", "tool"),
-    ("go_on", "attach", "detach"),
-    ("revolute", "prismatic"),
-    ("rad", "deg"),
-    ("sine", "step"),
-    ("model", "certified", "margin"),
-    ("RRTConnect", "RRTstar", "InformedRRTstar", "BITstar"),
-)
+TAKEN = """natural clamped, one_sided symmetric, genome index, tails segment, sum larger,
+inverse difference, threshold finite, tournament roulette rank, gene individual, rad deg, sine step,
+one_point uniform arithmetic blx_alpha, non_uniform gaussian uniform_reset, uniform gaussian,
+equal gaussian, comma plus, chords none, linear cubic, binary gray, left right, world tool,
+go_on attach detach, revolute prismatic, model certified margin,
+RRTConnect RRTstar InformedRRTstar BITstar"""
+WORDS = [words.split() for words in TAKEN.split(",")]  # that one setting takes
 
 
 @pytest.fixture(params=KIND_EXAMPLES)
@@ -74,17 +56,11 @@ def config() -> dict[str, Any]:
 
 def leaves(data: Any, path: Path_ = ()) -> Iterator[tuple[Path_, Any]]:
     """Yield every setting of plain configuration data and where it stands."""
-    items = (
-        data.items()
-        if isinstance(data, dict)
-        else enumerate(data)
-        if isinstance(data, list)
-        else ()
-    )
-    for key, value in items:
-        yield from leaves(value, (*path, key))
     if not isinstance(data, dict | list):
         yield path, data
+        return
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+        yield from leaves(value, (*path, key))
 
 
 def with_value(data: Any, path: Path_, value: Any) -> Any:
@@ -119,29 +95,28 @@ def test_every_shipped_condition_has_a_hash_of_its_own() -> None:
     assert len(different) > len(everything) // 2
 
 
+def other_values(name: Any, value: Any) -> list[Any]:
+    """Return values of which one is valid in the place of a setting's."""
+    if name == "sha256":
+        return ["0" * 64]
+    if isinstance(value, str):
+        every = [word for words in WORDS if value in words for word in words]
+        return [word for word in every if word != value] or [f"{value}m"]
+    if value is None or isinstance(value, bool):
+        return [3 if value is None else not value]
+    return [value + 1, value - 1, value * 2, value * 0.5, value + 0.05, value * 0.95]
+
+
 @pytest.mark.examples(2)
 def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
-    """Change each setting by the smallest step that stays valid: another hash, or it is refused.
-
-    Never ignored.
-    """
-    config = json.loads(shipped.to_json())
-    others = {shipped.id}
-    count = 0
+    """Change each setting by the smallest step that stays valid: another hash, or it is refused."""
+    config, others, count = json.loads(shipped.to_json()), {shipped.id}, 0
+    ga = config["planner"].get("ga", {})
     for path, value in leaves(config):
         if path[-1] in ("_target_", "revision", "shape") or path[-2:] == ("goal", "kind"):
             continue  # they say which settings are beside them
         count += 1
-        steps: list[Any] = [not value] if isinstance(value, bool) else []
-        if path[-1] == "sha256":
-            steps = ["0" * 64]
-        elif isinstance(value, str):
-            steps = [word for words in WORDS if value in words for word in words] or [f"{value}m"]
-        elif value is None:
-            steps = [3]
-        elif not steps:
-            steps = [value + 1, value - 1, value * 2, value * 0.5, value + 0.05, value * 0.95]
-        for step in steps:
+        for step in other_values(path[-1], value):
             if step == value:
                 continue
             try:
@@ -151,22 +126,12 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
             assert changed.id not in others, path
             others.add(changed.id)
             break
-        else:  # only together with another setting
-            named = path[0] == "scenario" and path[-1] in (
-                "name",
-                "object",
-                "then",
-            )  # an obstacle and who names it
-            assert named or path[-1] in ("hall_frozen", "hall_memory", "hall_distinct"), (
-                f"no other value of {path} is accepted"
-            )
-            ga = config["planner"].get("ga", {})
-            assert (
-                named
-                or ga["hall_depth"] == 0.0
-                or ga["hall_frozen"]
-                or ga["hall_memory"] is not None
-            )
+        else:  # only together with another setting: an obstacle and who names it, the hall
+            if path[0] != "scenario" or path[-1] not in ("name", "object", "then"):
+                hall = ("hall_frozen", "hall_memory", "hall_distinct")
+                assert path[-1] in hall, f"no other value of {path} is accepted"
+                kept = ga["hall_frozen"] or ga["hall_memory"] is not None
+                assert kept or ga["hall_depth"] == 0.0
     assert count > 20
 
 
@@ -180,26 +145,21 @@ def test_whole_numbers_and_floats_are_one_setting(shipped: Condition) -> None:
             assert Condition.from_config(with_value(config, path, -0.0)).id == shipped.id
 
 
+UNNAMED = "must be a component, given by its _target_, was"
+UNREGISTERED = "robot._target_: must be a registered component, was"
+
+
 @pytest.mark.parametrize(
     ("part", "value", "message"),
     [
-        (
-            "robot",
-            {"_target_": "os.system", "command": "true"},
-            "robot._target_: must be a registered component, was 'os",
-        ),
-        (
-            "robot",
-            {"_target_": "armz"},
-            "robot._target_: must be a registered component, was 'armz'; did you mean 'arms'?",
-        ),
-        ("robot", {}, "robot: must be a component, given by its _target_, was {}"),
-        ("robot", None, "robot: must be a component, given by its _target_, was None"),
-        ("robot", [1], "robot: must be a component, given by its _target_, was [1]"),
+        ("robot", {"_target_": "os.system", "command": "true"}, f"{UNREGISTERED} 'os"),
+        ("robot", {"_target_": "armz"}, f"{UNREGISTERED} 'armz'; did you mean 'arms'?"),
+        *(("robot", value, f"robot: {UNNAMED} {value}") for value in ({}, None, [1])),
         ("seed", "0", "seed: must be a whole number, at least 0, was '0'"),
-        ("seed", True, "seed: must be a whole number, at least 0, was True"),
-        ("seed", -1, "seed: must be a whole number, at least 0, was -1"),
-        ("seed", None, "seed: must be a whole number, at least 0, was None"),
+        *(
+            ("seed", v, f"seed: must be a whole number, at least 0, was {v}")
+            for v in (True, -1, None)
+        ),
         ("sead", 1, "sead: unknown setting; did you mean 'seed'?"),
     ],
 )
@@ -209,34 +169,30 @@ def test_parts_that_cannot_be(config: dict[str, Any], part: str, value: Any, mes
 
 def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> None:
     robot, scenario, planner = config["robot"], config["scenario"], config["planner"]
-    assert (
-        refusal(config | {"robot": scenario})
-        == "robot: must be one that via_point_ga takes (Robot), was 'arm_motion'"
-    )
-    assert (
-        refusal(config | {"scenario": robot}) == "scenario: must be one that via_point_ga takes "
-        "(ArmMotion or LinkMotion or MoveitTask or GridMotion), was 'arms'"
-    )
-    assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
     search = {"_target_": "random_search", "revision": 1}
-    assert (
-        refusal(config | {"planner": search | {"planner": 3}})
-        == "planner: must be a planner, was 3"
-    )
-    assert "scenario: must be one that via_point_ga" in refusal(
-        config | {"planner": search | {"planner": planner}, "scenario": robot}
-    )
-    assert refusal(config | {"planner": planner | {"ga": robot}}).startswith(
-        "planner.ga: must be a GeneticSettings"
-    )
+    taken = "(ArmMotion or LinkMotion or MoveitTask or GridMotion)"
+    for changes, message in (
+        (
+            {"robot": scenario},
+            "robot: must be one that via_point_ga takes (Robot), was 'arm_motion'",
+        ),
+        ({"scenario": robot}, f"scenario: must be one that via_point_ga takes {taken}, was 'arms'"),
+        ({"planner": robot}, "planner: must be a planner, was 'arms'"),
+        ({"planner": search | {"planner": 3}}, "planner: must be a planner, was 3"),
+        (
+            {"planner": search | {"planner": planner}, "scenario": robot},
+            "scenario: must be one that via_point_ga",
+        ),
+        ({"planner": planner | {"ga": robot}}, "planner.ga: must be a GeneticSettings"),
+    ):
+        assert refusal(config | changes).startswith(message)
 
 
 @pytest.mark.parametrize("value", [{}, [], None, 3])
 def test_a_component_without_a_name_is_refused(config: dict[str, Any], value: Any) -> None:
-    named = "must be a component, given by its _target_, was"
     arms = [*config["robot"]["arms"][:-1], value]
     changed = config | {"robot": config["robot"] | {"arms": arms}}
-    assert refusal(changed).startswith(f"robot.arms[{len(arms) - 1}]: {named}")
+    assert refusal(changed).startswith(f"robot.arms[{len(arms) - 1}]: {UNNAMED}")
     changed = config | {"planner": config["planner"] | {"ga": value}}
     assert refusal(changed).startswith("planner.ga")  # or the first setting that is missing
 
@@ -247,47 +203,44 @@ def test_a_refusal_is_a_line_that_can_be_read(config: dict[str, Any]) -> None:
     assert len(refusal(config | {"robot": {"_target_": "x" * 5000}})) < 1500
 
 
-@pytest.mark.parametrize(
-    "text",
-    [b"", b"{", b"[]", b"3", b"null", b"\xff\xfe", b"[" * 100_000, b'{"robot": ' * 100_000],
-    ids=["empty", "cut", "list", "number", "null", "no text", "deep list", "deep mapping"],
-)
+TEXTS = {
+    "empty": b"",
+    "cut": b"{",
+    "list": b"[]",
+    "number": b"3",
+    "null": b"null",
+    "no text": b"\xff\xfe",
+    "deep list": b"[" * 100_000,
+    "deep mapping": b'{"robot": ' * 100_000,
+}
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 def test_a_text_that_is_no_condition_is_refused(text: bytes) -> None:
     assert "config.json: must be a condition in JSON" in refusal(text)
 
 
-@pytest.mark.parametrize("value", ["NaN", "Infinity", "-Infinity"])
-def test_numbers_that_are_none_are_refused(config: dict[str, Any], value: str) -> None:
-    text = json.dumps(
-        with_value(config, ("planner", "walk_step"), float(value.replace("Infinity", "inf")))
-    )
-    assert value in text
-    assert refusal(text.encode()).startswith("planner.walk_step: must be a finite number")
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_none_are_refused(config: dict[str, Any], value: float) -> None:
+    changed = with_value(config, ("planner", "walk_step"), value)
+    assert refusal(changed).startswith("planner.walk_step: must be a finite number")
 
 
-def test_another_revision_is_refused_and_names_both(config: dict[str, Any]) -> None:
-    config["planner"]["ga"]["revision"] = 7
-    with pytest.raises(RevisionMismatch, match=r"planner.ga was revision 7, installed is 1"):
-        Condition.from_json(json.dumps(config).encode())
+def test_another_revision_or_setting_is_refused_by_name(config: dict[str, Any]) -> None:
+    for name, value, kind, message in (
+        ("revision", 7, RevisionMismatch, "planner.ga was revision 7, installed is 1"),
+        ("population_sise", 3, UnknownSetting, "unknown setting; did you mean 'population_si"),
+    ):
+        changed = with_value(config, ("planner", "ga", name), value)
+        with pytest.raises(kind, match=message):
+            Condition.from_json(json.dumps(changed).encode())
 
 
 def test_revisions_are_listed_for_every_component(shipped: Condition) -> None:
-    found = {
-        field: (stored, installed)
-        for field, stored, installed in revisions(json.loads(shipped.to_json()))
-    }
+    rows = revisions(json.loads(shipped.to_json()))
     arms = {"robot.arms[0]"} if hasattr(shipped.robot, "arms") else set()
-    assert {"robot", "scenario", "planner"} | arms <= set(found)
-    assert all(stored == installed for stored, installed in found.values())
-
-
-def test_an_unknown_setting_in_a_stored_configuration_is_refused(config: dict[str, Any]) -> None:
-    config["planner"]["ga"]["population_sise"] = 3
-    with pytest.raises(
-        UnknownSetting,
-        match="planner.ga.population_sise: unknown setting; did you mean 'population_si",
-    ):
-        Condition.from_json(json.dumps(config).encode())
+    assert {"robot", "scenario", "planner"} | arms <= {field for field, _, _ in rows}
+    assert all(stored == installed for _, stored, installed in rows)
 
 
 def test_a_planner_that_lacks_something_of_the_protocol_is_refused_by_name(
@@ -321,61 +274,97 @@ def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
 # The registry
 
 
-@pytest.mark.parametrize("name", registry.names(registry.COMPONENTS))
-def test_registered_names_are_the_components_own(name: str) -> None:
-    kind = component_class(name)
-    assert issubclass(kind, Component)
-    assert kind.component == name
+def test_every_component_is_registered_and_nothing_else() -> None:
+    named = {}  # component → `module:class` of every class that names itself one
+    for path in SOURCE.rglob("*.py"):
+        module = ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts)
+        templates = "assets" in path.parts  # of guests
+        for kind in ast.walk(ast.parse("" if templates else path.read_text())):
+            for line in kind.body if isinstance(kind, ast.ClassDef) else ():
+                text = ast.unparse(line)
+                if text.startswith("component: ") and isinstance(line.value, ast.Constant):
+                    named[line.value.value] = f"{module}:{kind.name}"
+    registered = {
+        each.name: each.target
+        for each in registry.registrations(registry.COMPONENTS)
+        if each.is_own
+    }
+    assert registered == named
+
+
+@pytest.mark.parametrize("group", [registry.COMPONENTS, registry.PAGES, registry.CLAIMS])
+def test_the_module_of_a_registration_holds_what_it_names(group: str) -> None:
+    own = [each for each in registry.registrations(group) if each.is_own]
+    assert own
+    for each in own if group != registry.COMPONENTS else own[:4]:
+        assert each.package.startswith("evoexp ")
+        if each.file is not None:
+            assert each.file.is_file()
+        elif hasattr(loaded := each.load(), "__module__"):
+            assert each.module == loaded.__module__
+        assert each.module.startswith("evoexp.")
 
 
 @pytest.fixture
-def guest(tmp_path: Path) -> Iterator[Path]:
-    """Have two components of a guest's module on the path, which nobody registers yet."""
+def guest(tmp_path: Path) -> Iterator[Callable[..., None]]:
+    """Return what registers names of a guest's module, which is on the path."""
     (tmp_path / "guest_module.py").write_text(
         "from evoexp.evolution.genetic_settings import GeneticSettings\n"
         "class Mine(GeneticSettings):\n    component = 'my_plug_in'\n"
     )
+
+    def register(package: str, *names: str, target: str = "guest_module:Mine", **more: str) -> None:
+        write_distribution(tmp_path, package, components=dict.fromkeys(names, target), **more)
+        registry.clear()
+
     with on_path(tmp_path):
-        yield tmp_path
+        yield register
 
 
-def test_an_installed_package_registers_components(guest: Path, config: dict[str, Any]) -> None:
-    names = dict.fromkeys(("my_plug_in", "my_plug_in_too"), "guest_module:Mine")
-    write_distribution(guest, "My.plug-in", components=names)
-    registry.clear()
+Register = Callable[..., None]
+
+
+def test_an_installed_package_registers_components(guest: Register, config: dict[str, Any]) -> None:
+    guest("My.plug-in", "my_plug_in", "my_plug_in_too")
     config["planner"]["ga"]["_target_"] = "my_plug_in"
     mine = Condition.from_config(config)
-    assert type(mine.planner.ga).__name__ == "Mine"  # type: ignore[attr-defined]
+    kind: Any = type(mine.planner.ga)  # type: ignore[attr-defined]
+    assert kind.__name__ == "Mine" and component_class("my_plug_in_too") is kind
     assert registry.guests(mine.to_json()) == {"my_plug_in": "My.plug-in 1.0"}
-    assert component_class("my_plug_in_too") is type(mine.planner.ga)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
+    ("name", "target", "message"),
     [
-        ("mine", "mine: plug-in 1.0 must register names that begin with its own, 'plug_in' or 'pl"),
-        ("plug_inn", "plug_inn: plug-in 1.0 must register names that begin with its own"),
-        ("genetic", f"genetic: registered by evoexp {__version__} and plug-in 1.0; uninstall"),
-        ("plug_in_lost", "plug_in_lost: plug-in 1.0 registers guest_module:Lost, which cannot be"),
-        ("plug_in_gone", "plug_in_gone: plug-in 1.0 registers no_such_module:A, which cannot be"),
+        (
+            "mine",
+            "guest_module:Mine",
+            "must register names that begin with its own, 'plug_in' or 'pl",
+        ),
+        ("plug_inn", "guest_module:Mine", "must register names that begin with its own"),
+        ("plug_in_lost", "guest_module:Lost", "registers guest_module:Lost, which cannot be"),
+        ("plug_in_gone", "no_such_module:A", "registers no_such_module:A, which cannot be"),
     ],
 )
-def test_a_package_that_registers_wrongly_is_named(guest: Path, name: str, message: str) -> None:
-    targets = {"plug_in_lost": "guest_module:Lost", "plug_in_gone": "no_such_module:A"}
-    write_distribution(guest, "plug-in", components={name: targets.get(name, "guest_module:Mine")})
-    registry.clear()
+def test_a_package_that_registers_wrongly_is_named(
+    guest: Register, name: str, target: str, message: str
+) -> None:
+    guest("plug-in", name, target=target)
     with pytest.raises(RegistrationError) as caught:
         component_class(name)
-    assert str(caught.value).startswith(message)
+    assert str(caught.value).startswith(f"{name}: plug-in 1.0 {message}")
     assert component_class("arms").component == "arms"  # other names are as good as before
 
 
-def test_two_guests_of_one_name_are_both_named(guest: Path) -> None:
-    write_distribution(guest, "plug", "2.0", components={"plug_in": "guest_module:Mine"})
-    write_distribution(guest, "plug-in", "1.0", components={"plug_in": "guest_module:Mine"})
-    registry.clear()
-    with pytest.raises(RegistrationError, match="registered by plug 2.0 and plug-in 1.0"):
-        component_class("plug_in")
+def test_two_packages_of_one_name_are_both_named(guest: Register) -> None:
+    guest("plug", "plug_in", version="2.0")
+    guest("plug-in", "plug_in", "genetic")
+    for name, both in (
+        ("plug_in", "plug 2.0 and plug-in 1.0"),
+        ("genetic", f"evoexp {__version__} and plug-in 1.0; uninstall"),
+    ):
+        with pytest.raises(RegistrationError, match=f"{name}: registered by {both}"):
+            component_class(name)
 
 
 def test_without_its_metadata_evoexp_says_that_it_is_not_installed(

@@ -26,6 +26,7 @@ from evoexp.version import __version__
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
 MENU = ROOT / "scripts/mkdocs.yml"
+NOTEBOOK = ROOT / "docs/remake_a_figure.ipynb"
 RUN = {"bash": "commands", "python": "code", "sql": "queries"}  # languages of blocks that are run
 FILES = {"xml", "yaml", "csv", "ini"}  # of blocks that are files: `title="…"` names each
 # Commands that the tests of this module leave out, each with the reason.
@@ -60,6 +61,7 @@ def blocks(page: Path, *languages: str) -> list[Block]:
     return [Block(*each) for each in found if not languages or each[0] in languages]
 
 
+@functools.cache
 def lines(page: Path) -> list[str]:
     """Return every command of a page's blocks."""
     found = []
@@ -75,6 +77,10 @@ def commands(page: Path) -> list[list[str]]:
     """Return the words of every evoexp command of a page, without the program's name."""
     every = [shlex.split(line) for line in lines(page)]
     return [words[1:] for words in every if words[0] in ("evoexp", "./scripts/evoexp")]
+
+
+def without_blocks(page: Path) -> str:
+    return re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
 
 
 def write_files(page: Path, folder: Path) -> None:
@@ -93,27 +99,23 @@ def anchors(page: Path) -> set[str]:
 
 @each_page
 def test_links_lead_to_files_and_headings(page: Path) -> None:
-    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
-    for target in re.findall(r"\]\(([^)\s]+)\)", text):
-        if target.startswith("http"):
-            continue
-        name, _, anchor = target.partition("#")
-        path = (page.parent / name).resolve() if name else page
-        assert path.exists(), target
-        assert not anchor or anchor in anchors(path), target
+    for target in re.findall(r"\]\(([^)\s]+)\)", without_blocks(page)):
+        if not target.startswith("http"):
+            name, _, anchor = target.partition("#")
+            path = (page.parent / name).resolve() if name else page
+            assert path.exists(), target
+            assert not anchor or anchor in anchors(path), target
 
 
 @each_page
-def test_every_block_is_run_or_is_a_file(page: Path) -> None:
+def test_every_block_is_run_or_is_a_file_and_every_command_is_one(page: Path) -> None:
     for block in blocks(page):
-        assert block.language in RUN if not block.name else block.language in FILES, block
-    outside = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+        assert block.language in (FILES if block.name else RUN), block
+    outside = without_blocks(page)
     assert "```" not in outside
     assert not re.findall(r"^\n(?: {4,}|\t)\S.*", outside, flags=re.MULTILINE)  # by indentation
-
-
-@each_page
-def test_every_command_is_run_or_left_out_for_a_reason(page: Path) -> None:
+    for name in re.findall(r"`(?:\./scripts/)?evoexp ([^\s`]+)[^`]*`", outside):
+        assert name in COMMANDS, name
     for line in lines(page):
         is_ours = shlex.split(line)[0] in ("evoexp", "./scripts/evoexp")
         assert is_ours or any(part in line for part in LEFT_OUT), line
@@ -124,33 +126,15 @@ def test_every_reason_is_needed() -> None:
     assert [part for part in LEFT_OUT if part not in every] == []
 
 
-@each_page
-def test_commands_within_sentences_are_commands(page: Path) -> None:
-    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
-    for name in re.findall(r"`(?:\./scripts/)?evoexp ([^\s`]+)[^`]*`", text):
-        assert name in COMMANDS, name
-
-
-def test_the_readme_is_short() -> None:
+def test_the_readme_is_short_every_page_in_the_menu_and_the_citation_right() -> None:
     assert len((ROOT / "README.md").read_text().splitlines()) <= 120
-
-
-def test_every_page_is_in_the_menu() -> None:
     listed = set(re.findall(r": ([\w./]+\.md)$", MENU.read_text(), flags=re.MULTILINE))
     assert listed == {path.name for path in (ROOT / "docs").glob("*.md")}
-
-
-def test_the_citation_can_be_read() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["cff-version"] and citation["license"] == "MIT"
     assert citation["version"] == __version__
     assert len(citation["references"]) == 5
     assert all(reference["authors"] and reference["year"] for reference in citation["references"])
-
-
-@functools.cache
-def experiments() -> frozenset[str]:
-    return frozenset(options("experiment"))
 
 
 def is_elsewhere(words: list[str]) -> bool:
@@ -172,7 +156,7 @@ def test_commands_are_commands(page: Path) -> None:
             is_one = "-m" not in words and not is_no_experiment(given[0])
             assert composed(*given) if is_one else compose.expand(given, multirun="-m" in words)
         named = [w for w in words[1:] if re.fullmatch(r"[a-z]+(_[a-z0-9]+)+", w)]
-        assert not named or set(named) <= experiments() or is_elsewhere(words), words
+        assert not named or set(named) <= set(options("experiment")) or is_elsewhere(words), words
 
 
 @contextlib.contextmanager
@@ -190,9 +174,8 @@ def readers_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reader")
     (folder / "path/to").mkdir(parents=True)
     (folder / "path/to/problems").symlink_to(ROOT / "src/evoexp/assets/motionbenchmaker/problems")
-    (folder / "path/to/mine.yaml").write_text(
-        (ROOT / "conf/experiment/rana_planar.yaml").read_text()
-    )
+    own = (ROOT / "conf/experiment/rana_planar.yaml").read_text()
+    (folder / "path/to/mine.yaml").write_text(own)
     with pytest.MonkeyPatch.context() as patch, fresh_folder(folder, patch):
         assert main(["run", "experiment=rana_planar"]) == 0
         assert main(["pack", "4da921", "-o", "path/to/runs.tar"]) == 0
@@ -210,12 +193,9 @@ ONE_OF_MANY = {  # conditions: tests/test_shipped.py runs every one of them
 def shortened(words: list[str]) -> list[str]:
     """Return a command with which a long run is over in seconds."""
     is_long = words[0] == "run" and not {"experiment=rana_planar", "-m"} & set(words)
-    is_short = any(word.startswith("budget=") for word in words)
-    if is_long and not is_short:
-        only = [
-            part for word in words if word in ONE_OF_MANY for part in ("--only", ONE_OF_MANY[word])
-        ]
-        return [*words, "budget=smoke", "num_replicates=1", *only]
+    if is_long and not any(word.startswith("budget=") for word in words):
+        names = [ONE_OF_MANY[word] for word in words if word in ONE_OF_MANY]
+        return [*words, "budget=smoke", "num_replicates=1", *(["--only", *names] if names else [])]
     # a comparison of what was run above, at that budget
     is_of_page = words[0] == "compare" and "rana_planar" not in words
     return [*words, "budget=smoke"] if is_of_page else words
@@ -226,19 +206,14 @@ def shortened(words: list[str]) -> list[str]:
 def test_every_command_can_be_run(
     page: Path, readers_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = [
-        words
-        for words in commands(page)
-        if not any(part in " ".join(words) for part in ("my_search", "my_swap", "HASH", "tcp:"))
-    ]
-    if not found:
-        pytest.skip("the page has no commands that are run here")
-    if page.name == "README.md":
-        pytest.skip("run as they stand, in an empty folder, by the next test")
+    others = ("my_search", "my_swap", "HASH", "tcp:")
+    every = [words for words in commands(page) if not any(o in " ".join(words) for o in others)]
+    if not every or page.name == "README.md":
+        pytest.skip("no commands, or run as they stand, in an empty folder, by the next test")
     folder = shutil.copytree(readers_folder, tmp_path / "reader", symlinks=True)
     write_files(page, folder)
     with fresh_folder(folder, monkeypatch):
-        for words in found:
+        for words in every:
             assert main(shortened(words)) == (words[0] == "diff"), words
 
 
@@ -248,37 +223,28 @@ def test_first_commands_run_as_they_stand(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with fresh_folder(tmp_path, monkeypatch):
-        found = commands(page)
-        assert len(found) >= 5
-        for words in found:
+        assert len(commands(page)) >= 5
+        for words in commands(page):
             assert main(words) == 0, words
         assert (tmp_path / "outputs/reports/index.html").is_file()
 
 
-@each_page
+@pytest.mark.parametrize("page", [*PAGES, NOTEBOOK], ids=lambda path: path.name)
 def test_code_and_queries_run_as_they_stand(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = blocks(page, "python", "sql")
-    if not found:
+    if page == NOTEBOOK:
+        cells = [c for c in json.loads(page.read_text())["cells"] if c["cell_type"] == "code"]
+        assert not any(cell["outputs"] for cell in cells)
+        code = [Block("python", "", "".join(cell["source"])) for cell in cells]
+    elif not (code := blocks(page, "python", "sql")):
         pytest.skip("no code")
     with fresh_folder(tmp_path, monkeypatch):
         assert main(["run", "experiment=rana_planar", "budget=smoke", "--no-report"]) == 0
         names: dict[str, object] = {"__name__": "__main__"}  # as in a script
-        for block in found:
+        for block in code:
             if block.language == "sql":
                 assert duckdb.sql(block.text).fetchall(), block.text
             else:
                 exec(compile(block.text, page.name, "exec"), names)
-
-
-def test_the_notebook_remakes_a_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    notebook = json.loads((ROOT / "docs/remake_a_figure.ipynb").read_text())
-    with fresh_folder(tmp_path, monkeypatch):
-        assert main(["run", "experiment=rana_planar", "budget=smoke", "--no-report"]) == 0
-        names: dict[str, object] = {"__name__": "__main__"}  # as in a script
-        for cell in notebook["cells"]:
-            if cell["cell_type"] == "code":
-                assert not cell["outputs"]
-                exec(compile("".join(cell["source"]), "notebook", "exec"), names)
-        assert (tmp_path / "convergence.svg").stat().st_size > 10_000
+        assert page != NOTEBOOK or Path("convergence.svg").stat().st_size > 10_000

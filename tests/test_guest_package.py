@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 NAME = "lambda_search"
-SOURCE = Path(__file__).parents[1] / "src"
+OFFLINE = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
 
 pytestmark = [
     pytest.mark.matrix,
@@ -30,7 +30,7 @@ Execute = Callable[..., str]
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return an empty folder, beside an environment with all packages of this one."""
     root = tmp_path_factory.mktemp("guest")
     venv.create(root / "environment", with_pip=False)
@@ -39,23 +39,21 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lines = "".join(f"site.addsitedir({path!r}); " for path in theirs)
     (packages / "shared.pth").write_text(f"import site; {lines}\n")
     (root / "work").mkdir()
-    return root
+    return root / "work"
 
 
 @pytest.fixture(scope="module")
-def execute(place: Path) -> Execute:
+def execute(work: Path) -> Execute:
     """Return a function that runs a command in the folder with the environment's Python."""
-    environment = {
-        name: value for name, value in os.environ.items() if name not in ("EVOEXP_OUTPUTS",)
-    }
-    scripts = place / "environment" / Path(sysconfig.get_path("scripts")).name
-    environment |= {"PATH": f"{scripts}:{environment['PATH']}", "COLUMNS": "120"}
+    environment = os.environ | {"COLUMNS": "120"}
+    environment.pop("EVOEXP_OUTPUTS", None)
+    scripts = work.parent / "environment" / Path(sysconfig.get_path("scripts")).name
+    environment["PATH"] = f"{scripts}:{environment['PATH']}"
 
-    def run(*words: str, cwd: str = "work") -> str:
-        python = str(scripts / "python")
+    def run(*words: str, folder: str = ".") -> str:
         done = subprocess.run(
-            [python, "-m", *words],
-            cwd=place / cwd,
+            [str(scripts / "python"), "-m", *words],
+            cwd=work / folder,
             env=environment,
             capture_output=True,
             text=True,
@@ -68,88 +66,67 @@ def execute(place: Path) -> Execute:
 
 
 @pytest.fixture(scope="module")
-def installed(place: Path, execute: Execute) -> str:
-    """Write the package and install it as its README says, without the network."""
+def run(execute: Execute) -> list[str]:
+    """Write the package, install it as its README says, run it; return its conditions' hashes."""
     execute("evoexp", "new", "planner", NAME)
-    words = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
-    execute("pip", "install", "--quiet", *words, "-e", NAME)
-    return NAME
-
-
-@pytest.fixture(scope="module")
-def run(execute: Execute, installed: str) -> list[str]:
-    """Run the experiment at the smallest budget; return the hashes of its conditions."""
-    printed = execute("evoexp", "run", f"experiment={installed}", "budget=smoke")
+    execute("pip", "install", "--quiet", *OFFLINE, "-e", NAME)
+    printed = execute("evoexp", "run", f"experiment={NAME}", "budget=smoke")
     hashes = re.findall(r"[0-9a-f]{12}", printed.partition("report: ")[0])
     assert len(hashes) == 3
     assert printed.count("2 of 2") >= 3
     return hashes
 
 
-def test_it_is_found(execute: Execute, installed: str) -> None:
+def test_it_is_found_and_named(work: Path, execute: Execute, run: list[str]) -> None:
     listed = json.loads(execute("evoexp", "list", "--json"))["experiments"]
-    (mine,) = [each for each in listed if each["name"] == installed]
-    assert mine["origin"] == f"{installed} 0.1.0"
-    shown = execute("evoexp", "show", f"experiment={installed}", "--only", "λ = 4")
-    assert f"{installed} 1 ({installed} 0.1.0)" in shown
+    (mine,) = [each for each in listed if each["name"] == NAME]
+    assert mine["origin"] == f"{NAME} 0.1.0"
+    shown = execute("evoexp", "show", f"experiment={NAME}", "--only", "λ = 4")
+    assert f"{NAME} 1 ({NAME} 0.1.0)" in shown
+    for each in run:
+        assert f"{NAME} 0.1.0" in (work / "outputs/runs" / each / "manifest.json").read_text()
 
 
-def test_it_runs_and_reproduces(execute: Execute, run: list[str]) -> None:
+def test_it_reproduces_and_reports(work: Path, execute: Execute, run: list[str]) -> None:
     for each in run:
         assert execute("evoexp", "reproduce", each).endswith("2 of 2 MATCH\n")
+    execute("evoexp", "report", NAME, "budget=smoke")
+    text = (work / f"outputs/reports/{NAME}@smoke/index.md").read_text()
+    for part in ("λ = 16", "random search", f"evoexp report {NAME} budget=smoke"):
+        assert part in text
 
 
-def test_manifest_and_log_name_the_package(place: Path, run: list[str], installed: str) -> None:
-    for each in run:
-        text = (place / "work/outputs/runs" / each / "manifest.json").read_text()
-        assert f"{installed} 0.1.0" in text
-
-
-def test_it_reports(place: Path, execute: Execute, run: list[str], installed: str) -> None:
-    execute("evoexp", "report", installed, "budget=smoke")
-    text = (place / f"work/outputs/reports/{installed}@smoke/index.md").read_text()
-    assert "λ = 16" in text and "random search" in text
-    assert f"evoexp report {installed} budget=smoke" in text
-
-
-def test_it_evaluates_plays_and_exports(
-    place: Path, execute: Execute, run: list[str], installed: str
-) -> None:
+def test_it_evaluates_plays_and_exports(work: Path, execute: Execute, run: list[str]) -> None:
     straight = np.linspace([45.0, 225.0, 225.0, 225.0], [135.0, 135.0, 315.0, 315.0], 5)
-    (place / "work/motion.json").write_text(json.dumps([straight.tolist()]))
-    words = ("motion.json", f"experiment={installed}", "--only", "λ = 4")
+    (work / "motion.json").write_text(json.dumps([straight.tolist()]))
+    words = ("motion.json", f"experiment={NAME}", "--only", "λ = 4")
     terms = json.loads(execute("evoexp", "evaluate", *words, "--json"))
     assert terms["length_deg"] == pytest.approx(180.0)
     assert terms["certified"] is False
     for command in ("view", "play", "export"):
         execute("evoexp", command, run[0])
         execute("evoexp", command, *words)
-    made = {path.suffix for path in (place / "work/outputs/motions").iterdir()}
+    made = {path.suffix for path in (work / "outputs/motions").iterdir()}
     assert made >= {".html", ".mcap", ".json"}
 
 
-def test_its_own_tests_pass(execute: Execute, installed: str) -> None:
-    printed = execute("pytest", "-q", "-p", "no:cacheprovider", cwd=f"work/{installed}")
+def test_its_own_tests_pass(execute: Execute, run: list[str]) -> None:
+    printed = execute("pytest", "-q", "-p", "no:cacheprovider", folder=NAME)
     assert re.search(r"^\d+ passed", printed.splitlines()[-1])
     assert "skipped" not in printed
 
 
-def test_it_runs_from_a_wheel_too(place: Path, execute: Execute, run: list[str]) -> None:
+def test_it_runs_from_a_wheel_and_is_missed_when_it_is_gone(
+    work: Path, execute: Execute, run: list[str]
+) -> None:
     """The options are in the wheel: the package is installed, and the folder is gone."""
-    words = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
-    execute("pip", "wheel", "--quiet", *words, "-w", "wheels", f"./{NAME}")
-    (wheel,) = (place / "work/wheels").glob("*.whl")
-    execute("pip", "install", "--quiet", *words, "--force-reinstall", str(wheel))
-    (place / "work" / NAME).rename(place / "gone")
+    execute("pip", "wheel", "--quiet", *OFFLINE, "-w", "wheels", f"./{NAME}")
+    (wheel,) = (work / "wheels").glob("*.whl")
+    execute("pip", "install", "--quiet", *OFFLINE, "--force-reinstall", str(wheel))
+    (work / NAME).rename(work / "gone")
     printed = execute("evoexp", "run", f"experiment={NAME}", "budget=smoke", "--no-report")
     assert printed.startswith("nothing to run: every replicate is there")
-
-
-def test_a_run_whose_package_is_gone_names_it(
-    place: Path, execute: Execute, run: list[str]
-) -> None:
     execute("pip", "uninstall", "--quiet", "--disable-pip-version-check", "-y", NAME)
-    with pytest.raises(AssertionError) as failed:
+    with pytest.raises(AssertionError, match=f"needs {NAME} 0.1.0, which is not installed"):
         execute("evoexp", "reproduce", run[0])
-    assert f"needs {NAME} 0.1.0, which is not installed" in str(failed.value)
     assert "not installed here" in execute("evoexp", "show", run[0])

@@ -5,9 +5,13 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from collections import Counter
+from functools import cache
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
+import pytest
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -16,13 +20,7 @@ SOURCES = sorted(
 )
 OPTIONS = sorted((ROOT / "conf").rglob("*.yaml"))
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
-ROLES = (
-    "planner.py",
-    "kernels.py",
-    "settings.py",
-    "measures.py",
-    "claims.py",
-)
+ROLES = ("planner.py", "kernels.py", "settings.py", "measures.py", "claims.py")
 SOURCE = re.compile(r"# \[[^\]]+\] (paper: \S+|assumed)")
 
 
@@ -44,27 +42,36 @@ READ_OFF = re.compile(
     r"(the (paper's |printed )?)?Fig",
     re.IGNORECASE,
 )
+RIDDLES = (  # sentences that a stranger reads twice
+    r'"""(Return|Say|Yield|Tell|Print|Declare|Draw|Write|Give|Name|Take)s? (what|whether what)\b',
+    r"; (the|where|what) [a-z]+ one\b",
+    r'"""What\b',
+    r'"""[^"\n]*[,;:] ?\n',  # a summary that was cut in two
+    r"\b(Eq|Eqs|Fig|Figs|Tab|Sec)\.\n",
+)
 
 
 def test_no_number_claims_to_come_from_a_drawing() -> None:
     """The papers' texts came without their figures: what is not printed was assumed."""
-    pages = [*SOURCES, ROOT / "README.md"]
-    assert not [
-        f"{path.name}: {match[0]}"
-        for path in [*OPTIONS, *pages]
-        for match in READ_OFF.finditer(path.read_text())
-    ]
-    for bad in ("assumed: read off Fig. 4", "assumed: the width of Fig. 2"):
-        assert READ_OFF.search(bad)
+    pages = [*OPTIONS, *SOURCES, ROOT / "README.md"]
+    assert not [path.name for path in pages if READ_OFF.search(path.read_text())]
 
 
-def test_the_rule_about_numbers_can_fail() -> None:
-    assert NUMBER.search(" 0.5 ")
-    assert NUMBER.search(" [4.0, 4.0]")
+def test_docstrings_name_things() -> None:
+    """Plain words: no clause stands for a noun, and no summary is cut in two."""
+    texts = {path: path.read_text() for path in SOURCES}
+    assert not [(path, r) for path, text in texts.items() for r in RIDDLES if re.search(r, text)]
+
+
+def test_rules_can_fail() -> None:
+    assert NUMBER.search(" 0.5 ") and NUMBER.search(" [4.0, 4.0]")
     assert not NUMBER.search(" rana_planar")
-    assert not SOURCE.match("# assumed")
-    assert not SOURCE.match("# [deg] guessed")
+    assert not SOURCE.match("# assumed") and not SOURCE.match("# [deg] guessed")
     assert SOURCE.match("# [1/deg] paper: Tab. 1, k1")
+    assert all(map(READ_OFF.search, ("assumed: read off Fig. 4", "assumed: the width of Fig. 2")))
+    bad = ('"""Return what `create` writes."""', '"""What a page holds."""', '"""Cut,\n')
+    assert all(any(re.search(riddle, text) for riddle in RIDDLES) for text in bad)
+    assert not any(re.search(riddle, '"""Return the files of a page."""') for riddle in RIDDLES)
 
 
 def test_every_experiment_says_its_command_and_content() -> None:
@@ -107,33 +114,6 @@ def test_kernels_are_annotated() -> None:
     assert not [path.name for path in SOURCES if "no-untyped-def" in path.read_text()]
 
 
-RIDDLES = (
-    r'"""(Return|Say|Yield|Tell|Print|Declare|Draw|Write|Give|Name|Take)s? (what|whether what)\b',
-    r"; (the|where|what) [a-z]+ one\b",
-    r'"""What\b',
-    r'"""[^"\n]*[,;:] ?\n',  # a summary that was cut in two
-    r"\b(Eq|Eqs|Fig|Figs|Tab|Sec)\.\n",
-)
-"""Sentences that a stranger reads twice."""
-
-
-def test_docstrings_name_things() -> None:
-    """Plain words: no clause stands for a noun, and no summary is cut in two."""
-    found = [
-        f"{path.relative_to(ROOT)}: {match[0]!r}"
-        for path in SOURCES
-        for riddle in RIDDLES
-        for match in re.finditer(riddle, path.read_text())
-    ]
-    assert not found
-
-
-def test_the_rule_about_docstrings_can_fail() -> None:
-    bad = ('"""Return what `create` writes."""', '"""What a page holds."""', '"""Cut,\n')
-    assert all(any(re.search(riddle, text) for riddle in RIDDLES) for text in bad)
-    assert not any(re.search(riddle, '"""Return the files of a page."""') for riddle in RIDDLES)
-
-
 def test_no_global_randomness_and_nothing_irreproducible() -> None:
     allowed = ("Generator", "PCG64", "SeedSequence", "default_rng")
     libm = r"np\.(sin|cos|tan|exp|log|power|arc\w+|linalg\.norm|dot|random\.default_rng)\("
@@ -154,29 +134,25 @@ LIGHT = {  # module → packages that neither it nor those before it may load
     "evoexp.paths.redistribution": ("hydra", "pandas", "pinocchio", "matplotlib"),
     "evoexp.batch.replicate": ("hydra", "matplotlib", "pandas"),
 }
+IMPORTS = f"""
+import importlib, sys
+for module, absent in {LIGHT!r}.items():
+    importlib.import_module(module)
+    print(*[f'{{module}}: {{name}}' for name in absent if name in sys.modules], end='')
+"""
+HELP = """
+import sys, evoexp.cli
+try: evoexp.cli.main(['--help'])
+except SystemExit: pass
+print(len(sys.modules))
+"""
 
 
-def test_imports_stay_light() -> None:
-    code = (
-        "import importlib, sys\n"
-        f"for module, absent in {LIGHT!r}.items():\n"
-        "    importlib.import_module(module)\n"
-        "    print(*[f'{module}: {name}' for name in absent if name in sys.modules], end='')"
-    )
-    command = [sys.executable, "-c", code]
-    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
-
-
-def test_help_imports_next_to_nothing() -> None:
-    code = (
-        "import sys, evoexp.cli\ntry: evoexp.cli.main(['--help'])\nexcept SystemExit: "
-        "pass\nprint(len(sys.modules))"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert int(result.stdout.splitlines()[-1]) < 250
-    assert "reproduce" in result.stdout
+def test_imports_stay_light_and_help_imports_next_to_nothing() -> None:
+    assert subprocess.check_output([sys.executable, "-c", IMPORTS], text=True) == ""
+    printed = subprocess.check_output([sys.executable, "-c", HELP], text=True)
+    assert int(printed.splitlines()[-1]) < 250
+    assert "reproduce" in printed
 
 
 def test_scripts_are_executable() -> None:
@@ -185,9 +161,67 @@ def test_scripts_are_executable() -> None:
 
 
 def test_the_clock_is_read_by_the_batch_only() -> None:
+    rooms = {"planners", "evolution", "paths", "objectives", "collision", "robots"}
     for path in SOURCES:
-        if any(
-            room in path.parts
-            for room in ("planners", "evolution", "paths", "objectives", "collision", "robots")
-        ):
-            assert "import time" not in path.read_text(), path
+        assert not rooms & {*path.parts} or "import time" not in path.read_text(), path
+
+
+# Every library that evoexp imports is one that it declares.
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+MODULES = {  # of libraries that metadata name otherwise, or that are not installed
+    "coacd": "coacd",
+    "example_robot_data": "example-robot-data",
+    "ompl": "ompl",
+    "pinocchio": "pin",  # its module lies where packages_distributions does not look
+    "toppra": "toppra",
+}
+DEEP = ("coal", "hydra-core", "mcap", "numba", "numpy", "omegaconf", "pin", "pydantic")
+
+
+def plain(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def declared(*extras: str) -> dict[str, str]:
+    """Return distribution → its requirement."""
+    optional = (PROJECT["optional-dependencies"][extra] for extra in extras)
+    lines = [line for group in (PROJECT["dependencies"], *optional) for line in group]
+    return {plain(re.match(r"[\w.-]+", line)[0]): line for line in lines}  # type: ignore[index]
+
+
+@cache
+def imported() -> dict[str, str]:
+    """Return top-level module → a file of evoexp that imports it."""
+    modules, known = {}, {*sys.stdlib_module_names, "evoexp"}
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module or ""]
+            modules |= dict.fromkeys((n.partition(".")[0] for n in names), path.name)
+    return {name: file for name, file in modules.items() if name not in known}
+
+
+installed = cache(packages_distributions)
+
+
+@pytest.mark.parametrize("module", imported())
+def test_an_imported_library_is_declared(module: str) -> None:
+    extras = PROJECT["optional-dependencies"].keys() - {"test", "docs"}
+    owners = installed().get(module, [MODULES.get(module, module)])
+    assert {plain(owner) for owner in owners} & declared(*extras).keys(), (
+        f"{imported()[module]} imports {module}, of {owners}, which pyproject.toml does not name"
+    )
+
+
+@pytest.mark.parametrize("distribution", DEEP)
+def test_what_evoexp_depends_on_in_depth_has_an_upper_bound(distribution: str) -> None:
+    assert "<" in declared()[distribution]
+
+
+def test_every_locked_distribution_has_its_licence() -> None:
+    lock, page = ((ROOT / name).read_text() for name in ("requirements.lock", "docs/licences.md"))
+    _, _, table = page.rpartition("| --- | --- |\n")
+    listed = re.findall(r"^\| (\S+) \| \S.* \|$", table, re.MULTILINE)
+    assert set(listed) == set(re.findall(r"^([^ =]+)==", lock, re.MULTILINE))

@@ -1,56 +1,74 @@
-"""Arrays of .npy files: as numpy reads them, or refused by what is wrong."""
+"""Arrays of .npy files: as numpy reads them, or refused by what is wrong, in little memory."""
 
 import io
+import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from confinement import confined
 from evoexp.input_files import read_npy
 
+ROWS = np.arange(6.0).reshape(2, 3)
+ARRAYS = {
+    "rows": ROWS,
+    "columns": np.asfortranarray(ROWS),
+    "big-endian": np.arange(3, dtype=">i2"),
+    "flags": np.array([True, False]),
+    "one number": np.array(7.5),
+    "none": np.empty((0, 4)),
+}
 
-def npy(array: np.ndarray) -> bytes:
+
+def saved(array: np.ndarray) -> bytes:
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()
 
 
-def with_header(shape: str) -> bytes:
-    """Return a file of 64 bytes of numbers whose header tells another shape."""
-    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}\n".encode()
-    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(64)
-
-
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.arange(6.0).reshape(2, 3),
-        np.asfortranarray(np.arange(6.0).reshape(2, 3)),
-        np.arange(3, dtype=">i2"),
-        np.array([True, False]),
-        np.array(7.5),
-        np.empty((0, 4)),
-    ],
-    ids=["rows", "columns", "big-endian", "flags", "one number", "none"],
-)
+@pytest.mark.parametrize("array", ARRAYS.values(), ids=ARRAYS)
 def test_arrays_are_those_of_numpy(array: np.ndarray) -> None:
-    found = read_npy(npy(array))
+    found = read_npy(saved(array))
     assert (found.dtype, found.shape) == (array.dtype, array.shape)
-    assert np.array_equal(found, np.load(io.BytesIO(npy(array))))
+    assert np.array_equal(found, array)
 
 
-@pytest.mark.parametrize("shape", ["(-2, -4)", "(8, -1)", "(8, 1.0)", "(8, True)", "8", "(8, 'a')"])
-def test_a_shape_is_whole_numbers(shape: str) -> None:
-    assert read_npy(with_header("(8, 1)")).shape == (8, 1)
-    with pytest.raises(ValueError, match="tells no shape|header is damaged"):
-        read_npy(with_header(shape))
+def npy(shape: str, kind: str = "<f8", size: int = 64) -> bytes:
+    """Return a file of that many zeros whose header claims a shape."""
+    text = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + bytes(size)
 
 
-def test_other_sizes_and_kinds_are_refused() -> None:
-    with pytest.raises(ValueError, match="2 × 3 numbers of 8 bytes, 64 bytes follow"):
-        read_npy(with_header("(2, 3)"))
-    with pytest.raises(ValueError, match="does not begin as one"):
-        read_npy(b"PK")
-    with pytest.raises(ValueError, match="header is damaged"):
-        read_npy(npy(np.arange(3.0))[:20])
-    with pytest.raises(ValueError, match="no numbers"):
-        read_npy(npy(np.array(["a"])))
+OTHERS = {
+    "ten thousand million items": (npy("(10000000000,)"), "64 bytes follow"),
+    "more items than integers": (npy(f"({2**62}, {2**62})"), "64 bytes follow"),
+    "no items along an endless axis": (npy("(0, 9223372036854775807)", size=0), "."),
+    "too few items": (npy("(2, 3)", size=32), "2 × 3 numbers of 8 bytes, 32 bytes follow"),
+    "too many items": (npy("(2, 3)"), "2 × 3 numbers of 8 bytes, 64 bytes follow"),
+    **{shape: (npy(shape), "tells no shape|header is damaged") for shape in (
+        "(-2, -4)", "(8, -1)", "(8, 1.0)", "(8, True)", "8", "(8, 'a')", "(" * 5000 + ")" * 5000
+    )},
+    "objects": (npy("(8,)", "|O"), "no numbers"),
+    "texts": (saved(np.array(["a"])), "no numbers"),
+    "items of no kind": (npy("(8,)", "<f3"), "header is damaged"),
+    "fields": (npy("(8,)", "<f8', 'x"), "header is damaged"),
+    "a header without end": (b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**32 - 1), "."),
+    "code": (b"\x93NUMPY\x01\x00\x20\x00" + b"__import__('os').system('touch x')", "damaged"),
+    "half a header": (npy("(8,)")[:20], "header is damaged"),
+    "another version": (b"\x93NUMPY\x09\x00" + npy("(8,)")[8:], "."),
+    "another file": (b"PK", "does not begin as one"),
+    "nothing": (b"", "does not begin as one"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_others_are_refused(name: str, tmp_path: Path) -> None:
+    content, message = OTHERS[name]
+
+    def attempt() -> None:
+        with pytest.raises(ValueError, match=message):
+            read_npy(content)
+
+    assert read_npy(npy("(8, 1)")).shape == (8, 1)
+    confined(attempt, tmp_path, 500)

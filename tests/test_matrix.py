@@ -1,9 +1,4 @@
-"""No behaviour is tested with --all only: each such test has a counterpart in the default command.
-
-A test marked `matrix` makes a check again of all shipped conditions, of other pages, at the papers'
-budgets, in a browser or another environment. `matrix_counterparts.toml` names the test that makes
-it of an example. Tests marked `examples(count)` are examples themselves.
-"""
+"""No behaviour is tested with --all only: `matrix_counterparts.toml` names tests of examples."""
 
 import ast
 import tomllib
@@ -15,22 +10,15 @@ TESTS = Path(__file__).parent
 COUNTERPARTS = tomllib.loads((TESTS / "matrix_counterparts.toml").read_text())
 
 
-def is_marked(node: ast.AST, name: str) -> bool:
-    return any(
-        isinstance(part, ast.Attribute) and ast.unparse(part) == f"pytest.mark.{name}"
-        for part in ast.walk(node)
-    )
-
-
 def sorted_tests(source: str) -> dict[bool, set[str]]:
     """Return the names of a file's tests: those that run with --all only, and the others."""
     tree, found = ast.parse(source), {True: set[str](), False: set[str]()}
-    constants = [node for node in tree.body if isinstance(node, ast.Assign)]
-    marks = [node for node in constants if ast.unparse(node.targets[0]) == "pytestmark"]
+    assigned = [node for node in tree.body if isinstance(node, ast.Assign)]
+    marks = [node for node in assigned if ast.unparse(node.targets[0]) == "pytestmark"]
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test"):
-            places = [*marks, *(mark for mark in node.decorator_list)]
-            found[any(is_marked(place, "matrix") for place in places)].add(node.name)
+            texts = map(ast.unparse, [*marks, *node.decorator_list])
+            found[any("pytest.mark.matrix" in text for text in texts)].add(node.name)
     return found
 
 

@@ -51,36 +51,35 @@ def test_the_setting_precedes_folders_above_which_precede_the_environment(
 def test_packages_of_a_workspace_go_by_the_names_in_their_manifests(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    file = tmp_path / "lab" / "arm.urdf"
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
-    other = mesh(tmp_path / "src" / "hands" / "hand_of_others", "other")
-    (other / "package.xml").write_text("<package><name>other</name></package>")
-    with pytest.raises(SettingError):
-        sought(tmp_path / "lab" / "arm.urdf", {})
-    package = mesh(tmp_path / "src" / "hands" / "hand_description", "workspace")
-    (package / "package.xml").write_text("<package>\n<name> hand </name></package>")
-    assert sought(tmp_path / "lab" / "arm.urdf", {}) == b"workspace"
+    for name, folder in (("other", "hand_of_others"), (" hand ", "hand_description")):
+        with pytest.raises(SettingError):
+            sought(file, {})
+        package = mesh(tmp_path / "src" / "hands" / folder, "workspace")
+        (package / "package.xml").write_text(f"<package>\n<name>{name}</name></package>")
+    assert sought(file, {}) == b"workspace"
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(package))
-    assert sought(tmp_path / "lab" / "arm.urdf", {}) == b"workspace"
+    assert sought(file, {}) == b"workspace"
 
 
 def test_the_message_lists_the_places_that_were_tried(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file, ros = tmp_path / "lab" / "arm.urdf", tmp_path / "ros"
+    file, ros, part = tmp_path / "lab" / "arm.urdf", tmp_path / "ros", "meshes/part.obj"
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(ros))
     with pytest.raises(SettingError) as refusal:
         sought(file, {})
-    above = [folder / "hand" / "meshes" / "part.obj" for folder in file.parents]
-    for place in [*above, tmp_path / "meshes" / "part.obj", ros / "hand" / "meshes" / "part.obj"]:
-        assert str(place) in str(refusal.value)
+    folders = [*(folder / "hand" for folder in file.parents), tmp_path, ros / "hand"]
+    assert all(f"{folder / part}" in str(refusal.value) for folder in folders)
     assert "robot.packages={NAME: FOLDER}" in str(refusal.value)
-    with pytest.raises(SettingError) as refusal:
-        sought(file, {"hand": tmp_path})
-    assert f"tried {tmp_path / 'meshes' / 'part.obj'};" in str(refusal.value)
-    with pytest.raises(SettingError, match=f"tried {tmp_path / 'part.obj'}$"):
-        mesh_content("part.obj", tmp_path / "arm.urdf", {}, "robot.path")
-    with pytest.raises(SettingError, match="a missing mesh"):
-        mesh_content("package://" + 9000 * "x", file, {}, "robot.path")
+    for name, packages, message in (
+        (f"package://hand/{part}", {"hand": tmp_path}, f"tried {tmp_path / part};"),
+        ("part.obj", {}, f"tried {file.with_name('part.obj')}$"),
+        ("package://" + 9000 * "x", {}, "a missing mesh"),
+    ):
+        with pytest.raises(SettingError, match=message):
+            mesh_content(name, file, packages, "robot.path")
 
 
 @pytest.mark.parametrize(

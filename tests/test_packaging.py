@@ -1,7 +1,4 @@
-"""The built wheel holds what the checkout has, and runs from any directory.
-
-Nothing here needs a network.
-"""
+"""The built wheel holds what the checkout has, and runs from any directory without a network."""
 
 import os
 import subprocess
@@ -22,12 +19,10 @@ pytestmark = pytest.mark.skipif(
 
 def execute(*command: str | Path, cwd: Path, **environment: str) -> str:
     """Run a command; return what it prints."""
-    inherited = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in ("PYTHONPATH", "EVOEXP_OUTPUTS")
-    }
-    words, variables = list(map(str, command)), inherited | environment
+    variables = os.environ | environment
+    for name in {"PYTHONPATH", "EVOEXP_OUTPUTS"} - environment.keys():
+        variables.pop(name, None)
+    words = list(map(str, command))
     done = subprocess.run(
         words, cwd=cwd, env=variables, capture_output=True, text=True, check=False
     )
@@ -36,18 +31,11 @@ def execute(*command: str | Path, cwd: Path, **environment: str) -> str:
 
 
 def pip() -> list[str]:
-    """Return the command of this environment's pip, or of the one that comes with Python.
-
-    Uv installs none.
-    """
+    """Return the command of this environment's pip, or of the one that comes with Python."""
     if find_spec("pip") is not None:
         return [sys.executable, "-m", "pip"]
-    ensurepip = find_spec("ensurepip")
-    bundled = (
-        sorted(Path(ensurepip.origin).parent.glob("_bundled/pip-*.whl"))
-        if ensurepip and ensurepip.origin
-        else []
-    )
+    place = Path(getattr(find_spec("ensurepip"), "origin", "none"))
+    bundled = sorted(place.parent.glob("_bundled/pip-*.whl"))
     if not bundled:
         pytest.skip("neither this environment nor this Python has a pip")
     return [sys.executable, str(bundled[-1] / "pip")]
@@ -65,57 +53,40 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Install the wheel alone; with this directory as PYTHONPATH it comes before the checkout."""
     directory = tmp_path_factory.mktemp("installed")
-    options = (
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-        "--disable-pip-version-check",
-        "--target",
-        directory,
-    )
-    execute(*pip(), "install", *options, wheel, cwd=directory)
+    options = ("--quiet", "--no-deps", "--no-index", "--disable-pip-version-check")
+    execute(*pip(), "install", *options, "--target", directory, wheel, cwd=directory)
     return directory
 
 
 def test_contents(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     ours = {name for name in names if not name.partition("/")[0].endswith(".dist-info")}
+    data = ("claims.yaml", "page.yaml", "claim_kinds.yaml")
     package = {
         path.relative_to(SOURCE.parent).as_posix()
         for path in SOURCE.rglob("*")
         if path.suffix in (".py", ".typed")
-        or path.name in ("claims.yaml", "page.yaml", "claim_kinds.yaml")
+        or path.name in data
+        or ("assets" in path.parts and path.is_file() and path.suffix != ".pyc")
     }
-    assets = {
-        path.relative_to(SOURCE.parent).as_posix()
-        for path in (SOURCE / "assets").rglob("*")
-        if path.is_file() and path.suffix != ".pyc"
-    }
-    conf = {
-        f"evoexp/{path.relative_to(ROOT).as_posix()}"
-        for path in (ROOT / "conf").rglob("*")
-        if path.is_file()
-    }
+    options = [path for path in (ROOT / "conf").rglob("*") if path.is_file()]
+    conf = {f"evoexp/{path.relative_to(ROOT).as_posix()}" for path in options}
     assert len(conf) > 20
     assert {"evoexp/py.typed", "evoexp/assets/shipped.json"} <= ours
-    assert ours == package | assets | conf
-    assert any(name.endswith(".dist-info/licenses/LICENSE") for name in names)
-    assert any(name.endswith(".dist-info/entry_points.txt") for name in names)
+    assert ours == package | conf
+    for ending in ("licenses/LICENSE", "entry_points.txt"):
+        assert any(name.endswith(f".dist-info/{ending}") for name in names)
 
 
-def test_the_installed_package_is_the_one_that_runs(installed: Path, tmp_path: Path) -> None:
-    code = (
-        "import evoexp, evoexp.shipped as s; print(evoexp.__file__, s.config_directory(), "
-        "sep='\\n')"
-    )
+def test_the_installed_package_and_command_are_those_that_run(
+    installed: Path, tmp_path: Path
+) -> None:
+    code = "import evoexp, evoexp.shipped as s; print(evoexp.__file__, s.config_directory())"
     printed = execute(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(installed))
-    assert printed.splitlines() == [f"{installed}/evoexp/__init__.py", f"{installed}/evoexp/conf"]
-
-
-def test_the_installed_command(installed: Path, tmp_path: Path) -> None:
-    command = installed / "bin" / "evoexp"
-    assert "reproduce" in execute(command, "--help", cwd=tmp_path, PYTHONPATH=str(installed))
-    assert "rana_planar" in execute(command, "list", cwd=tmp_path, PYTHONPATH=str(installed))
+    assert printed.split() == [f"{installed}/evoexp/__init__.py", f"{installed}/evoexp/conf"]
+    for word, part in (("--help", "reproduce"), ("list", "rana_planar")):
+        command = installed / "bin" / "evoexp"
+        assert part in execute(command, word, cwd=tmp_path, PYTHONPATH=str(installed))
 
 
 @pytest.mark.matrix

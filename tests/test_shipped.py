@@ -1,19 +1,18 @@
 """The shipped table tells the truth, and `reproduce` answers from it where nothing was ever run."""
 
 from collections import Counter
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-from composed import composed
+from composed import composed, script
 from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import fingerprint, same_fingerprint
 from evoexp.cli import main
 from evoexp.condition import Condition
+from evoexp.configuration.search_path import options
 from evoexp.shipped import Shipped
 from matrix import matrices_are_asked_for
 from shipped_conditions import EXAMPLES, KINDS, expanded, kinds_of_conditions, shipped_conditions
@@ -42,13 +41,12 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.matrix
 def test_every_shipped_condition_is_in_the_table_and_nothing_else() -> None:
     assert len(TABLE) == len(set(TABLE))
-    hashes = {row[:3]: row.condition_id for row in TABLE}
     composed = {
         (*key, budget): condition.id
         for budget in BUDGETS
         for key, condition in shipped_conditions(budget).items()
     }
-    assert hashes == composed, (
+    assert {row[:3]: row.condition_id for row in TABLE} == composed, (
         f"a shipped condition was added, removed or changed: if that was meant, {UPDATE}"
     )
 
@@ -65,39 +63,26 @@ def condition_of(row: Shipped) -> Condition:
     return composed(f"experiment={row.experiment}", f"budget={row.budget}", label=row.label)
 
 
-def is_example(row: Shipped) -> bool:
-    """Whether a row is of an experiment that the examples are taken from."""
-    return row.experiment in dict(EXAMPLES)
-
-
 SMOKE = [
-    pytest.param(row, id=f"{row.experiment}: {row.label}", marks=() if is_example(row) else MATRIX)
+    pytest.param(row, id=f"{row.experiment}: {row.label}", marks=() if is_example else MATRIX)
     for row in TABLE
-    if row.budget == "smoke" and (is_example(row) or matrices_are_asked_for())
+    if (is_example := row.experiment in dict(EXAMPLES)) or matrices_are_asked_for()
+    if row.budget == "smoke"
 ]
 
 
-def check_digest(row: Shipped) -> None:
+@pytest.mark.parametrize("row", [*SMOKE, SMALL["paper"][0]])
+def test_smoke_digests(row: Shipped) -> None:
+    """And one of a paper's budget."""
     condition = condition_of(row)
-    assert condition.id == row.condition_id, (
-        f"the condition itself changed: if that was meant, {UPDATE}"
-    )
+    meant = f"if that was meant, {UPDATE}"
+    assert condition.id == row.condition_id, f"the condition itself changed: {meant}"
     found = fingerprint(condition, run_replicate(condition, 0).summary)
     assert same_fingerprint(found, row.digest), (
         f"{row.experiment}, {row.label}, {row.budget}: the same settings give another result than "
         "before. If that was not meant, find out why; else raise `revision` of the component "
         f"whose results changed, {UPDATE}"
     )
-
-
-@pytest.mark.parametrize("row", SMOKE)
-def test_smoke_digests(row: Shipped) -> None:
-    check_digest(row)
-
-
-@pytest.mark.parametrize("row", SMALL["paper"][:1])
-def test_a_paper_digest(row: Shipped) -> None:
-    check_digest(row)
 
 
 def test_a_raised_revision_is_another_hash(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,9 +102,7 @@ def test_a_shipped_hash_matches_the_table(
     assert main(["reproduce", row.condition_id[:9]]) == 0
     printed = capsys.readouterr().out
     assert "against the shipped table: MATCH" in printed
-    assert any(
-        other.command in printed for other in TABLE if other.condition_id == row.condition_id
-    )
+    assert any(o.command in printed for o in TABLE if o.condition_id == row.condition_id)
     assert main(["reproduce", row.condition_id.upper(), "--replicate", "0"]) == 0
     assert not nowhere.exists()
 
@@ -142,8 +125,7 @@ def test_nothing_to_compare(
     assert main(["reproduce", *what]) == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("evoexp: NOTHING TO COMPARE: ")
-    assert what[0] in printed.err
-    assert printed.err.count("\n") == 1
+    assert what[0] in printed.err and printed.err.count("\n") == 1
     assert "MATCH" not in printed.out + printed.err
 
 
@@ -162,64 +144,50 @@ def test_a_hash_is_found_once_in_the_smallest_experiment_that_has_it() -> None:
 
 
 @pytest.fixture
-def update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """The script, made to write a copy of the table."""
-    spec = spec_from_loader(
-        "update_shipped", SourceFileLoader("update_shipped", str(ROOT / "scripts/update-shipped"))
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
+def update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str]]:
+    """Have the script write a copy of the table of some rows; return its exit code and the copy."""
+    module = script("update-shipped")
     monkeypatch.setattr(module, "TABLE", tmp_path / "shipped.json")
     module.TABLE.write_text("untouched")
-    return module
+
+    def run(rows: Iterable[Shipped], *words: str) -> tuple[int, str]:
+        names = [word for word in words if not word.startswith("-")] or options("experiment")
+        answers = {tuple(names): list(rows)}
+        monkeypatch.setattr(module, "rows", lambda asked: answers[tuple(asked)])
+        return module.main(list(words)), module.TABLE.read_text(encoding="utf-8")
+
+    return run
 
 
-def test_update_writes_the_table_as_it_is_stored(
-    update: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(update, "rows", lambda _: TABLE)
-    assert update.main([]) == 0
-    stored = ROOT / "src" / "evoexp" / "assets" / "shipped.json"
-    assert update.TABLE.read_text(encoding="utf-8") == stored.read_text(encoding="utf-8")
+OTHER = TABLE[0]._replace(condition_id="f" * 64, digest="0" * 32)
+Update = Callable[..., tuple[int, str]]
+
+
+def test_update_writes_the_table_and_keeps_the_rows_of_other_experiments(update: Update) -> None:
+    stored = (ROOT / "src/evoexp/assets/shipped.json").read_text(encoding="utf-8")
+    assert update(TABLE) == (0, stored)
     assert sorted(TABLE) == list(TABLE)
-
-
-def test_update_of_one_experiment_keeps_the_rows_of_all_others(
-    update: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    name = TABLE[0].experiment
-    own = [row for row in TABLE if row.experiment == name]
-    changed = own[0]._replace(condition_id="f" * 64, digest="0" * 32)
-    monkeypatch.setattr(update, "rows", lambda names: [changed, *own[1:]] if names == [name] else 0)
-    assert update.main([name]) == 0
-    written = update.TABLE.read_text(encoding="utf-8")
-    assert written == update.to_json(sorted([changed, *own[1:], *TABLE[len(own) :]]))
+    own = [row for row in TABLE if row.experiment == TABLE[0].experiment]
+    assert update([OTHER, *own[1:]], TABLE[0].experiment) == update([OTHER, *TABLE[1:]])
 
 
 def test_update_refuses_another_digest_under_the_same_hash(
-    update: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    update: Update, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(update, "rows", lambda _: [TABLE[0]._replace(digest="0" * 32), *TABLE[1:]])
-    assert update.main([]) == 1
-    assert update.TABLE.read_text() == "untouched"
+    changed = TABLE[0]._replace(digest="0" * 32)
+    assert update([changed, *TABLE[1:]]) == (1, "untouched")
     printed = capsys.readouterr().out
-    assert (
-        f"hash {TABLE[0].condition_id[:12]} as before, digest {TABLE[0].digest} → {'0' * 32}"
-        in printed
-    )
+    digests = f"digest {TABLE[0].digest} → {'0' * 32}"
+    assert f"hash {TABLE[0].condition_id[:12]} as before, {digests}" in printed
     assert "raise `revision` of the component" in printed
-    assert update.main(["--force"]) == 0
-    assert "0" * 32 in update.TABLE.read_text()
+    code, written = update([changed, *TABLE[1:]], "--force")
+    assert code == 0 and "0" * 32 in written
 
 
 def test_update_takes_a_new_hash_and_says_so(
-    update: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    update: Update, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    changed = TABLE[0]._replace(condition_id="f" * 64, digest="0" * 32)
-    monkeypatch.setattr(update, "rows", lambda _: [changed, *TABLE[2:]])
-    assert update.main([]) == 0
+    assert update([OTHER, *TABLE[2:]])[0] == 0
     printed = capsys.readouterr().out
     assert f"{', '.join(TABLE[0][:3])}: {TABLE[0].condition_id[:12]} → ffffffffffff" in printed
     assert f"{', '.join(TABLE[1][:3])}: {TABLE[1].condition_id[:12]} → gone" in printed

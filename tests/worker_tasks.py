@@ -16,20 +16,14 @@ LEAST, MOST = KILOBYTE, 50 * MEGABYTE  # [B] of a result
 
 
 class Struck(NamedTuple):
-    """A task whose worker is killed once.
+    """A task whose worker is killed once."""
 
-    Attributes:
-        number: Seeds the result.
-        size: Of the result [B].
-        delay_s: From the end of the computation to the kill by another process [s]; None: the
-            worker kills itself before it.
-        flag: A file that tells that it was killed; None: it is not.
-    """
-
-    number: int
-    size: int
+    number: int  # seeds the result
+    size: int  # of the result [B]
+    # from the end of the computation to the kill by another process [s]; None: the worker kills
+    # itself before it
     delay_s: float | None
-    flag: Path | None
+    flag: Path | None  # a file that tells that it was killed; None: it is not
 
 
 def content(number: int, size: int) -> bytes:
@@ -39,14 +33,14 @@ def content(number: int, size: int) -> bytes:
 
 def work(task: Struck) -> tuple[int, bytes, str]:
     """Compute a result; at its first time, have this process killed."""
-    if task.flag is not None and not task.flag.exists():
+    is_struck = task.flag is not None and not task.flag.exists()
+    if task.flag is not None:
         task.flag.touch()
-        if task.delay_s is None:
-            os.kill(os.getpid(), signal.SIGKILL)
-        computed = content(task.number, task.size)
+    if is_struck and task.delay_s is None:
+        os.kill(os.getpid(), signal.SIGKILL)
+    computed = content(task.number, task.size)
+    if is_struck:
         _kill_later(task.delay_s or 0.0)
-    else:
-        computed = content(task.number, task.size)
     return task.number, computed, hashlib.sha256(computed).hexdigest()
 
 

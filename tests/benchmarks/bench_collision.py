@@ -1,6 +1,4 @@
-"""Judging a population, and its touching circles alone.
-
-Beside numpy and beside Pinocchio with coal.
+"""Judging a population, and its touching circles alone, beside numpy and Pinocchio with coal.
 
 Fresh walks are judged, smoothed once: half of the instants collide at the beginning of a run,
 hardly any at its end; a population of a finished run is judged, too, because who looks at blocks of
@@ -15,103 +13,59 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.records import generations
+from evoexp.testing import conditions
 from references import rana_numpy
 
 INDIVIDUALS, INSTANTS = 100, 20
 HANDFUL = 25  # configurations that coal is given per call
 
 
-def condition() -> Condition:
-    return (
-        compose.expand(["experiment=rana_planar", "ga.population_size=100"])[0]
-        .conditions[0]
-        .condition
-    )
-
-
-def population_of(when: str) -> Any:
+def population_of(planner: Any, problem: Any, when: str) -> Any:
     """Return a population, (nq, N + 1, individuals)."""
-    given = condition()
-    planner, problem = given.prepare()
     if when == "fresh":
         return planner.sample(problem, np.random.default_rng(0), INDIVIDUALS)
     *_, last = generations(planner.evolve(problem, np.random.default_rng(0)))
     return last.population[:, :, :INDIVIDUALS].copy()
 
 
-def coal_collisions(collision: Any) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
-    """Return two functions of q (nq, configurations) [rad] that tell which collide.
-
-    Pair by pair, and by broad phase.
-
-    The first is called once per configuration and stops at the first contact. The second takes all
-    configurations in one call (a pool with one thread and a tree per configuration).
-    """
+def coal_collisions(collision: Any) -> Callable[[Any], Any]:
+    """Return a function of q (nq, configurations) [rad] that tells which collide, by one thread."""
     model, geometry, shapes = collision.assembly.model, pin.GeometryModel(), collision.shapes
     for joint, center, _, radius in zip(*shapes[:4], strict=True):
-        place = pin.SE3(np.eye(3), center)
-        geometry.addGeometryObject(
-            pin.GeometryObject("sphere", int(joint), 0, place, coal.Sphere(radius))
-        )
+        place, ball = pin.SE3(np.eye(3), center), coal.Sphere(radius)
+        geometry.addGeometryObject(pin.GeometryObject("sphere", int(joint), 0, place, ball))
     (first, stop), (second, end) = collision.arm_spheres
     for a in range(first, stop):
         for b in range(second, end):
             geometry.addCollisionPair(pin.CollisionPair(a, b))
-    data, geometry_data = model.createData(), geometry.createData()
     pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(model, geometry, 1)
-
-    def pair_by_pair(q: Any) -> Any:
-        return np.array(
-            [pin.computeCollisions(model, data, geometry, geometry_data, one, True) for one in q.T]
-        )
-
-    def broad_phase(q: Any) -> Any:
-        return pin.computeCollisionsInParallel(1, pool, q, True, False)
-
-    return pair_by_pair, broad_phase
+    return lambda q: pin.computeCollisionsInParallel(1, pool, q, True, False)
 
 
 @pytest.mark.parametrize("when", ["fresh", "finished"])
 def bench_judging(beside: Any, when: str) -> None:
-    given = condition()
+    words = "experiment=rana_planar", f"ga.population_size={INDIVIDUALS}"
+    given = next(iter(conditions(*words, budget="paper").values()))
     planner, problem = given.prepare()
-    population = population_of(when)
-    rana = rana_numpy.from_condition(given)
-    strings = (
-        np.array([population[a:b] for a, b in problem.arm_slices]).transpose(3, 0, 2, 1).copy()
-    )
-    pair_by_pair, broad_phase = coal_collisions(problem.collision)
+    population, rana = population_of(planner, problem, when), rana_numpy.from_condition(given)
+    arms = np.array([population[a:b] for a, b in problem.arm_slices])
+    strings = arms.transpose(3, 0, 2, 1).copy()
+    broad_phase = coal_collisions(problem.collision)
     every = population[:, 1:].reshape(len(population), -1)
-    some = np.deg2rad(every[:, :: every.shape[1] // HANDFUL][:, :HANDFUL])
-    expected = (
-        problem.collision.clearance(every).least[:: every.shape[1] // HANDFUL][:HANDFUL] < 0.0
-    )
-    assert np.array_equal(pair_by_pair(some), expected)
+    chosen = slice(0, HANDFUL * (every.shape[1] // HANDFUL), every.shape[1] // HANDFUL)
+    some = np.deg2rad(every[:, chosen])
+    expected = problem.collision.clearance(every).least[chosen] < 0.0
     assert np.array_equal(broad_phase(some), expected)
-    assert np.allclose(
-        rana_numpy.judge(rana, strings).cost,
-        planner.cost(problem, population).cost,
-        rtol=0.0,
-        atol=1e-9,
-    )
+    costs = rana_numpy.judge(rana, strings).cost, planner.cost(problem, population).cost
+    assert np.allclose(*costs, rtol=0.0, atol=1e-9)
+    part = HANDFUL / INSTANTS
     beside(
         f"judge {INDIVIDUALS} individuals of {INSTANTS} instants, {when}",
         lambda: planner.cost(problem, population),
         {
-            "numpy": (lambda: rana_numpy.judge(rana, strings), INDIVIDUALS, 1),
-            "Pinocchio + coal, pair by pair, collisions only": (
-                lambda: pair_by_pair(some),
-                HANDFUL / INSTANTS,
-                1,
-            ),
-            "Pinocchio + coal, broad phase, collisions only": (
-                lambda: broad_phase(some),
-                HANDFUL / INSTANTS,
-                1,
-            ),
+            "numpy": lambda: rana_numpy.judge(rana, strings),
+            "Pinocchio + coal, broad phase, collisions only": (lambda: broad_phase(some), part, 1),
         },
         unit="evaluation",
         amount=INDIVIDUALS,

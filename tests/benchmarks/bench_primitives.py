@@ -1,6 +1,4 @@
-"""Spheres and capsules of a 6R arm among ten obstacles, batches of 100.
-
-Beside Pinocchio with coal and beside numpy.
+"""Spheres and capsules among ten obstacles in batches, beside Pinocchio with coal.
 
 Two kinds of batches: configurations at random, of which two in five collide, and configurations of
 a converged population, which hardly differ. coal answers for the same arm as 11 capsules and as the
@@ -8,6 +6,7 @@ same 59 spheres; it stops at a configuration's first contact, as `collides` does
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,86 +15,64 @@ import pytest
 
 from collision.built_bodies import built, num_before_contact
 from evoexp.collision.bodies.body_collision import BodyCollision
-from evoexp.robots.kinematics import kinematic_table
 from evoexp.scenarios.obstacles import obstacle_table
-from references import arms_6r, arms_7r, primitives_numpy
+from references import arms_6r, arms_7r
 
 SIZE, MANY = 100, 4000
 IGNORED = [(1, arms_6r.FLOOR)]
-DRAWN = {"random": arms_6r.random_configurations, "population": arms_6r.population}
-DRAWN_7R = {"random": arms_7r.random_configurations, "population": arms_7r.population}
+TABLE = obstacle_table(arms_6r.OBSTACLES)
+DRAWN = ("random", "population")
+SPHERES, CAPSULES = "coal, broad phase, 59 spheres", "coal, broad phase, 11 capsules"
+
+
+def drawn_from(arm: Any, drawn: str, size: int = SIZE) -> Any:
+    return (arm.random_configurations if drawn == "random" else arm.population)(size)
 
 
 def collision_of(shapes: str) -> BodyCollision:
     model = arms_6r.model()
-    table = obstacle_table(arms_6r.OBSTACLES)
-    return built(
-        model,
-        arms_6r.shapes_of(getattr(arms_6r, shapes)(model)),
-        table,
-        arms_6r.SELF_PAIRS,
-        IGNORED,
-    )
+    packed = arms_6r.shapes_of(getattr(arms_6r, shapes)(model))
+    return built(model, packed, TABLE, arms_6r.SELF_PAIRS, IGNORED)
 
 
 def collision_of_7r() -> BodyCollision:
-    table = obstacle_table(arms_7r.OBSTACLES)
-    return built(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
+    obstacles = obstacle_table(arms_7r.OBSTACLES)
+    return built(arms_7r.model(), arms_7r.shapes(), obstacles, arms_7r.SELF_PAIRS)
 
 
-def coal_collisions(shapes: str, broad_phase: bool) -> Callable[[Any], Any]:
+def scene_of(shapes: str) -> tuple[Any, Any]:
+    """Return the 6R arm's model, and its geometry among the obstacles."""
+    model = arms_6r.model()
+    geometry = getattr(arms_6r, shapes)(model)
+    pairs = (arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED)
+    return model, arms_6r.with_obstacles(geometry, *pairs)
+
+
+def scene_of_7r() -> tuple[Any, Any]:
+    model = arms_7r.model()
+    return model, arms_7r.geometry(model)
+
+
+def broad_phase(scene: tuple[Any, Any]) -> Callable[[Any], Any]:
     """Return a function of q (nq, configurations): which collide, by a pool of one thread."""
-    model = arms_6r.model()
-    scene = arms_6r.with_obstacles(
-        getattr(arms_6r, shapes)(model), arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED
-    )
-    if broad_phase:
-        pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(model, scene, 1)
-    else:
-        pool = pin.GeometryPool(model, scene, 1)
+    pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(*scene, 1)
     return lambda q: pin.computeCollisionsInParallel(1, pool, q, True, False)
-
-
-def numpy_clearance() -> Callable[[Any], Any]:
-    """Return a function of q (nq, configurations): the least clearance of the spheres."""
-    model = arms_6r.model()
-    table = obstacle_table(arms_6r.OBSTACLES)
-    shapes = arms_6r.shapes_of(arms_6r.spheres(model))
-    chain = kinematic_table(model)
-    local = np.array([chain.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)])
-    checked = np.ones((len(shapes.joint), len(table.kind)), dtype=bool)
-    for joint, k in IGNORED:
-        checked[shapes.joint == joint, k] = False
-    scene = arms_6r.with_obstacles(
-        arms_6r.spheres(model), arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED
-    )
-    pairs = np.array(
-        [(p.first, p.second) for p in scene.collisionPairs if p.second < len(shapes.joint)]
-    )
-
-    def clearance(q: Any) -> Any:
-        centers = primitives_numpy.sphere_centers(chain, shapes.joint - 1, local, q)
-        outside = primitives_numpy.to_obstacles(centers, shapes.radius, table, checked)
-        return np.minimum(outside, primitives_numpy.to_self(centers, shapes.radius, *pairs.T))
-
-    return clearance
 
 
 @pytest.mark.parametrize("drawn", DRAWN)
 @pytest.mark.parametrize("shapes", ["spheres", "capsules"])
 def bench_collides(beside: Any, shapes: str, drawn: str) -> None:
-    collision, q = collision_of(shapes), DRAWN[drawn](SIZE)
+    collision, q = collision_of(shapes), drawn_from(arms_6r, drawn)
     references = {
-        "coal, broad phase, 11 capsules": coal_collisions("capsules", broad_phase=True),
-        "coal, broad phase, 59 spheres": coal_collisions("spheres", broad_phase=True),
-        "coal, pair by pair, 11 capsules": coal_collisions("capsules", broad_phase=False),
+        CAPSULES: broad_phase(scene_of("capsules")),
+        SPHERES: broad_phase(scene_of("spheres")),
     }
-    same = coal_collisions(shapes, broad_phase=True)
+    same = references[SPHERES if shapes == "spheres" else CAPSULES]
     assert np.array_equal(collision.collides(q), same(q))
     beside(
         f"collisions of a 6R arm, {shapes}, {SIZE} {drawn} configurations",
         lambda: collision.collides(q),
-        {name: (lambda one=one: one(q), SIZE, 1) for name, one in references.items()},
+        {name: partial(reference, q) for name, reference in references.items()},
         unit="configuration",
         amount=SIZE,
         repeat=10,
@@ -109,29 +86,25 @@ def bench_collides_7r(beside: Any, drawn: str, size: int) -> None:
 
     Of `MANY` configurations no processor remembers which way the branches went the last time.
     """
-    model, collision = arms_7r.model(), collision_of_7r()
-    q = DRAWN_7R[drawn](size)
-    pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
-        model, arms_7r.geometry(model), 1
+    collision, q, coal = (
+        collision_of_7r(),
+        drawn_from(arms_7r, drawn, size),
+        broad_phase(scene_of_7r()),
     )
     some = np.ascontiguousarray(q[:, :SIZE])
-    hits = pin.computeCollisionsInParallel(1, pool, some, True, False)
-    assert np.array_equal(collision.collides(q)[:SIZE], hits)
+    assert np.array_equal(collision.collides(q)[:SIZE], coal(some))
     edges = [np.ascontiguousarray(q[:, k : k + 20]) for k in range(0, SIZE, 20)]
+
+    def any_of_20() -> None:
+        for edge in edges:
+            num_before_contact(collision, edge)
+
     beside(
         f"collisions of a 7R arm, 59 spheres, {size} {drawn} configurations",
         lambda: collision.collides(q),
         {
-            "coal, broad phase, 59 spheres": (
-                lambda: pin.computeCollisionsInParallel(1, pool, some, True, False),
-                SIZE,
-                1,
-            ),
-            "whether any of 20 collides": (
-                lambda: [num_before_contact(collision, edge) for edge in edges],
-                SIZE,
-                10,
-            ),
+            SPHERES: (lambda: coal(some), SIZE, 1),
+            "whether any of 20 collides": (any_of_20, SIZE, 10),
         },
         unit="configuration",
         amount=size,
@@ -139,70 +112,32 @@ def bench_collides_7r(beside: Any, drawn: str, size: int) -> None:
     )
 
 
-@pytest.mark.parametrize("limit", [0.05, np.inf])
 @pytest.mark.parametrize("drawn", DRAWN)
-def bench_clearance(beside: Any, drawn: str, limit: float) -> None:
-    collision, q, plain = collision_of("spheres"), DRAWN[drawn](SIZE), numpy_clearance()
-    broad_phase = coal_collisions("capsules", broad_phase=True)
-    assert (
-        np.abs(
-            np.minimum(plain(q), limit) - np.minimum(collision.clearance(q, limit).least, limit)
-        ).max()
-        < 1e-12
-    )
+def bench_clearance(beside: Any, drawn: str) -> None:
+    collision, q = collision_of("spheres"), drawn_from(arms_6r, drawn)
+    coal = broad_phase(scene_of("capsules"))
     beside(
-        f"clearances of 59 spheres below {limit}, {SIZE} {drawn} configurations",
-        lambda: collision.clearance(q, limit),
-        {
-            "numpy": (lambda: plain(q), SIZE, 1),
-            "coal, broad phase, 11 capsules, collisions only": (lambda: broad_phase(q), SIZE, 1),
-        },
+        f"clearances of 59 spheres, {SIZE} {drawn} configurations",
+        lambda: collision.clearance(q),
+        {f"{CAPSULES}, collisions only": lambda: coal(q)},
         unit="configuration",
         amount=SIZE,
         repeat=10,
     )
 
 
-@pytest.mark.parametrize("shapes", ["spheres", "capsules"])
-def bench_collides_one_by_one(beside: Any, shapes: str) -> None:
+@pytest.mark.parametrize("arm", ["6R arm, spheres", "6R arm, capsules", "7R arm, 59 spheres"])
+def bench_collides_one_by_one(beside: Any, arm: str) -> None:
     """What a planner pays that asks for one configuration at a time: eight are computed."""
-    collision, q = collision_of(shapes), arms_6r.random_configurations(SIZE)
+    own, is_6r = (arms_6r, True) if arm.startswith("6R") else (arms_7r, False)
+    collision = collision_of(arm.partition(", ")[2]) if is_6r else collision_of_7r()
+    coal = broad_phase(scene_of("capsules") if is_6r else scene_of_7r())
+    q = drawn_from(own, "random")
     every = [np.ascontiguousarray(q[:, k : k + 1]) for k in range(SIZE)]
-    broad_phase = coal_collisions("capsules", broad_phase=True)
     beside(
-        f"collisions of a 6R arm, {shapes}, a single configuration",
+        f"collisions of a {arm}, a single configuration",
         lambda: [collision.collides(one) for one in every],
-        {
-            "coal, broad phase, 11 capsules": (
-                lambda: [broad_phase(one) for one in every],
-                SIZE,
-                1,
-            )
-        },
-        unit="configuration",
-        amount=SIZE,
-    )
-
-
-def bench_collides_one_by_one_7r(beside: Any) -> None:
-    model, collision = arms_7r.model(), collision_of_7r()
-    q = arms_7r.random_configurations(SIZE)
-    every = [np.ascontiguousarray(q[:, k : k + 1]) for k in range(SIZE)]
-    pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
-        model, arms_7r.geometry(model), 1
-    )
-    beside(
-        "collisions of a 7R arm, 59 spheres, a single configuration",
-        lambda: [collision.collides(one) for one in every],
-        {
-            "coal, broad phase, 59 spheres": (
-                lambda: [
-                    pin.computeCollisionsInParallel(1, pool, one, True, False) for one in every
-                ],
-                SIZE,
-                1,
-            )
-        },
+        {CAPSULES if is_6r else SPHERES: lambda: [coal(one) for one in every]},
         unit="configuration",
         amount=SIZE,
     )

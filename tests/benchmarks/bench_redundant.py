@@ -1,9 +1,5 @@
-"""Redundant arms among ellipses: path checks, a generation, a replicate.
+"""Redundant arms among ellipses: path checks and replicates, beside straightforward versions."""
 
-Beside straightforward versions.
-"""
-
-from collections.abc import Callable
 from typing import Any
 
 import numba
@@ -11,38 +7,21 @@ import numpy as np
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.configuration import compose
-from evoexp.planners.reaching_tasks import Problem
-from evoexp.records import FloatArray, generations
+from evoexp.records import generations
+from evoexp.testing import conditions
 
 NUM_PATHS = 800
 
 
-def condition(experiment: str) -> Condition:
-    return compose.expand([f"experiment={experiment}"])[0].conditions[0].condition
-
-
-def num_tests(problem: Problem) -> int:
-    """Return segment–ellipse tests that one path asks for.
-
-    Links at M positions, chords of their ends between them.
-    """
-    return (
-        2
-        * problem.collision.path.num_positions
-        * len(problem.start)
-        * len(problem.collision.ellipses[0])
-    )
+def lavoie() -> Condition:
+    return next(iter(conditions("experiment=lavoie_7dof", budget="paper").values()))
 
 
 @numba.njit(cache=True)
 def straightforward(  # type: ignore[no-untyped-def]
     starts, ends, lengths, centers, semi_axes, angles, num_positions, hit
 ):
-    """Everything in its obvious place.
-
-    Libm's sines, one individual, one position, one segment at a time.
-    """
+    """Everything in its obvious place: one individual, one position, one segment at a time."""
     num = len(lengths)
     before, now = np.zeros((num + 1, 2)), np.zeros((num + 1, 2))
     for k in range(starts.shape[1]):
@@ -79,77 +58,36 @@ def touches(p, q, center, semi_axes, angle):  # type: ignore[no-untyped-def]
     return u * u + v * v <= 1.0
 
 
-def paths(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Return paths from the start that do not collide, so that every test is made.
-
-    Small turns, (N, NUM_PATHS) each.
-    """
+def bench_free_paths(beside: Any) -> None:
+    """Whole path checks: small turns from the start, so that no collision leaves out a test."""
+    _, problem = lavoie().prepare()
     starts = np.repeat(problem.start[:, None], NUM_PATHS, axis=1)
-    return starts, starts + np.random.default_rng(0).uniform(-0.05, 0.05, starts.shape)
-
-
-def obvious_check(
-    problem: Problem, starts: FloatArray, ends: FloatArray
-) -> Callable[[], np.ndarray]:
-    """Return a function that checks paths the straightforward way.
-
-    It has found what the kernel finds.
-    """
+    ends = starts + np.random.default_rng(0).uniform(-0.05, 0.05, starts.shape)
     table, hit = problem.collision.obstacles, np.empty(NUM_PATHS, dtype=np.bool_)
     angles = np.arctan2(table.rotation[:, 3], table.rotation[:, 0])
-    about = (
-        problem.collision.arm.lengths,
-        table.center[:, :2].copy(),
-        table.size[:, :2].copy(),
-        angles,
-    )
+    about = problem.collision.arm.lengths, table.center[:, :2].copy(), table.size[:, :2].copy()
+    num_positions = problem.collision.path.num_positions
 
-    def check() -> np.ndarray:
-        straightforward(starts, ends, *about, problem.collision.path.num_positions, hit)
-        return hit
+    def obvious() -> None:
+        straightforward(starts, ends, *about, angles, num_positions, hit)
 
-    assert np.array_equal(check(), problem.collision.collide(starts, ends))
-    return check
-
-
-def bench_free_paths(beside: Any) -> None:
-    """Whole path checks, no test left out by an early collision."""
-    _, problem = condition("lavoie_7dof").prepare()
-    starts, ends = paths(problem)
-    obvious = obvious_check(problem, starts, ends)
-    assert not obvious().any()
+    obvious()
+    assert not hit.any() and np.array_equal(hit, problem.collision.collide(starts, ends))
+    # links at M positions, chords of their ends between them
+    places = 2 * num_positions * len(problem.start)
     beside(
         "segment–ellipse tests, lavoie_7dof, collision-free paths",
         lambda: problem.collision.collide(starts, ends),
-        {"straightforward numba": (obvious, NUM_PATHS * num_tests(problem), 1)},
+        {"straightforward numba": obvious},
         unit="test",
-        amount=NUM_PATHS * num_tests(problem),
-        rounds=20,
-    )
-
-
-def bench_initial_population(beside: Any) -> None:
-    """Paths to random postures as the first generation has them.
-
-    A collision ends a path's tests.
-    """
-    planner, problem = condition("lavoie_10dof").prepare()
-    ends = planner.sample(problem, np.random.default_rng(1), NUM_PATHS)[0]
-    starts = np.repeat(problem.start[:, None], NUM_PATHS, axis=1)
-    obvious = obvious_check(problem, starts, ends)
-    beside(
-        "path checks of a random population, lavoie_10dof",
-        lambda: problem.collision.collide(starts, ends),
-        {"straightforward numba": (obvious, NUM_PATHS, 1)},
-        unit="path",
-        amount=NUM_PATHS,
+        amount=NUM_PATHS * places * len(problem.collision.ellipses[0]),
         rounds=20,
     )
 
 
 def bench_replicates(beside: Any) -> None:
     """The same 20 replicates each round, with log and verdict."""
-    given = condition("lavoie_7dof")
+    given = lavoie()
     planner, problem = given.prepare()
 
     def ours() -> None:
@@ -165,7 +103,7 @@ def bench_replicates(beside: Any) -> None:
     beside(
         "a replicate with log and verdict, lavoie_7dof",
         ours,
-        {"the planner alone": (planning, 20, 1)},
+        {"the planner alone": planning},
         unit="replicate",
         amount=20,
         rounds=5,

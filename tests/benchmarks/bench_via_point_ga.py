@@ -1,6 +1,4 @@
-"""The planner of Rana & Zalzala.
-
-Its steps, a generation and a whole replicate, beside the same planner in numpy.
+"""The planner of Rana & Zalzala, its steps and whole replicates, beside the same in numpy.
 
 Both measure arc length equally well: 8 speeds per segment are about as accurate as 16 chords
 (`paths.redistribution`).
@@ -14,10 +12,10 @@ import pytest
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.configuration import compose
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.via_point_ga.strings import PER_CALL
 from evoexp.records import generations
+from evoexp.testing import conditions
 from paths.string_operators import redistribute, relax
 from references import rana_numpy
 
@@ -25,18 +23,15 @@ LATER = 50  # generation from which on single generations are measured: collisio
 
 
 def condition(*overrides: str) -> Condition:
-    return compose.expand(["experiment=rana_planar", *overrides])[0].conditions[0].condition
+    every = conditions("experiment=rana_planar", *overrides, budget="paper")
+    return next(iter(every.values()))
 
 
 def crossed(given: Condition, count: int) -> Any:
-    """Return strings as redistribution meets them, (individuals, arms, N + 1, joints).
-
-    Smooth ones, once crossed.
-    """
+    """Return smooth strings, once crossed, (individuals, arms, N + 1, joints)."""
     rana, rng = rana_numpy.from_condition(given, crossover_rate=1.0), np.random.default_rng(0)
-    return rana_numpy.crossover(
-        rana, rng, rana_numpy.smooth(rana, rana_numpy.walks(rana, rng, count))
-    )
+    walks = rana_numpy.smooth(rana, rana_numpy.walks(rana, rng, count))
+    return rana_numpy.crossover(rana, rng, walks)
 
 
 def bench_redistribution_and_relaxation(beside: Any) -> None:
@@ -86,13 +81,8 @@ def bench_generation(beside: Any) -> None:
 
 @pytest.mark.parametrize("label", ["via-point GA", "random search"])
 def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
-    """A replicate of the paper's budget with its log.
-
-    And its CPU seconds as the summary has them.
-    """
-    conditions = compose.expand(["experiment=rana_planar"])[0].conditions
-    given = next(one.condition for one in conditions if one.label == label)
-    cpu: list[float] = []
+    """A replicate of the paper's budget with its log, and its CPU seconds in the summary."""
+    given, cpu = conditions("experiment=rana_planar", budget="paper")[label], list[float]()
 
     def ours() -> None:
         cpu.append(run_replicate(given, len(cpu)).summary.cpu_s)
@@ -106,8 +96,6 @@ def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
                 pass
 
         references["numpy + scipy, a tenth of the generations, no log"] = (tenth, 0.1, 1)
-    ours()
-    cpu.clear()
     beside(
         f"a replicate with its log, {label} (500 generations)",
         ours,
@@ -116,8 +104,5 @@ def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
         rounds=20,
     )
     cpu = cpu[-20:]  # without the warm-up
-    benchmark.extra_info["cpu_s"] = {
-        "min": min(cpu),
-        "median": float(np.median(cpu)),
-        "replicates": len(cpu),
-    }
+    seconds = {"min": min(cpu), "median": float(np.median(cpu)), "replicates": len(cpu)}
+    benchmark.extra_info["cpu_s"] = seconds

@@ -12,38 +12,31 @@ from typing import Any
 import pytest
 
 Work = Callable[[], object]
+Reference = Work | tuple[Work, float, int]  # a function, units of work of a call, calls a round
 
 
 @pytest.fixture
 def beside(benchmark: Any) -> Callable[..., None]:
-    """Return a function that times `ours` by pytest-benchmark and, before each of its rounds.
-
-    The references.
-
-    Its arguments:
-        work: What is done, with its size; a row of the table that `scripts/benchmark` prints.
-        ours: Called `repeat` times a round; does `amount` units of work.
-        references: Name → (function, units of work that one call does, calls a round).
-        unit: Of work.
-        amount: See `ours`.
-        repeat: See `ours`.
-        rounds: Rounds.
-    """
+    """Return a function that times `ours` and, before each of its rounds, the references."""
 
     def measure(
-        work: str,
-        ours: Work,
-        references: dict[str, tuple[Work, float, int]],
-        unit: str,
+        work: str,  # with its size; a row of the table that `scripts/benchmark` prints
+        ours: Work,  # called `repeat` times a round; does `amount` units of work
+        references: dict[str, Reference],  # alone: one call does `amount` units of work
+        unit: str,  # of work
         amount: float = 1.0,
         repeat: int = 1,
         rounds: int = 50,
     ) -> None:
-        seconds: dict[str, list[float]] = {name: [] for name in references}
+        whole = {k: r if isinstance(r, tuple) else (r, amount, 1) for k, r in references.items()}
+        seconds: dict[str, list[float]] = {name: [] for name in whole}
 
         def time_references() -> None:
-            for name, (reference, units, calls) in references.items():
-                seconds[name].append(timed(reference, calls) / (calls * units))
+            for name, (reference, units, calls) in whole.items():
+                begin = time.process_time()
+                for _ in range(calls):
+                    reference()
+                seconds[name].append((time.process_time() - begin) / (calls * units))
 
         def repeated() -> None:
             for _ in range(repeat):
@@ -55,33 +48,19 @@ def beside(benchmark: Any) -> Callable[..., None]:
         )
         each = [t / (repeat * amount) for t in benchmark.stats.stats.data]
         benchmark.group = benchmark.group or "ratios"
-        benchmark.extra_info |= {"work": work, "unit": unit, "ours": spread(each), "references": {}}
-        for name, taken in seconds.items():
-            taken = taken[-len(each) :]  # the warm-up's is not counted
-            ratios = [theirs / mine for theirs, mine in zip(taken, each, strict=True)]
-            row = {
-                "time": spread(taken),
-                "of_minima": min(taken) / min(each),
-                "median": statistics.median(ratios),
-                "noise": noise(ratios),
-            }
-            benchmark.extra_info["references"][name] = row
+        rows = {name: compared(taken[-len(each) :], each) for name, taken in seconds.items()}
+        own = {"work": work, "unit": unit, "ours": spread(each), "references": rows}
+        benchmark.extra_info |= own
 
     return measure
 
 
-def timed(work: Work, calls: int) -> float:
-    """Return the processor time that some calls take [s]."""
-    begin = time.process_time()
-    for _ in range(calls):
-        work()
-    return time.process_time() - begin
-
-
-def noise(ratios: list[float]) -> float:
-    """Return half of the interquartile range of ratios, relative to their median."""
+def compared(theirs: list[float], ours: list[float]) -> dict[str, Any]:
+    """Return times of a reference, and ratios with half of their interquartile range as noise."""
+    ratios = [their / our for their, our in zip(theirs, ours, strict=True)]
     low, middle, high = statistics.quantiles(ratios, n=4)
-    return (high - low) / (2.0 * middle)
+    row = {"time": spread(theirs), "of_minima": min(theirs) / min(ours)}
+    return row | {"median": statistics.median(ratios), "noise": (high - low) / (2.0 * middle)}
 
 
 def spread(seconds: list[float]) -> dict[str, float]:

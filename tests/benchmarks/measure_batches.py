@@ -26,19 +26,12 @@ SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER: orphans of a command are this process'
 
 
 class Spent(NamedTuple):
-    """Resources of a command.
+    """Resources of a command."""
 
-    Attributes:
-        wall_s: Time [s].
-        cpu_s: CPU time of all of its processes [s].
-        main_s: CPU time of the command's own process, which writes what comes back [s].
-        memory_mb: Peak memory of the command's own process [MB].
-    """
-
-    wall_s: float
-    cpu_s: float
-    main_s: float
-    memory_mb: float
+    wall_s: float  # [s]
+    cpu_s: float  # of all of its processes [s]
+    main_s: float  # CPU time of its own process, which writes what comes back [s]
+    memory_mb: float  # peak of its own process [MB]
 
 
 def spent(outputs: Path, *words: str) -> Spent:
@@ -76,7 +69,7 @@ def _own(process: int) -> tuple[float, float]:
     return ticks / os.sysconf("SC_CLK_TCK"), int(peak) * TO_MEGABYTES
 
 
-def batch(count: int, runner: str) -> str:
+def batch(count: int, runner: str) -> dict[str, str]:
     """Run so many replicates; return a row of the table."""
     with tempfile.TemporaryDirectory() as folder:
         outputs = Path(folder)
@@ -87,20 +80,18 @@ def batch(count: int, runner: str) -> str:
         planner = sum(pq.read_table(summary, columns=["cpu_s"])["cpu_s"].to_pylist())
         size = sum(path.stat().st_blocks * 512 for path in outputs.rglob("*"))
         again, listed = spent(outputs, "run", *asked), spent(outputs, "list")
-    each = (first.cpu_s - planner) / count
-    cells = (
-        f"{count:,}".replace(",", " "),
-        f"{first.wall_s:.1f} s",
-        f"{first.cpu_s:.1f} s",
-        f"{planner:.1f} s",
-        f"{1e3 * each:.2f} ms",
-        f"{first.main_s:.1f} s",
-        f"{first.memory_mb:.0f} MB",
-        f"{size / 1e6:.1f} MB",
-        f"{again.wall_s:.1f} s",
-        f"{listed.wall_s:.1f} s",
-    )
-    return f"| {' | '.join(cells)} |"
+    return {
+        "replicates": f"{count:,}".replace(",", " "),
+        "time": f"{first.wall_s:.1f} s",
+        "CPU time of all processes": f"{first.cpu_s:.1f} s",
+        "of it planners": f"{planner:.1f} s",
+        "the rest per replicate": f"{1e3 * (first.cpu_s - planner) / count:.2f} ms",
+        "main process": f"{first.main_s:.1f} s",
+        "its peak memory": f"{first.memory_mb:.0f} MB",
+        "on disk": f"{size / 1e6:.1f} MB",
+        "again": f"{again.wall_s:.1f} s",
+        "list": f"{listed.wall_s:.1f} s",
+    }
 
 
 def main() -> None:
@@ -113,12 +104,11 @@ def main() -> None:
     runner = "dask" if arguments.dask else "loky"
     with tempfile.TemporaryDirectory() as folder:  # compiles
         spent(Path(folder), "run", *CONDITION, f"runner={runner}")
-    heads = "replicates, time, CPU time of all processes, of it planners, the rest per replicate"
-    heads += ", main process, its peak memory, on disk, again, list"
-    names = heads.split(", ")
-    print(f"| {' | '.join(names)} |\n|{' --- |' * len(names)}")
-    for count in arguments.counts:
-        print(batch(count, runner), flush=True)
+    for k, count in enumerate(arguments.counts):
+        row = batch(count, runner)
+        if k == 0:
+            print(f"| {' | '.join(row)} |\n|{' --- |' * len(row)}")
+        print(f"| {' | '.join(row.values())} |", flush=True)
 
 
 if __name__ == "__main__":

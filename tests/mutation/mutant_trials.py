@@ -32,11 +32,6 @@ class Outcome(NamedTuple):
     text: str  # the test that failed, or the reason why none did
 
 
-def copy_tree(tree: Path, place: Path) -> Path:
-    """Copy a checkout without what was made in it."""
-    return Path(shutil.copytree(tree, place, ignore=LEFT_OUT))
-
-
 def _copy_if_there(file: str, place: str) -> None:
     """Copy a file, unless another process removed it meanwhile."""
     with contextlib.suppress(FileNotFoundError):
@@ -46,9 +41,8 @@ def _copy_if_there(file: str, place: str) -> None:
 def near_tests(tree: Path, module: Path) -> list[list[str]]:
     """Choose the tests that may kill the mutants of a module.
 
-    Returns:
-        Files that mirror the module or import it, through as few other modules as may be; then all
-        others of the folder that mirrors its room, those that reach it soonest first.
+    First files that mirror it or import it, through as few other modules as may be; then all others
+    of the folder that mirrors its room.
     """
     parts = module.relative_to(PACKAGE).with_suffix("").parts
     folder = tree / "tests"
@@ -56,29 +50,20 @@ def near_tests(tree: Path, module: Path) -> list[list[str]]:
         folder = folder / part if (folder / part).is_dir() else folder
     files = folder.glob("test_*.py" if folder == tree / "tests" else "**/test_*.py")
     room = [path.relative_to(tree).as_posix() for path in sorted(files)]
-    mirrored = [
-        file
-        for part in reversed(parts)
-        for file in room
-        if Path(file).stem.startswith(f"test_{part.removesuffix('_kernels')}")
-    ]
-    levels = _importing(tree, module.as_posix())
-    nearest = sorted(levels[0], key=lambda file: file not in room) if levels else []
-    near = list(dict.fromkeys([*mirrored, *nearest]))
-    later = [file for level in levels for file in level if file in room]
-    return [near, [file for file in dict.fromkeys([*later, *room]) if file not in near]]
-
-
-def _importing(tree: Path, file: str) -> list[list[str]]:
-    """Return the test files that import a module: itself, then what imports it, and so on."""
-    imports, levels, reached, edge = _imports(tree), [], {file}, {file}
-    while edge:
+    stems = [f"test_{part.removesuffix('_kernels')}" for part in reversed(parts)]
+    near = [file for stem in stems for file in room if Path(file).stem.startswith(stem)]
+    imports, edge = _imports(tree), {module.as_posix()}
+    reached, levels = set(edge), list[list[str]]()
+    while edge:  # what imports the module, what imports that, and so on
         names = {_dotted(one) for one in edge}
         edge = {one for one, modules in imports.items() if modules & names} - reached
         reached |= edge
-        if tests := sorted(one for one in edge if Path(one).stem.startswith("test_")):
-            levels.append(tests)
-    return levels
+        tests = sorted(one for one in edge if Path(one).stem.startswith("test_"))
+        levels += [tests] if tests else []
+    near += sorted(levels[0], key=lambda file: file not in room) if levels else []
+    others = [file for level in levels for file in level if file in room]
+    near = list(dict.fromkeys(near))
+    return [near, [file for file in dict.fromkeys([*others, *room]) if file not in near]]
 
 
 def _dotted(file: str) -> str:
@@ -105,7 +90,7 @@ class Trials:
     def __init__(self, tree: Path, place: Path) -> None:
         """Copy the tree into an empty folder."""
         self._place = place  # its bytecode lies elsewhere if a prefix is set; it is small
-        self.tree = copy_tree(tree, place / "tree")
+        self.tree = Path(shutil.copytree(tree, place / "tree", ignore=LEFT_OUT))
         shutil.copytree(cache_root(), place / "cache", copy_function=_copy_if_there)
         self._count = 0
 
@@ -148,18 +133,10 @@ class Trials:
         place = self._place / "run"
         shutil.copytree(self._place / "cache", place / "cache")
         (place / "tmp").mkdir()
-        inherited = {
-            name: value
-            for name, value in os.environ.items()
-            if not name.startswith(("EVOEXP", "PYTEST"))
-        }
-        mine = inherited | {
-            "PYTHONPATH": str(self.tree / "src"),
-            "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
-            "EVOEXP_CACHE": str(place / "cache"),
-            "EVOEXP_OUTPUTS": str(place / "outputs"),
-            "TMPDIR": str(place / "tmp"),
-        }
+        mine = {k: v for k, v in os.environ.items() if not k.startswith(("EVOEXP", "PYTEST"))}
+        mine |= {"PYTHONPATH": str(self.tree / "src"), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+        folders = {"EVOEXP_CACHE": "cache", "EVOEXP_OUTPUTS": "outputs", "TMPDIR": "tmp"}
+        mine |= {name: str(place / folder) for name, folder in folders.items()}
         options = ["-x", "-q", "-rfE", "--tb=no", "-p", "pytest_timeout", f"--timeout={TEST_S}"]
         process = subprocess.Popen(
             [sys.executable, "-m", "pytest", *options, *names],

@@ -68,10 +68,8 @@ def mutants_of(file: str, source: str) -> Iterator[tuple[str, Mutant]]:
         return starts[line - 1] + len(lines[line - 1].encode()[:column].decode())
 
     for kind, node, text in _borders(ast.parse(source)):
-        start, end = (
-            place(node.lineno, node.col_offset),
-            place(node.end_lineno, node.end_col_offset),
-        )
+        start = place(node.lineno, node.col_offset)
+        end = place(node.end_lineno, node.end_col_offset)
         yield kind, changed_text(file, source, start, end, text)
 
 
@@ -117,9 +115,8 @@ def _variants(node: ast.expr) -> Iterator[tuple[str, str]]:
             yield "sign", f"({ast.unparse(operand)})"
         case ast.BinOp(left, operator, right):
             swapped = f"({ast.unparse(ast.BinOp(right, operator, left))})"
-            if isinstance(operator, ast.MatMult) or (
-                isinstance(operator, ast.Mult) and MOTION.search(ast.unparse(node))
-            ):
+            is_motion = isinstance(operator, ast.Mult) and MOTION.search(ast.unparse(node))
+            if is_motion or isinstance(operator, ast.MatMult):
                 yield "order of composition", swapped
             if type(operator) in FLIPPED and not (_is_sequence(left) or _is_sequence(right)):
                 flipped = ast.BinOp(left, FLIPPED[type(operator)](), right)
@@ -158,13 +155,7 @@ def _variants_of_call(function: str, words: list[str]) -> Iterator[tuple[str, st
 
 
 def drawn(tree: Path, seed: int, count: int) -> list[Mutant]:
-    """Draw mutants of all rooms in turn, and of all kinds that a file has with equal chance.
-
-    Args:
-        tree: A checkout.
-        seed: The same seed draws the same mutants of the same code.
-        count: How many; those that are known to change nothing are not counted.
-    """
+    """Draw so many mutants of all rooms in turn, and of all kinds that a file has, by a seed."""
     equivalent = {(row["file"], row["before"], row["after"]) for row in entries("equivalent")}
     rooms = defaultdict[str, list[Path]](list)
     for path in sorted((tree / PACKAGE).rglob("*.py")):

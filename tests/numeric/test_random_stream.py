@@ -1,5 +1,8 @@
 """Uniform numbers in blocks: the same numbers in the same order, wherever blocks end."""
 
+import struct
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -48,10 +51,8 @@ def test_behind_its_end_a_block_gives_zeros_and_says_so() -> None:
 
 
 def test_indices_stay_below_their_count() -> None:
-    block = Block(
-        np.array([0.0, 0.5, np.nextafter(1.0, 0.0), np.nextafter(1.0, 0.0)]),
-        np.zeros(1, dtype=np.int64),
-    )
+    almost = np.nextafter(1.0, 0.0)
+    block = Block(np.array([0.0, 0.5, almost, almost]), np.zeros(1, dtype=np.int64))
     assert [draw_index(block, count) for count in (3, 3, 3, 2**53)] == [0, 1, 2, 2**53 - 1]
 
 
@@ -65,31 +66,42 @@ def test_indices_stay_below_their_count() -> None:
 )
 def test_steps_take_numbers_that_are_drawn_ahead(wanted: tuple[int, list[list[int]]]) -> None:
     most, blocks = wanted
-    own, step_by_step = rng(), rng()
-    ahead = DrawnAhead(own, most)
+    ahead, step_by_step = DrawnAhead(rng(), most), rng()
     for counts in blocks:
         numbers, begin = ahead.draw(len(counts)), 0
         assert len(numbers) >= most * len(counts)
         for count, state in zip(counts, ahead.take(counts), strict=True):
-            expected = step_by_step.random(count)
-            assert np.array_equal(numbers[begin : begin + count], expected)
+            assert np.array_equal(numbers[begin : begin + count], step_by_step.random(count))
             assert state == state_bytes(step_by_step.bit_generator)
             begin += count
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 1000])
-@pytest.mark.parametrize("has_half", [False, True])
-def test_states_behind_steps_are_those_that_drawing_leads_to(count: int, has_half: bool) -> None:
-    rng = np.random.default_rng(3)
-    if has_half:
-        rng.integers(0, 10, dtype=np.uint32)
-    before = state_bytes(rng.bit_generator)
-    found = states_behind(before, [count] * 5)
-    for state in found:
-        rng.random(count)
-        assert state_bytes(rng.bit_generator) == state
+def test_states_behind_steps_are_those_that_drawing_leads_to(count: int) -> None:
+    """With and without the other half of a number of which 32 bits were drawn."""
+    generator = rng()
+    for draw_before in (lambda: None, lambda: generator.integers(0, 10, dtype=np.uint32)):
+        draw_before()
+        for state in states_behind(state_bytes(generator.bit_generator), [count] * 5):
+            generator.random(count)
+            assert state_bytes(generator.bit_generator) == state
 
 
-def test_states_of_another_generator_are_refused() -> None:
+def test_state_bytes_follow_the_generator_which_is_a_pcg64() -> None:
+    generator, halves = rng(), []
+    bits: Any = generator.bit_generator
+    for draw_some in (
+        generator.random,
+        lambda: generator.integers(5, dtype=np.uint32),
+        lambda: bits.advance(2**80),
+    ):
+        draw_some()
+        state = bits.state
+        words = b"".join(state["state"][name].to_bytes(16, "little") for name in ("state", "inc"))
+        assert state_bytes(bits) == words + struct.pack(
+            "<II", state["has_uint32"], state["uinteger"]
+        )
+        halves.append(state["has_uint32"])
+    assert halves == [0, 1, 0]  # a draw of 32 bits keeps the other half, and advance drops it
     with pytest.raises(TypeError, match="must be a PCG64, was a MT19937"):
         state_bytes(np.random.MT19937(0))

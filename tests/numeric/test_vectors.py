@@ -8,8 +8,18 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import copy_part, kernel
 from evoexp.numeric.elementary import sincos
+from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
+from evoexp.numeric.vector_rows import (
+    lane_numbers,
+    load_each,
+    load_pairs,
+    load_quads,
+    num_up_to,
+    store_places,
+    transposed,
+)
 from evoexp.numeric.vectors import (
     LANES,
     any_lane,
@@ -27,33 +37,39 @@ from evoexp.numeric.vectors import (
 from evoexp.records import FloatArray
 
 SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, 1.7976931348623157e308, 0.1]
-PAIRS = np.array([(a, b) for a in SPECIAL for b in SPECIAL if not np.isnan(a * b) or a is b])
+Function = Callable[..., Any]
+U = np.uint64
 
 
 def some_pairs() -> tuple[FloatArray, FloatArray]:
-    """Return pairs of numbers: special ones, and random ones of all sizes."""
+    """Return pairs of numbers: special ones, equal ones, and random ones of all sizes."""
     rng = np.random.default_rng(0)
+    special = [(a, b) for a in SPECIAL for b in SPECIAL if not np.isnan(a * b) or a is b]
     random = rng.normal(size=(400, 2)) * 10.0 ** rng.integers(-300, 300, (400, 2))
-    pairs = np.concatenate([PAIRS, random])
-    pairs = pairs[: len(pairs) // LANES * LANES]
-    return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+    pairs = np.concatenate([special, random, random[:, :1].repeat(2, axis=1)])
+    first, second = pairs[: len(pairs) // LANES * LANES].T.copy()
+    return first, second
+
+
+X, Y = some_pairs()
 
 
 def same(found: FloatArray, expected: FloatArray) -> bool:
     """Return whether all numbers have the same bits; one NaN is as good as another."""
-    equal = found.view(np.int64) == expected.view(np.int64)
+    equal = found.view(np.int64) == (expected * 1.0).view(np.int64)
     return bool((equal | (np.isnan(found) & np.isnan(expected))).all())
 
 
-def over_lanes(function: Callable[..., Any]) -> Callable[..., FloatArray]:
+def over_lanes(function: Function) -> Callable[..., FloatArray]:
     """Return a function of two arrays that calls a kernel's function vector by vector."""
+    of_lanes = kernel(function)
 
     @kernel
     def run(x: FloatArray, y: FloatArray, out: FloatArray) -> None:
         for k in range(0, len(x), LANES):
-            store(out, np.uint64(k), function(load(x, np.uint64(k)), load(y, np.uint64(k))))
+            store(out, U(k), of_lanes(load(x, U(k)), load(y, U(k))))
 
-    def over_arrays(x: FloatArray, y: FloatArray) -> FloatArray:
+    def over_arrays(x: FloatArray = X, y: FloatArray = Y) -> FloatArray:
         out = np.empty_like(x)
         run(x, y, out)
         return out
@@ -61,135 +77,221 @@ def over_lanes(function: Callable[..., Any]) -> Callable[..., FloatArray]:
     return over_arrays
 
 
-@pytest.mark.parametrize("operation", [operator.add, operator.sub, operator.mul, operator.truediv])
-def test_arithmetic_has_the_bits_of_scalars(operation: Callable[..., Any]) -> None:
-    x, y = some_pairs()
+@kernel
+def flag(condition: Any) -> Any:
+    return select(condition, spread(1.0), spread(0.0))
+
+
+# a comparison with NaN is false: the second of the choices, the first of lower and upper
+CASES: dict[str, tuple[Function, Function]] = {  # of lanes, of numpy
+    "root": (lambda a, b: root(a), lambda x, y: np.sqrt(x)),
+    "magnitude": (lambda a, b: magnitude(a), lambda x, y: np.abs(x)),
+    "ceiling": (lambda a, b: ceiling(a), lambda x, y: np.ceil(x)),
+    "whole": (lambda a, b: whole(a), lambda x, y: np.rint(x)),
+    "spread": (lambda a, b: spread(2.5), lambda x, y: np.full_like(x, 2.5)),
+    "select": (lambda a, b: select(a < b, a, b), lambda x, y: np.where(x < y, x, y)),
+    "lower": (lambda a, b: lower(a, b), lambda x, y: np.where(y < x, y, x)),
+    "upper": (lambda a, b: upper(a, b), lambda x, y: np.where(x < y, y, x)),
+    "or": (lambda a, b: flag((a < -1.0) | (b > 1.0)), lambda x, y: (x < -1.0) | (y > 1.0)),
+    "and": (lambda a, b: flag((a > -1.0) & (b < 1.0)), lambda x, y: (x > -1.0) & (y < 1.0)),
+}
+BINARY = [operator.add, operator.sub, operator.mul, operator.truediv]
+COMPARISONS = [operator.lt, operator.le, operator.gt, operator.ge, operator.eq]
+
+
+@pytest.mark.parametrize(("of_lanes", "of_numpy"), CASES.values(), ids=CASES)
+def test_functions_have_the_bits_of_scalars(of_lanes: Function, of_numpy: Function) -> None:
     with np.errstate(all="ignore"):
-        expected = operation(x, y)
-        half = operation(0.5, x)
-        thrice = operation(x, 3.0)
-    assert same(over_lanes(kernel(lambda a, b: operation(a, b)))(x, y), expected)
-    assert same(over_lanes(kernel(lambda a, b: operation(0.5, a)))(x, y), half)
-    assert same(over_lanes(kernel(lambda a, b: operation(a, 3.0)))(x, y), thrice)
+        assert same(over_lanes(of_lanes)(), of_numpy(X, Y))
 
 
-def test_roots_magnitudes_and_choices() -> None:
-    x, y = some_pairs()
-    with np.errstate(invalid="ignore"):
-        assert same(over_lanes(kernel(lambda a, b: root(a)))(x, y), np.sqrt(x))
-    assert same(over_lanes(kernel(lambda a, b: magnitude(a)))(x, y), np.abs(x))
-    assert same(over_lanes(kernel(lambda a, b: ceiling(a)))(x, y), np.ceil(x))
-    assert same(over_lanes(kernel(lambda a, b: whole(a)))(x, y), np.rint(x))
-    assert same(over_lanes(kernel(lambda a, b: spread(2.5)))(x, y), np.full_like(x, 2.5))
-    # a comparison with NaN is false: the second of the choices, the first of lower and upper
-    assert same(over_lanes(kernel(lambda a, b: select(a < b, a, b)))(x, y), np.where(x < y, x, y))
-    assert same(over_lanes(kernel(lambda a, b: select(a > b, a, b)))(x, y), np.where(x > y, x, y))
-    assert same(over_lanes(kernel(lambda a, b: select(a == b, a, b)))(x, y), np.where(x == y, x, y))
-    assert same(over_lanes(lower)(x, y), np.where(y < x, y, x))
-    assert same(over_lanes(upper)(x, y), np.where(x < y, y, x))
+@pytest.mark.parametrize("operation", BINARY)
+def test_arithmetic_has_the_bits_of_scalars(operation: Function) -> None:
+    with np.errstate(all="ignore"):
+        assert same(over_lanes(lambda a, b: operation(a, b))(), operation(X, Y))
+        assert same(over_lanes(lambda a, b: operation(0.5, a))(), operation(0.5, X))
+        assert same(over_lanes(lambda a, b: operation(a, 3.0))(), operation(X, 3.0))
+
+
+@pytest.mark.parametrize("comparison", COMPARISONS)
+def test_comparisons_hold_as_those_of_scalars(comparison: Function) -> None:
+    assert same(over_lanes(lambda a, b: flag(comparison(a, b)))(), comparison(X, Y))
+    assert same(over_lanes(lambda a, b: flag(comparison(a, 0.0)))(), comparison(X, 0.0))
 
 
 def test_a_condition_holds_in_any_lane() -> None:
     @kernel
-    def any_below(x: FloatArray, limit: float) -> bool:
-        return any_lane(load(x, np.uint64(0)) < limit)
+    def any_below(x: FloatArray, limit: float, asked: bool) -> bool:
+        return any_lane((load(x, U(0)) < limit) & asked)
 
     for lane in range(LANES):
         x = np.ones(LANES)
         x[lane] = -1.0
-        assert any_below(x, 0.0)
-        assert not any_below(x, -1.0)
-    assert not any_below(np.full(LANES, np.nan), np.inf)
-
-
-def test_conditions_hold_together_in_the_lanes_of_both() -> None:
-    @kernel
-    def between(x: FloatArray, low: float, high: float) -> bool:
-        one = load(x, np.uint64(0))
-        return any_lane((one > low) & (one < high))
-
-    @kernel
-    def below_if(x: FloatArray, high: float, asked: bool) -> bool:
-        return any_lane((load(x, np.uint64(0)) < high) & asked)
-
-    x = np.arange(LANES, dtype=np.float64)
-    assert between(x, 1.5, 4.5)
-    assert not between(x, 4.5, 1.5)
-    assert below_if(x, 3.0, True)
-    assert not below_if(x, 3.0, False)
-
-
-COMPARISONS = [operator.lt, operator.le, operator.gt, operator.ge, operator.eq]
-
-
-@pytest.mark.parametrize("comparison", COMPARISONS)
-def test_comparisons_hold_as_those_of_scalars(comparison: Callable[..., Any]) -> None:
-    x, y = some_pairs()
-    x = np.where(np.arange(len(x)) % 3 == 0, y, x)
-    holds = over_lanes(kernel(lambda a, b: select(comparison(a, b), spread(1.0), spread(0.0))))
-    assert same(holds(x, y), comparison(x, y) * 1.0)
-    positive = over_lanes(kernel(lambda a, b: select(comparison(a, 0.0), spread(1.0), spread(0.0))))
-    assert same(positive(x, y), comparison(x, 0.0) * 1.0)
-
-
-def test_one_of_two_conditions_is_enough() -> None:
-    x, y = some_pairs()
-
-    @kernel
-    def outside(a: Any, b: Any) -> Any:
-        return select((a < -1.0) | (b > 1.0), spread(1.0), spread(0.0))
-
-    assert same(over_lanes(outside)(x, y), ((x < -1.0) | (y > 1.0)) * 1.0)
-
-
-def test_sines_and_cosines_have_the_bits_of_scalars() -> None:
-    angles = np.concatenate(
-        [
-            SPECIAL[:-2],
-            np.arange(-400, 400) * (np.pi / 4.0),
-            np.random.default_rng(0).uniform(-1e5, 1e5, 4000),
-        ]
-    )
-    angles = angles[: len(angles) // LANES * LANES]
-
-    @kernel
-    def scalars(x: FloatArray, out: FloatArray) -> None:
-        for k in range(len(x)):
-            out[0, k], out[1, k] = sincos(x[k])
-
-    expected = np.empty((2, len(angles)))
-    scalars(angles, expected)
-    for row in range(2):
-        found = over_lanes(kernel(lambda a, b, row=row: sincos(a)[row]))(angles, angles)
-        assert same(found, expected[row])
+        assert any_below(x, 0.0, True)
+        assert not any_below(x, -1.0, True) and not any_below(x, 0.0, False)
+    assert not any_below(np.full(LANES, np.nan), np.inf, True)
 
 
 def test_neighbours_are_read_and_written_where_they_are_named() -> None:
     @kernel
     def shift(x: FloatArray, place: int, out: FloatArray, to: int) -> None:
-        store(out, np.uint64(to), load(x, np.uint64(place)) + 0.0)
+        store(out, U(to), load(x, U(place)) + 0.0)
 
     x, out = np.arange(20.0), np.full(20, -1.0)
     shift(x, 3, out, 5)
     assert out.tolist() == [-1.0] * 5 + list(range(3, 11)) + [-1.0] * 7
-
-
-def test_other_arrays_are_refused() -> None:
-    @kernel
-    def first(x: Any) -> bool:
-        return any_lane(load(x, np.uint64(0)) < 0.0)
-
     others: list[Any] = [np.zeros((8, 8)), np.zeros(16)[::2], np.zeros(8, dtype=int)]
     for array in others:
         with pytest.raises(TypingError, match="contiguous float64 of one dimension"):
-            first(array)
+            shift(array, 0, out, 0)
 
 
-def test_any_lane_is_seen() -> None:
+# Sines and cosines
+
+
+def turns() -> FloatArray:
+    rng = np.random.default_rng(0)
+    some = [rng.uniform(-2.0, 2.0, 20_000), rng.uniform(-1e3, 1e3, 20_000), np.arange(-50.0, 50.0)]
+    near = np.arange(-50.0, 50.0) + 0.5  # where the quarter changes
+    return np.concatenate([*some, near, np.nextafter(near, 0.0)])[: 40_300 // LANES * LANES]
+
+
+def angles() -> FloatArray:
+    octants, rng = np.arange(-400, 400) * (np.pi / 4.0), np.random.default_rng(0)
+    every = np.concatenate([SPECIAL[:-2], octants, rng.uniform(-1e5, 1e5, 4000)])
+    return every[: len(every) // LANES * LANES]
+
+
+@pytest.mark.parametrize(("function", "x"), [(sincos, angles()), (sincos_of_turn, turns())])
+def test_sines_and_cosines_have_the_bits_of_scalars(function: Function, x: FloatArray) -> None:
     @kernel
-    def run(x: FloatArray, limit: float) -> bool:
-        return any_lane(load(x, np.uint64(0)) < limit)
+    def scalars(x: FloatArray, out: FloatArray) -> None:
+        for k in range(len(x)):
+            out[0, k], out[1, k] = function(x[k])
 
-    rng = np.random.default_rng(3)
-    for x in (*rng.normal(size=(50, LANES)), np.full(LANES, np.inf), *(np.eye(LANES) * -1.0)):
-        assert run(np.ascontiguousarray(x), -0.1) == (x < -0.1).any()
+    expected = np.empty((2, len(x)))
+    scalars(x, expected)
+    for row in (0, 1):
+        assert same(over_lanes(lambda a, b, row=row: function(a)[row])(x, x), expected[row])
+
+
+def test_sines_and_cosines_of_turns_are_right() -> None:
+    """A whole number of turns is taken off without rounding; whole quarters are exact."""
+    s, c = (over_lanes(lambda a, b, row=row: sincos_of_turn(a)[row]) for row in (0, 1))
+    t, right_angle = turns(), np.arccos(np.longdouble(0.0))
+    rest = (t - 4.0 * np.floor(t / 4.0)).astype(np.longdouble) * right_angle
+    assert float(np.abs(s(t, t) - np.sin(rest)).max()) < 1e-14
+    assert float(np.abs(c(t, t) - np.cos(rest)).max()) < 1e-14
+    assert float(np.abs(s(t, t) ** 2 + c(t, t) ** 2 - 1.0).max()) > 1e-15  # it is the quick one
+    assert np.float64(right_angle) == QUARTER_TURN
+    quarters = np.arange(-16.0, 16.0)
+    assert np.array_equal(s(quarters, quarters), [0.0, 1.0, 0.0, -1.0] * 8)
+    assert np.array_equal(c(quarters, quarters), [1.0, 0.0, -1.0, 0.0] * 8)
+
+
+# Rows and columns, and parts of arrays
+
+
+@kernel
+def each(array: FloatArray, places: Any, at: int, offset: int) -> Any:
+    return (load_each(array, places, U(at), U(offset)),)
+
+
+@kernel
+def pairs(array: FloatArray, places: Any, at: int, offset: int) -> Any:
+    return load_pairs(array, places, U(at), U(offset))
+
+
+@kernel
+def quads(array: FloatArray, places: Any, at: int, offset: int) -> Any:
+    return load_quads(array, places, U(at), U(offset))
+
+
+def test_a_square_is_transposed() -> None:
+    @kernel
+    def transpose(square: FloatArray, out: FloatArray) -> None:
+        low = load(square, U(0)), load(square, U(8)), load(square, U(16)), load(square, U(24))
+        high = load(square, U(32)), load(square, U(40)), load(square, U(48)), load(square, U(56))
+        rows = transposed(low + high)
+        for k in range(LANES):
+            store(out, U(k * LANES), rows[k])
+
+    square, out = np.random.default_rng(0).random((LANES, LANES)), np.empty(LANES * LANES)
+    transpose(square.ravel(), out)
+    assert np.array_equal(out.reshape(LANES, LANES), square.T)
+
+
+@pytest.mark.parametrize(("read", "width"), [(each, 1), (pairs, 2), (quads, 4)])
+def test_columns_are_read_from_each_lanes_own_place(read: Any, width: int) -> None:
+    @kernel
+    def fill(array: FloatArray, places: Any, at: int, offset: int, out: FloatArray) -> None:
+        columns = read(array, places, at, offset)
+        for k in range(len(columns)):
+            store(out, U(8 * k), columns[k])
+
+    rng = np.random.default_rng(1)
+    array = rng.random(100)
+    for at, offset in ((0, 0), (5, 17)):
+        places, out = rng.integers(0, 70, 20).astype(np.uint64), np.empty(width * LANES)
+        fill(array, places, at, offset, out)
+        begins = places[at : at + LANES].astype(int) + offset
+        assert np.array_equal(out.reshape(width, LANES).T, [array[b : b + width] for b in begins])
+
+
+def test_numbers_up_to_a_limit_are_counted() -> None:
+    @kernel
+    def count(array: FloatArray, places: Any, limits: FloatArray, out: FloatArray) -> None:
+        store(out, U(0), num_up_to(array, places, U(0), U(10), load(limits, U(0)), 7))
+        store(out, U(8), num_up_to(array, places, U(0), U(10), load(limits, U(0)), 8))
+
+    rng = np.random.default_rng(2)
+    for k in range(200):
+        array = rng.integers(0, 5, 60).astype(float)
+        array[rng.integers(0, 60, 3)] = [np.nan, np.inf, -np.inf]
+        limits = rng.integers(-1, 6, LANES).astype(float)
+        limits[k % LANES] = (np.nan, np.inf)[k % 2]
+        places, out = rng.integers(0, 40, LANES).astype(np.uint64), np.empty(2 * LANES)
+        count(array, places, limits, out)
+        for lane, begin in enumerate(places.astype(int) + 10):
+            for num, found in ((7, out[lane]), (8, out[LANES + lane])):
+                assert found == np.count_nonzero(array[begin + 8 - num : begin + 8] <= limits[lane])
+
+
+def test_the_number_that_is_counted_is_a_constant() -> None:
+    @kernel
+    def count_some(array: FloatArray, places: Any, num: int) -> Any:
+        return num_up_to(array, places, U(0), U(0), load(array, U(0)), num)
+
+    with pytest.raises(TypingError, match="constant"):
+        count_some(np.zeros(8), np.zeros(8, np.uint64), 7)
+
+
+def test_whole_numbers_become_places() -> None:
+    @kernel
+    def as_places(numbers: FloatArray, out: Any) -> None:
+        store_places(out, U(3), load(numbers, U(0)) + lane_numbers())
+
+    numbers, out = np.array([0.0, 1.0, 5.0, 2.0**40, 7.0, 0.0, 3.0, 2.0]), np.zeros(12, np.uint64)
+    as_places(numbers, out)
+    assert list(out) == [0, 0, 0, *(numbers + np.arange(8)).astype(int), 0]
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.int32, np.int64, np.float64])
+def test_parts_of_arrays_are_copied_and_nothing_else(kind: type) -> None:
+    @kernel
+    def copy(source: Any, first: int, out: Any, at: int, count: int) -> None:
+        copy_part(source, first, out, at, count)
+
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        source, out = rng.integers(0, 200, (2, 40)).astype(kind)
+        first, at = rng.integers(0, 40, 2).tolist()
+        count = int(rng.integers(0, 41 - max(first, at)))
+        expected = out.copy()
+        expected[at : at + count] = source[first : first + count]
+        copy(source, first, out, at, count)
+        np.testing.assert_array_equal(out, expected)
+    whole, other = np.zeros((2, 8), kind), np.zeros(8, dtype=np.float32)
+    for source, out in ((other, whole[0]), (whole[0, ::2], whole[1]), (whole[0], whole[:, 1])):
+        with pytest.raises(TypingError):
+            copy(source, 0, out, 0, 1)

@@ -1,7 +1,4 @@
-"""A 6R arm of a PUMA's proportions, as capsules and as spheres.
-
-Among ten turned obstacles of all kinds.
-"""
+"""A 6R arm of a PUMA's proportions, as capsules and as spheres, among ten turned obstacles."""
 
 from typing import Any
 
@@ -21,37 +18,33 @@ from evoexp.scenarios.obstacles import (
 )
 
 FLOOR = 0  # index of the obstacle that the first link stands on: those two are no pair
-SELF_PAIRS = (
-    (1, 3),
-    (1, 4),
-    (1, 5),
-    (1, 6),
-    (2, 4),
-    (2, 5),
-    (2, 6),
-)  # joints; the links around the wrist always touch
+# joints; the links around the wrist always touch
+SELF_PAIRS = ((1, 3), (1, 4), (1, 5), (1, 6), (2, 4), (2, 5), (2, 6))
+
+
+def box(*center: float, size: tuple[float, ...], rotation: tuple[float, ...]) -> BoxObstacle:
+    return BoxObstacle(shape="box", center=center, size=size, rotation=rotation)
+
+
+def ball(*center: float, radius: float) -> SphereObstacle:
+    return SphereObstacle(shape="sphere", center=center, radius=radius)
+
+
+def rod(kind: Any, start: tuple[float, ...], end: tuple[float, ...], radius: float) -> Any:
+    return kind(shape=kind.__name__[:-8].lower(), start=start, end=end, radius=radius)
+
 
 OBSTACLES = (
     HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, 0.0), normal=(0.02, -0.03, 1.0)),
-    BoxObstacle(
-        shape="box", center=(0.75, 0.1, 0.25), size=(0.5, 0.9, 0.06), rotation=(3.0, -4.0, 20.0)
-    ),
-    BoxObstacle(
-        shape="box", center=(-0.45, 0.75, 0.55), size=(0.25, 0.3, 0.5), rotation=(15.0, 10.0, -30.0)
-    ),
-    BoxObstacle(
-        shape="box", center=(0.35, -0.85, 0.9), size=(0.3, 0.12, 0.4), rotation=(40.0, 25.0, 60.0)
-    ),
-    CylinderObstacle(
-        shape="cylinder", start=(-0.75, -0.35, 0.0), end=(-0.7, -0.3, 1.1), radius=0.08
-    ),
-    CylinderObstacle(
-        shape="cylinder", start=(0.7, -0.45, 0.5), end=(0.9, -0.35, 0.75), radius=0.12
-    ),
-    SphereObstacle(shape="sphere", center=(0.6, 0.65, 0.95), radius=0.15),
-    SphereObstacle(shape="sphere", center=(-0.6, 0.05, 1.25), radius=0.12),
-    CapsuleObstacle(shape="capsule", start=(-0.3, 0.9, 1.2), end=(0.4, 0.85, 1.35), radius=0.05),
-    CapsuleObstacle(shape="capsule", start=(-0.2, -0.8, 0.3), end=(-0.4, -0.7, 0.8), radius=0.07),
+    box(0.75, 0.1, 0.25, size=(0.5, 0.9, 0.06), rotation=(3.0, -4.0, 20.0)),
+    box(-0.45, 0.75, 0.55, size=(0.25, 0.3, 0.5), rotation=(15.0, 10.0, -30.0)),
+    box(0.35, -0.85, 0.9, size=(0.3, 0.12, 0.4), rotation=(40.0, 25.0, 60.0)),
+    rod(CylinderObstacle, (-0.75, -0.35, 0.0), (-0.7, -0.3, 1.1), 0.08),
+    rod(CylinderObstacle, (0.7, -0.45, 0.5), (0.9, -0.35, 0.75), 0.12),
+    ball(0.6, 0.65, 0.95, radius=0.15),
+    ball(-0.6, 0.05, 1.25, radius=0.12),
+    rod(CapsuleObstacle, (-0.3, 0.9, 1.2), (0.4, 0.85, 1.35), 0.05),
+    rod(CapsuleObstacle, (-0.2, -0.8, 0.3), (-0.4, -0.7, 0.8), 0.07),
 )
 
 # joint, start, end, radius [m], spheres along it: 11 capsules, 59 spheres
@@ -71,30 +64,35 @@ CAPSULES = (
 
 
 def model() -> Any:
-    """Return the arm's `pin.Model`.
-
-    Z upwards, shoulder at 0.65 m, upper arm and forearm 0.43 m, a spherical wrist.
-    """
+    """Return the `pin.Model`: z upwards, both arms 0.43 m, a spherical wrist."""
     arm = pin.Model()
-    joint = 0
-    for axis, place in (
-        (pin.JointModelRZ(), (0.0, 0.0, 0.65)),
-        (pin.JointModelRY(), (0.0, 0.22, 0.0)),
-        (pin.JointModelRY(), (0.0, 0.0, 0.43)),
-        (pin.JointModelRZ(), (0.0, -0.09, 0.43)),
-        (pin.JointModelRY(), (0.0, 0.0, 0.0)),
-        (pin.JointModelRZ(), (0.0, 0.0, 0.06)),
+    y, z = pin.JointModelRY, pin.JointModelRZ
+    for joint, (axis, place) in enumerate(
+        (
+            (z(), (0.0, 0.0, 0.65)),
+            (y(), (0.0, 0.22, 0.0)),
+            (y(), (0.0, 0.0, 0.43)),
+            (z(), (0.0, -0.09, 0.43)),
+            (y(), (0.0, 0.0, 0.0)),
+            (z(), (0.0, 0.0, 0.06)),
+        )
     ):
-        joint = arm.addJoint(joint, axis, pin.SE3(np.eye(3), np.array(place)), f"joint_{joint + 1}")
+        arm.addJoint(joint, axis, pin.SE3(np.eye(3), np.array(place)), f"joint_{joint + 1}")
     return arm
+
+
+def add(geometry: Any, joint: int, placement: Any, shape: Any) -> None:
+    """Add a shape of a joint to a `pin.GeometryModel`."""
+    name = f"shape_{geometry.ngeoms}"
+    geometry.addGeometryObject(pin.GeometryObject(name, joint, 0, placement, shape))
 
 
 def capsules(arm: Any) -> Any:
     """Return the links as a `pin.GeometryModel` of 11 coal capsules."""
     geometry = pin.GeometryModel()
-    for k, (joint, start, end, radius, _) in enumerate(CAPSULES):
+    for joint, start, end, radius, _ in CAPSULES:
         shape, placement = capsule(np.array(start), np.array(end), radius)
-        geometry.addGeometryObject(pin.GeometryObject(f"capsule_{k}", joint, 0, placement, shape))
+        add(geometry, joint, placement, shape)
     return geometry
 
 
@@ -104,10 +102,7 @@ def spheres(arm: Any) -> Any:
     for joint, start, end, radius, count in CAPSULES:
         for f in np.linspace(0.0, 1.0, count):
             center = (1.0 - f) * np.array(start) + f * np.array(end)
-            name = f"sphere_{geometry.ngeoms}"
-            geometry.addGeometryObject(
-                pin.GeometryObject(name, joint, 0, pin.SE3(np.eye(3), center), coal.Sphere(radius))
-            )
+            add(geometry, joint, pin.SE3(np.eye(3), center), coal.Sphere(radius))
     return geometry
 
 
@@ -152,18 +147,14 @@ def point(coordinates: tuple[float, ...]) -> FloatArray:
 def with_obstacles(
     geometry: Any, obstacles: tuple[Any, ...], joint_pairs: Any, ignored: Any = ()
 ) -> Any:
-    """Return a robot's geometry with the obstacles behind it, and the pairs that are to be checked.
+    """Return a robot's geometry with the obstacles behind it, and the pairs to be checked.
 
-    Args:
-        geometry: `pin.GeometryModel` of the robot alone.
-        obstacles: Settings of the obstacles.
-        joint_pairs: Pairs of joints whose shapes are checked against each other.
-        ignored: Pairs (joint, obstacle) that are not.
+    Those are the shapes of `joint_pairs`, and all obstacles but for `ignored` (joint, obstacle).
     """
     scene = geometry.copy()
-    for k, obstacle in enumerate(obstacles):
+    for obstacle in obstacles:
         shape, placement = coal_obstacle(obstacle)
-        scene.addGeometryObject(pin.GeometryObject(f"obstacle_{k}", 0, 0, placement, shape))
+        add(scene, 0, placement, shape)
     joints = [one.parentJoint for one in geometry.geometryObjects]
     chosen = {frozenset(pair) for pair in joint_pairs}
     for a, joint in enumerate(joints):
@@ -182,10 +173,7 @@ def random_configurations(count: int) -> FloatArray:
 
 
 def population(count: int) -> FloatArray:
-    """Return configurations of a converged population, (6, count) [rad].
-
-    Within some 6° of one that is free.
-    """
+    """Return configurations within some 6° of one that is free, (6, count) [rad]."""
     center = np.array([0.3, 0.4, 0.9, 0.2, 0.5, 0.0])
     return np.asarray(center[:, None] + 0.1 * np.random.default_rng(0).normal(size=(6, count)))
 

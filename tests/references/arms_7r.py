@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from evoexp.collision.bodies.packing import Shapes
 from evoexp.records import FloatArray
-from evoexp.scenarios.obstacles import SphereObstacle
+from references.arms_6r import add, ball
 
 SELF_PAIRS = tuple(
     pair
@@ -35,26 +35,19 @@ RODS = (
 )
 
 OBSTACLES = tuple(
-    SphereObstacle(shape="sphere", center=center, radius=radius)
-    for center, radius in (
-        ((0.55, 0.0, 0.25), 0.12),
-        ((0.35, 0.35, 0.25), 0.12),
-        ((0.0, 0.55, 0.25), 0.12),
-        ((-0.55, 0.0, 0.25), 0.12),
-        ((-0.35, -0.35, 0.25), 0.12),
-        ((0.0, -0.55, 0.25), 0.12),
-        ((0.35, -0.35, 0.8), 0.12),
-        ((0.35, 0.35, 0.9), 0.12),
-        ((-0.35, 0.35, 0.8), 0.12),
-        ((-0.2, -0.4, 0.95), 0.12),
+    ball(*center, radius=0.12)
+    for center in (
+        *((0.55, 0.0, 0.25), (0.35, 0.35, 0.25), (0.0, 0.55, 0.25), (-0.55, 0.0, 0.25)),
+        *((-0.35, -0.35, 0.25), (0.0, -0.55, 0.25), (0.35, -0.35, 0.8), (0.35, 0.35, 0.9)),
+        *((-0.35, 0.35, 0.8), (-0.2, -0.4, 0.95)),
     )
-)  # fmt: skip
+)
 
 
 def model() -> Any:
     """Return the arm's `pin.Model`."""
-    arm, joint, quarter = pin.Model(), 0, 0.5 * np.pi
-    for k, (roll, place) in enumerate(
+    arm, quarter = pin.Model(), 0.5 * np.pi
+    for joint, (roll, place) in enumerate(
         (
             (0.0, (0.0, 0.0, 0.333)),
             (-quarter, (0.0, 0.0, 0.0)),
@@ -66,21 +59,19 @@ def model() -> Any:
         )
     ):
         placement = pin.SE3(pin.utils.rotate("x", roll), np.array(place))
-        joint = arm.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{k + 1}")
+        arm.addJoint(joint, pin.JointModelRZ(), placement, f"joint_{joint + 1}")
     return arm
 
 
 def shapes() -> Shapes:
     """Return the links as spheres."""
-    joint, center, radius = [], [], []
-    for owner, start, end, size, count in RODS:
-        for f in np.linspace(0.0, 1.0, count):
-            joint.append(owner)
-            center.append((1.0 - f) * np.array(start) + f * np.array(end))
-            radius.append(size)
-    centers = np.array(center)
-    joints = np.array(joint, dtype=np.int64)
-    return Shapes(joints, centers, centers, np.array(radius), joints)
+    rows = [
+        (owner, (1.0 - f) * np.array(start) + f * np.array(end), size)
+        for owner, start, end, size, count in RODS
+        for f in np.linspace(0.0, 1.0, count)
+    ]
+    joints, centers, radii = (np.array(column) for column in zip(*rows, strict=True))
+    return Shapes(joints, centers, centers, radii, joints)
 
 
 def geometry(arm: Any) -> Any:
@@ -88,11 +79,8 @@ def geometry(arm: Any) -> Any:
     own, scene = shapes(), pin.GeometryModel()
     every = [*zip(own.joint, own.start, own.radius, strict=True)]
     every += [(-1, np.array(one.center), one.radius) for one in OBSTACLES]
-    for k, (joint, center, radius) in enumerate(every):
-        place = pin.SE3(np.eye(3), np.array(center))
-        scene.addGeometryObject(
-            pin.GeometryObject(f"sphere_{k}", max(int(joint), 0), 0, place, coal.Sphere(radius))
-        )
+    for joint, center, radius in every:
+        add(scene, max(int(joint), 0), pin.SE3(np.eye(3), np.array(center)), coal.Sphere(radius))
     for a, (one, *_) in enumerate(every):
         for b, (two, *_) in enumerate(every[:a]):
             if (int(two), int(one)) in SELF_PAIRS or (one == -1 and two > 0):

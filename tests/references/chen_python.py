@@ -1,10 +1,8 @@
 """Both genetic algorithms of Chen & Zalzala 1995 in plain Python, individual by individual.
 
-Written from the paper without any kernel of evoexp. Uniform numbers are taken one by one from the
-generator, in the order in which `grid_path_ga` and `placement_ga` take them, so that whole
-generations can be compared. The first population is given: random walks are drawn by bits.
-
-A path is a list of nodes; a posture is two strings of bits, one per angle.
+Written from the paper without any kernel of evoexp. Uniform numbers are taken one by one, in the
+order in which `grid_path_ga` and `placement_ga` take them. The first population is given: random
+walks are drawn by bits. A path is a list of nodes, a posture two strings of bits, one per angle.
 """
 
 from collections.abc import Callable, Iterator
@@ -230,9 +228,8 @@ class Postures:
         cost += own.torque_max_weight * np.abs(np.array(own.torque_weights) * torques).max()
         cost += own.manipulability_weight * manipulability
         for weight, link, place, x_o, y_o in self.model.avoided:  # Eq. 12
-            shares = np.where(
-                np.arange(1, 4) < link, 1.0, np.where(np.arange(1, 4) == link, place, 0)
-            )
+            number = np.arange(1, 4)
+            shares = np.where(number < link, 1.0, np.where(number == link, place, 0))
             x, y = links @ shares + [x_p, 0.0]
             squared = (x - x_o) ** 2 + (y - y_o) ** 2
             cost += weight * (1.0 / squared if squared * cap > 1.0 else cap)

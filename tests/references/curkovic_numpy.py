@@ -1,17 +1,13 @@
 """The planner of Curkovic et al. 2013 in numpy and plain Python: slow, obvious, without a kernel.
 
 Written from the paper and from `coevolution`'s documented choices. It takes its uniform numbers in
-the order in which `coevolution` takes them, so that both can be compared generation by generation:
-the genes of the initial populations (robot by robot, gene by gene); then per generation and moving
-robot the roulette, per pair of parents the decision and the site, per offspring the decision, the
-gene and the amount.
-
-A population is an array (genes, individuals) [rad]: two absolute link angles per configuration.
+the order in which `coevolution` takes them. A population is an array (genes, individuals) [rad]:
+two absolute link angles per configuration.
 """
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,25 +21,14 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Curkovic:
-    """Scene and settings.
+    """Scene and settings; those of `coevolution` and its parts have the same names."""
 
-    Attributes:
-        start: (robots, 2) absolute link angles [rad].
-        goal: (robots, 2) [rad].
-        moving: (robots,) false for robots that stand still.
-        bases: (robots, 2) [length unit].
-        link_lengths: (robots, 2) [length unit].
-        discs: Centre x, y and radius of every obstacle [length unit].
-
-    The others are the settings of `coevolution` and its parts, under the same names.
-    """
-
-    start: Array
-    goal: Array
-    moving: NDArray[np.bool_]
-    bases: Array
-    link_lengths: Array
-    discs: list[tuple[float, float, float]]
+    start: Array  # (robots, 2) absolute link angles [rad]
+    goal: Array  # (robots, 2) [rad]
+    moving: NDArray[np.bool_]  # (robots,) false for robots that stand still
+    bases: Array  # (robots, 2) [length unit]
+    link_lengths: Array  # (robots, 2) [length unit]
+    discs: list[tuple[float, float, float]]  # centre x, y and radius of every obstacle
     chromosome_length: int
     population_size: int
     num_generations: int
@@ -68,32 +53,17 @@ class Curkovic:
 
 @dataclass
 class Judged:
-    """Populations, everybody tried with everybody of the other robots.
+    """Populations, everybody tried with everybody of the other robots."""
 
-    Attributes:
-        criteria: (robots, 4, individuals) C1 … C4.
-        costs: (robots, individuals).
-        own: (robots, individuals) cost without C1; inf for those that hit an obstacle.
-        hits: Pair of robots → (individuals, individuals) colliding configurations.
-        blocked: (robots, individuals) configurations that hit an obstacle.
-    """
-
-    criteria: Array
-    costs: Array
-    own: Array
-    hits: dict[tuple[int, int], Integers]
-    blocked: Integers
-
-    def hits_between(self, robot: int, individual: int, other: int, partner: int) -> int:
-        """Return the colliding configurations of two individuals."""
-        if robot < other:
-            return int(self.hits[robot, other][individual, partner])
-        return int(self.hits[other, robot][partner, individual])
+    criteria: Array  # (robots, 4, individuals) C1 … C4
+    costs: Array  # (robots, individuals)
+    own: Array  # (robots, individuals) cost without C1; inf for those that hit an obstacle
+    hits: dict[tuple[int, int], Integers]  # robots → (individuals, individuals) configurations
+    blocked: Integers  # (robots, individuals) configurations that hit an obstacle
 
     def key(self, team: tuple[int, ...]) -> tuple[int, float]:
         """Return a team's collisions and its cost: lower is better."""
-        pairs = itertools.combinations(range(len(team)), 2)
-        met = sum(self.hits_between(a, team[a], b, team[b]) for a, b in pairs)
+        met = sum(int(table[team[a], team[b]]) for (a, b), table in self.hits.items())
         cost = 0.0
         for robot, member in enumerate(team):
             cost += float(self.own[robot, member])
@@ -107,46 +77,28 @@ class Member:
     team: tuple[int, ...]
     age: int = 0
     rank: int = 0
-    key: tuple[int, float] = field(default=(0, 0.0))
 
 
 class Generation(NamedTuple):
-    """One generation.
+    """One generation."""
 
-    Attributes:
-        populations: (robots, genes, individuals).
-        judged: Their judgement.
-        best_cost: Lowest cost of a collision-free team in this generation; inf: there is none.
-        best_team: That team, the first of equal ones; None: there is none.
-        num_feasible: Individuals of the first robot with a collision-free partner in every other
-            population.
-        restarted: Whether the populations were drawn afresh.
-    """
-
-    populations: Array
+    populations: Array  # (robots, genes, individuals)
     judged: Judged
-    best_cost: float
-    best_team: tuple[int, ...] | None
-    num_feasible: int
-    restarted: bool
+    best_cost: float  # of a collision-free team; inf: there is none
+    best_team: tuple[int, ...] | None  # that team, the first of equal ones
+    num_feasible: int  # of the first robot, with a collision-free partner in every other population
+    restarted: bool  # whether the populations were drawn afresh
 
 
 def from_condition(condition: Any, **changes: Any) -> Curkovic:
-    """Return the scene and settings of a condition of `coevolution`, with changes.
-
-    Raises:
-        ValueError: If links are enveloped, or an obstacle is no disc.
-    """
+    """Return the scene and settings of a condition of `coevolution`, with changes."""
     planner, problem = condition.prepare()
     parts = (planner, planner.ga, planner.objective, planner.collision)
     obstacles = condition.scenario.obstacles
-    enveloped = any(arm.is_enveloped for arm in problem.collision.arms)
-    if enveloped or any(o.shape != "sphere" for o in obstacles):
-        raise ValueError("the reference is for links without envelopes among discs")
+    assert not any(arm.is_enveloped for arm in problem.collision.arms)
+    assert all(o.shape == "sphere" for o in obstacles), "the reference is for links among discs"
     names = {f.name for f in fields(Curkovic)}
-    settings = {
-        name: getattr(part, name) for part in parts for name in names if hasattr(part, name)
-    }
+    settings = {name: getattr(part, name) for part in parts for name in names & {*dir(part)}}
     scene: dict[str, Any] = {
         "start": problem.start,
         "goal": problem.goal,
@@ -278,7 +230,7 @@ def bred(
     populations, rows = generation.populations.copy(), iter(uniforms)
     for r in np.flatnonzero(c.moving):
         draws, before, costs = next(rows), generation.populations[r], generation.judged.costs[r]
-        parents = roulette(weights(c, costs), draws[:count])
+        parents = roulette(c, costs, draws[:count])
         offspring = before[:, parents]
         crossover(c, draws[count : count + 2 * (count // 2)].reshape(-1, 2), offspring)
         mutation(c, draws[count + 2 * (count // 2) :].reshape(-1, 3), offspring, rate)
@@ -288,14 +240,9 @@ def bred(
     return populations
 
 
-def weights(c: Curkovic, costs: Array) -> Array:
-    """Return the inverse of costs (of which none is 0 here), or their distance to the highest."""
-    return 1.0 / costs if c.selection == "inverse" else costs.max() - costs
-
-
-def roulette(wheel: Array, uniforms: Array) -> Integers:
-    """Draw parents in proportion to their weights."""
-    ends = np.cumsum(wheel)
+def roulette(c: Curkovic, costs: Array, uniforms: Array) -> Integers:
+    """Draw parents in proportion to the inverse of costs, or to their distance to the highest."""
+    ends = np.cumsum(1.0 / costs if c.selection == "inverse" else costs.max() - costs)
     return np.array([np.flatnonzero(ends > u * ends[-1])[0] for u in uniforms])
 
 
@@ -321,10 +268,7 @@ def mutation(c: Curkovic, uniforms: Array, offspring: Array, rate: float) -> Non
 
 
 def renewed_hall(c: Curkovic, generation: Generation, hall: list[Member]) -> list[Member]:
-    """Return the best teams of the hall and of those around the fronts; nobody is in two.
-
-    With distinct genomes "nobody" means a genome, of robots that move; else an index.
-    """
+    """Return the best teams of the hall and around the fronts; no genome, or index, is in two."""
     if not c.num_hall_teams:
         return []
     judged, by_genome = generation.judged, c.hall_distinct == "genome"
@@ -338,10 +282,7 @@ def renewed_hall(c: Curkovic, generation: Generation, hall: list[Member]) -> lis
         teams.append(generation.best_team)
     known = {names(generation, member.team, by_genome) for member in hall}
     new = [Member(team) for team in teams if names(generation, team, by_genome) not in known]
-    candidates = hall + new
-    for candidate in candidates:
-        candidate.key = judged.key(candidate.team)
-    candidates.sort(key=lambda member: (member.rank, member.key))  # stable
+    candidates = sorted(hall + new, key=lambda each: (each.rank, judged.key(each.team)))  # stable
     exclusive = [r for r in range(len(c.start)) if c.moving[r] or not by_genome]
     taken, chosen = set[tuple[int, bytes | int]](), list[Member]()
     for candidate in candidates:
@@ -353,22 +294,17 @@ def renewed_hall(c: Curkovic, generation: Generation, hall: list[Member]) -> lis
     return chosen
 
 
-def names(
-    generation: Generation, team: tuple[int, ...], by_genome: bool
-) -> tuple[bytes | int, ...]:
+def names(generation: Generation, team: tuple[int, ...], by_genome: bool) -> tuple[Any, ...]:
     """Return the genome, or the index, of every member of a team."""
-    if not by_genome:
-        return team
-    return tuple(generation.populations[r, :, i].tobytes() for r, i in enumerate(team))
+    genomes = (generation.populations[r, :, i].tobytes() for r, i in enumerate(team))
+    return tuple(genomes) if by_genome else team
 
 
 def front_members(
     generation: Generation, hall: list[tuple[int, ...]], by_genome: bool
 ) -> Iterator[tuple[int, int]]:
-    """Yield robot and individual of every front, one of several copies only.
-
-    With distinct genomes members of the hall are on the fronts in any case, else never.
-    """
+    """Yield robot and individual of every front, one of several copies only."""
+    # with distinct genomes members of the hall are on the fronts in any case, else never
     for r, criteria in enumerate(generation.judged.criteria):
         genomes = [genome.tobytes() for genome in generation.populations[r].T]
         in_hall = {genomes[team[r]] for team in hall}

@@ -1,12 +1,8 @@
 """The planner of Lavoie & Boudreau 2001 in numpy, over whole populations.
 
 Written from the paper and the operators' sources, without any kernel of evoexp but the normal
-deviates: every position of every link against every ellipse, every child judged anew. It takes its
-uniform numbers in the order in which `redundant_ga` takes them, so that both can be compared
-generation by generation: the initial population; then per generation the choice of parents, the
-crossover, the mutation, and at last the normal deviates.
-
-A population is an array (genes, individuals): joint angles [rad], or bits.
+deviates. Uniform numbers are taken in the order in which `redundant_ga` takes them. A population is
+an array (genes, individuals): joint angles [rad], or bits.
 """
 
 from collections.abc import Iterator

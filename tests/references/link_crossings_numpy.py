@@ -1,7 +1,4 @@
-"""Crossing links the obvious ways.
-
-In rational numbers pair by pair, and in numpy for whole populations.
-"""
+"""Crossing links, in rational numbers pair by pair, and in numpy for whole populations."""
 
 from fractions import Fraction
 from typing import Any
@@ -25,10 +22,8 @@ def exact_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
 
 
 def on_segment(a: Any, b: Any, c: Any) -> bool:
-    within = min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(
-        a[1], b[1]
-    )
-    return side(a, b, c) == 0 and within
+    within = (min(a[k], b[k]) <= c[k] <= max(a[k], b[k]) for k in (0, 1))
+    return side(a, b, c) == 0 and all(within)
 
 
 def exact_squared_distance(a: Any, b: Any, c: Any, d: Any) -> Fraction:
@@ -52,10 +47,7 @@ def cross(u: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> np.ndarray:
-    """Whether segments cross, by the signs of rounded line functions.
-
-    Ends are (2, …) and broadcast.
-    """
+    """Whether segments cross, by the signs of rounded line functions; ends are (2, …)."""
     first = cross(b - a, c - a) * cross(b - a, d - a) <= 0.0
     return np.asarray(first & (cross(d - c, a - c) * cross(d - c, b - c) <= 0.0))
 
@@ -63,17 +55,12 @@ def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> np.n
 def counts_of_populations(
     base_1: Any, points_1: FloatArray, base_2: Any, points_2: FloatArray
 ) -> np.ndarray:
-    """Return the number of colliding configurations of each pair, (N1, N2).
-
-    A configuration at a time.
-    """
+    """Return the number of colliding configurations of each pair, (N1, N2)."""
     counts = np.zeros((points_1.shape[2], points_2.shape[2]), dtype=np.int64)
     start_1, start_2 = (np.array(base)[:, None, None] for base in (base_1, base_2))
     for one, two in zip(points_1, points_2, strict=True):
-        a, b = (
-            (start_1, one[:2, :, None], one[2:, :, None]),
-            (start_2, two[:2, None], two[2:, None]),
-        )
+        a = start_1, one[:2, :, None], one[2:, :, None]
+        b = start_2, two[:2, None], two[2:, None]
         met = [crossing(a[m], a[m + 1], b[n], b[n + 1]) for m in (0, 1) for n in (0, 1)]
         counts += met[0] | met[1] | met[2] | met[3]
     return counts
@@ -89,23 +76,14 @@ def squared_distance(a: FloatArray, b: FloatArray, p: FloatArray) -> FloatArray:
 
 
 def envelope_counts(
-    lines_1: FloatArray,
-    tips_1: FloatArray,
-    radius_1: float,
+    lines_1: FloatArray,  # (4, 4, K, N1) of each boundary line its ends' x, y, x, y
+    tips_1: FloatArray,  # (K, 2, N1)
+    radius_1: float,  # of the circles around the tips
     lines_2: FloatArray,
     tips_2: FloatArray,
     radius_2: float,
 ) -> np.ndarray:
-    """Return the number of colliding configurations of each pair of enveloped arms, (N1, N2).
-
-    Args:
-        lines_1: (4, 4, K, N1): of each boundary line its ends' x, y, x, y.
-        tips_1: (K, 2, N1).
-        radius_1: Of the circles around the tips.
-        lines_2: (4, 4, K, N2).
-        tips_2: (K, 2, N2).
-        radius_2: As radius_1.
-    """
+    """Return the number of colliding configurations of each pair of enveloped arms, (N1, N2)."""
     counts = np.zeros((tips_1.shape[2], tips_2.shape[2]), dtype=np.int64)
     for k in range(len(tips_1)):
         tip_1, tip_2 = tips_1[k][:, :, None], tips_2[k][:, None]

@@ -1,8 +1,4 @@
-"""The criteria of a mobile arm's posture over the links' directions, by numpy.
-
-With derivatives by complex steps.
-
-The slow and obvious versions of what `references.placement_*` measures.
+"""The criteria of a mobile arm's posture over the links' directions, by numpy, slow and obvious.
 
 All functions take x (3, …) = (φ1, φ2, φ3) [rad], complex numbers, too: a complex step gives
 derivatives without any cancellation.
@@ -69,13 +65,11 @@ def cost(model: Directions, x: Any) -> Any:
 def margins(model: Directions, x: Any) -> Any:
     """Return what must not be negative: distances to the limits that there are, (limits, …)."""
     angles = np.stack([x[0], x[1] - x[0], x[2] - x[1]])
-    rows = []
-    for values, limits in ((angles, model.joint_limits), (torques(model, x), model.torque_limits)):
-        for value, (least, greatest) in zip(values, limits, strict=True):
-            rows += [value - least] * bool(np.isfinite(least)) + [greatest - value] * bool(
-                np.isfinite(greatest)
-            )
-    return np.stack(rows) if rows else np.zeros((0, *np.shape(x)[1:]))
+    values = np.concatenate([angles, torques(model, x)])
+    limits = np.concatenate([model.joint_limits, model.torque_limits])
+    rows = [(value - low, high - value) for value, (low, high) in zip(values, limits, strict=True)]
+    there = np.isfinite(limits).ravel()
+    return np.reshape(rows, (len(there), *np.shape(x)[1:]))[there]
 
 
 def programme(model: Directions, z: Any) -> Any:
@@ -102,9 +96,8 @@ def slide(model: Directions, x: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
 
     h, least, end = 1e-6, float(cost(model, x)), x
     for step in steps:
-        slope = np.array(
-            [cost(model, x + h * unit) - cost(model, x - h * unit) for unit in np.eye(3)]
-        ) / (2 * h)
+        around = [cost(model, x + h * unit) - cost(model, x - h * unit) for unit in np.eye(3)]
+        slope = np.array(around) / (2 * h)
         slope = slope - (slope @ normal(x)) / (normal(x) @ normal(x)) * normal(x)
         x = x - step * slope / np.linalg.norm(slope)
         for _ in range(3):

@@ -1,7 +1,4 @@
-"""Postures of the mobile arm, slowly and by another way.
-
-Over the directions of links 2 and 3, from Pinocchio.
-"""
+"""Postures of the mobile arm by Pinocchio, and over the directions of links 2 and 3."""
 
 import numpy as np
 import pinocchio as pin
@@ -11,18 +8,11 @@ from evoexp.robots.mobile_arm import MobileArm
 LENGTHS = (1.0, 1.0, 0.5)
 
 
-def robot(**changes: object) -> MobileArm:
-    return MobileArm(**({"link_lengths": LENGTHS, "platform_size": (0.6, 0.2)} | changes))  # type: ignore[arg-type]
-
-
 def pinocchio_posture(
     q: np.ndarray, force: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the end-effector (2,), the arm's Jacobian (2, 3) and its torques (3,) at q = (X_p.
-
-    Θ1, θ2, θ3) [rad].
-    """
-    model = robot().build().model
+    """Return end-effector (2,), Jacobian (2, 3), torques (3,) at q = (X_p, Θ1, θ2, θ3) [rad]."""
+    model = MobileArm(link_lengths=LENGTHS, platform_size=(0.6, 0.2)).build().model
     tip = pin.SE3(np.eye(3), np.array([LENGTHS[2], 0.0, 0.0]))
     frame = model.addFrame(pin.Frame("tip", model.njoints - 1, 0, tip, pin.FrameType.OP_FRAME))
     data = model.createData()
@@ -34,10 +24,7 @@ def pinocchio_posture(
 
 
 def dense_least(cost: object, height: float, num: int) -> float:
-    """Return the least cost over a grid of φ2, φ3 with φ1 from the height, both of its values.
-
-    `cost` takes (3, n).
-    """
+    """Return the least cost of (3, n) over a grid of φ2, φ3 with both values of φ1 there are."""
     grid = np.linspace(-np.pi, np.pi, num, endpoint=False)
     two, three = (values.ravel() for values in np.meshgrid(grid, grid))
     sine = (height - LENGTHS[1] * np.sin(two) - LENGTHS[2] * np.sin(three)) / LENGTHS[0]

@@ -21,10 +21,7 @@ def problem(case: str) -> Any:
 
 @functools.cache
 def found(case: str, kind: str) -> tuple[Truth, Any, Any]:
-    """Return the truth of a reference, the reference and its problem.
-
-    Kind: optimum, conventional or landscape.
-    """
+    """Return the truth, reference and problem of an optimum, a conventional one or a landscape."""
     experiment = "chen_landscapes" if kind == "landscape" else "chen_placement"
     label = f"{LABELS[case]}, {kind}"
     planner, prepared = composed(f"experiment={experiment}", label=label).prepare()

@@ -1,7 +1,7 @@
 """The evolution strategy on postures, slow and obvious: individuals are lists of postures.
 
-Everybody remembers the whole line of ancestors, the start first. Postures are judged by the phase,
-which has tests of its own; numbers are drawn as the planner does.
+Everybody remembers the whole line of ancestors, the start first. Postures are judged by the phase;
+numbers are drawn as the planner does.
 """
 
 from collections.abc import Iterator
@@ -15,25 +15,15 @@ from evoexp.planners.posture_es.phases import Problem
 
 
 class Cycle(NamedTuple):
-    """One generation of a phase.
+    """One generation of a phase."""
 
-    Attributes:
-        postures: (nq, individuals) as they were generated.
-        costs: (individuals,).
-        feasible: (individuals,).
-        best: The line of the best so far.
-        best_cost: Least cost so far.
-        evaluations: Since the start.
-        reason: Why the phase ends here; nothing if it goes on.
-    """
-
-    postures: Any
-    costs: Any
-    feasible: Any
-    best: list[Any]
-    best_cost: float
-    evaluations: int
-    reason: str
+    postures: Any  # (nq, individuals) as they were generated
+    costs: Any  # (individuals,)
+    feasible: Any  # (individuals,)
+    best: list[Any]  # the line of the best so far
+    best_cost: float  # least cost so far
+    evaluations: int  # since the start
+    reason: str  # why the phase ends here; nothing if it goes on
 
 
 class _Numbers:

@@ -1,6 +1,4 @@
-"""Distances of capsules and obstacles, slowly and plainly, in 80-bit numbers.
-
-The truth where coal iterates.
+"""Distances of capsules and obstacles in 80-bit numbers: the truth where coal iterates.
 
 The distance of a point moving along a segment to a convex body is a convex function of its place,
 so a search by thirds finds the least one.
@@ -12,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, SPHERE, ObstacleTable
+from evoexp.scenarios.obstacles import ObstacleTable
+from references.primitives_numpy import signed_distance
 
 Distance = Callable[[FloatArray], Any]
 REAL = np.longdouble
@@ -20,13 +19,7 @@ ROUNDS = 150  # [-] (2/3)^150 = 4e-27
 
 
 def along(start: FloatArray, end: FloatArray, distance: Distance) -> float:
-    """Return the least distance of a segment's points to a convex body.
-
-    Args:
-        start: (3,).
-        end: (3,).
-        distance: Of points (3,) to the body.
-    """
+    """Return the least distance of a segment's points, between ends (3,), to a convex body."""
     a, u = start.astype(REAL), end.astype(REAL) - start.astype(REAL)
     if not u.any():
         return float(distance(a))
@@ -55,22 +48,4 @@ def to_segment(start: FloatArray, end: FloatArray) -> Distance:
 
 def to_obstacle(table: ObstacleTable, k: int) -> Distance:
     """Return the signed distance function of obstacle k."""
-    center, turn = table.center[k].astype(REAL), table.rotation[k].reshape(3, 3).astype(REAL)
-    a, b, c = table.size[k].astype(REAL)
-
-    def distance(point: FloatArray) -> Any:
-        x, y, z = (point - center) @ turn
-        if table.kind[k] == SPHERE:
-            return np.sqrt(x * x + y * y + z * z) - a
-        if table.kind[k] == CAPSULE:
-            return np.sqrt(x * x + y * y + (z - np.clip(z, -b, b)) ** 2) - a
-        if table.kind[k] == BOX:
-            excess = np.array([abs(x) - a, abs(y) - b, abs(z) - c])
-        elif table.kind[k] == CYLINDER:
-            excess = np.array([np.sqrt(x * x + y * y) - a, abs(z) - b])
-        else:
-            return z
-        outside = np.maximum(excess, 0)
-        return np.sqrt(outside @ outside) + min(excess.max(), REAL(0))
-
-    return distance
+    return lambda point: signed_distance(table, k, point)

@@ -1,13 +1,7 @@
-"""The planner of Rana & Zalzala 1995 for planar arms of two links.
-
-In numpy and scipy over whole populations.
+"""The planner of Rana & Zalzala 1995 for planar arms of two links, in numpy over populations.
 
 Written from the paper, without any kernel of evoexp: what a careful author would write without a
-compiler. It takes its uniform numbers in the order in which `via_point_ga` takes them, so that both
-can be compared generation by generation: walks of the initial population (individual by individual,
-arm by arm, step by step); then per generation the roulette, per pair of parents the decision and a
-site per arm, the distinct slots, the decision per slot, and the new walks.
-
+compiler. It takes its uniform numbers in the order in which `via_point_ga` takes them.
 A population is an array (individuals, arms, N + 1, 2) [deg], joint angles relative to the link
 before.
 """
@@ -26,23 +20,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rana:
-    """Scene and settings.
+    """Scene and settings; those of `via_point_ga` and its parts have the same names."""
 
-    Attributes:
-        start: (arms, 2) [deg].
-        goal: (arms, 2) [deg].
-        bases: (arms, 2) [length unit].
-        link_lengths: (arms, 2) [length unit].
-        chords_per_segment: Of the polyline that measures the spline's arc length.
-        collision_substeps: Configurations tested per segment.
-
-    The others are the settings of `via_point_ga` and its parts, under the same names.
-    """
-
-    start: Array
-    goal: Array
-    bases: Array
-    link_lengths: Array
+    start: Array  # (arms, 2) [deg]
+    goal: Array  # (arms, 2) [deg]
+    bases: Array  # (arms, 2) [length unit]
+    link_lengths: Array  # (arms, 2) [length unit]
     num_via_points: int = 20
     walk_step: float = 2.5
     max_turn: float = 120.0
@@ -52,7 +35,7 @@ class Rana:
     relaxation_step: float = 0.5
     redistribution: bool = True
     spline_end: str = "natural"
-    chords_per_segment: int = 16
+    chords_per_segment: int = 16  # of the polyline that measures the spline's arc length
     population_size: int = 50
     num_generations: int = 500
     num_elites: int = 2
@@ -68,40 +51,27 @@ class Rana:
 
 
 class Judged(NamedTuple):
-    """Cost (individuals,) and the terms of Eq.
+    """Cost and the terms of Eq. 7."""
 
-    7: lengths and unevenness (individuals, arms), collisions.
-    """
-
-    cost: Array
-    lengths: Array
-    unevenness: Array
-    collisions: Array
+    cost: Array  # (individuals,)
+    lengths: Array  # (individuals, arms)
+    unevenness: Array  # (individuals, arms)
+    collisions: Array  # (individuals,)
 
 
 class Population(NamedTuple):
-    """One generation: strings (individuals, arms, N + 1, 2), costs and collisions.
+    """One generation."""
 
-    Individuals,.
-    """
-
-    strings: Array
-    costs: Array
-    collisions: Array
+    strings: Array  # (individuals, arms, N + 1, 2)
+    costs: Array  # (individuals,)
+    collisions: Array  # (individuals,)
 
 
 def from_condition(condition: Any, **changes: Any) -> Rana:
-    """Return the same scene and settings as a condition of `via_point_ga` has, with changes.
-
-    Raises:
-        ValueError: If the scene is none of planar arms of two links, standing straight and free of
-            obstacles.
-    """
+    """Return the same scene and settings as a condition of `via_point_ga` has, with changes."""
     robot, scenario, planner = condition.robot, condition.scenario, condition.planner
-    if scenario.obstacles or any(
-        len(arm.link_lengths) != 2 or arm.base_angle for arm in robot.arms
-    ):
-        raise ValueError("the reference is for planar arms of two links without obstacles")
+    assert not scenario.obstacles, "the reference is for planar arms of two links alone"
+    assert not any(len(arm.link_lengths) != 2 or arm.base_angle for arm in robot.arms)
     settings: dict[str, Any] = {}
     for part in (planner, planner.ga, planner.objective, planner.collision):
         settings |= {f.name: getattr(part, f.name) for f in fields(Rana) if hasattr(part, f.name)}
@@ -153,54 +123,41 @@ def walks(rana: Rana, rng: np.random.Generator, count: int) -> Array:
     for i in range(1, num):
         ahead = rana.goal - path[:, :, i - 1]
         angle = np.arctan2(ahead[..., 1], ahead[..., 0]) + turns[:, :, i - 1]
-        path[:, :, i] = path[:, :, i - 1] + length[:, None] * np.stack(
-            [np.cos(angle), np.sin(angle)], axis=-1
-        )
+        step = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        path[:, :, i] = path[:, :, i - 1] + length[:, None] * step
     return path
 
 
 def smooth(rana: Rana, strings: Array) -> Array:
     """Redistribute along splines at equal arc length, then relax once (Eqs. 8, 9)."""
-    paths = strings.reshape(-1, rana.num_via_points + 1, 2)
-    paths = (
-        redistributed(paths, rana.chords_per_segment, rana.spline_end)
-        if rana.redistribution
-        else paths.copy()
-    )
+    paths = strings.reshape(-1, rana.num_via_points + 1, 2).copy()
+    if rana.redistribution:
+        paths = redistributed(paths, rana.chords_per_segment, rana.spline_end)
     for i in range(1, rana.num_via_points):
-        paths[:, i] += rana.relaxation_step * (
-            (paths[:, i - 1] + paths[:, i + 1]) / 2.0 - paths[:, i]
-        )
+        middle = (paths[:, i - 1] + paths[:, i + 1]) / 2.0
+        paths[:, i] += rana.relaxation_step * (middle - paths[:, i])
     return paths.reshape(strings.shape)
 
 
 def redistributed(paths: Array, chords: int, spline_end: str) -> Array:
-    """Return points of paths (paths, N + 1, joints) at equal length along the splines.
-
-    Measured by chords.
-    """
+    """Return points of paths (paths, N + 1, joints) at equal length of chords along the splines."""
     num = paths.shape[1] - 1
-    rows = np.arange(len(paths))[:, None]
-    spline: Any = scipy.interpolate.CubicSpline(
-        np.arange(num + 1), paths, axis=1, bc_type=spline_end
-    )
+    rows, knots = np.arange(len(paths))[:, None], np.arange(num + 1)
+    spline: Any = scipy.interpolate.CubicSpline(knots, paths, axis=1, bc_type=spline_end)
     steps = np.diff(spline(np.arange(num * chords + 1) / chords), axis=1)
     length = np.zeros((len(paths), num * chords + 1))
     np.cumsum(np.sqrt((steps * steps).sum(axis=2)), axis=1, out=length[:, 1:])
     target = length[:, -1:] * (np.arange(1, num) / num)
-    k = np.array(
-        [np.searchsorted(of, at, side="right") - 1 for of, at in zip(length, target, strict=True)]
-    )
-    k = np.clip(k, 0, num * chords - 1)
+    before = [np.searchsorted(*each, side="right") - 1 for each in zip(length, target, strict=True)]
+    k = np.clip(before, 0, num * chords - 1)
     begin, end = length[rows, k], length[rows, k + 1]
     u = (k + (target - begin) / np.where(end > begin, end - begin, 1.0)) / chords
     segment = np.minimum(u.astype(int), num - 1)
     t = (u - segment)[:, :, None]
     c3, c2, c1, c0 = spline.c[:, segment, rows]  # each (paths, N − 1, joints)
     result = paths.copy()
-    result[:, 1:num] = np.where(
-        length[:, -1, None, None] > 0.0, ((c3 * t + c2) * t + c1) * t + c0, paths[:, 1:num]
-    )
+    values = ((c3 * t + c2) * t + c1) * t + c0
+    result[:, 1:num] = np.where(length[:, -1, None, None] > 0.0, values, paths[:, 1:num])
     return result
 
 
@@ -209,17 +166,11 @@ def judge(rana: Rana, strings: Array) -> Judged:
     steps = np.sqrt((np.diff(strings, axis=2) ** 2).sum(axis=3))  # (individuals, arms, N)
     lengths = steps.sum(axis=2)
     unevenness = np.abs(steps - lengths[:, :, None] / steps.shape[2]).sum(axis=2)
-    collisions = (
-        colliding(rana, between(strings, rana.collision_substeps))
-        .any(axis=2)
-        .sum(axis=1)
-        .astype(float)
-    )
-    cost = (
-        rana.length_weight * lengths.sum(axis=1)
-        + rana.unevenness_weight * unevenness.sum(axis=1)
-        + rana.collision_weight * collisions
-    )
+    hits = colliding(rana, between(strings, rana.collision_substeps))
+    collisions = hits.any(axis=2).sum(axis=1).astype(float)
+    cost = rana.length_weight * lengths.sum(axis=1)
+    cost = cost + rana.unevenness_weight * unevenness.sum(axis=1)
+    cost = cost + rana.collision_weight * collisions
     return Judged(cost, lengths, unevenness, collisions)
 
 
@@ -241,19 +192,12 @@ def colliding(rana: Rana, q: Array) -> NDArray[np.bool_]:
 
 
 def _centers(rana: Rana, arm: int, q: Array) -> tuple[Array, Array]:
-    """Return x and y of the circles of one arm, joint to joint, the shared one once.
-
-    (…, circles).
-    """
+    """Return x and y of the circles of one arm, the shared one once, (…, circles) each."""
     first, second = np.deg2rad(q[..., 0]), np.deg2rad(q[..., 0] + q[..., 1])
     lengths, fractions = rana.link_lengths[arm], np.linspace(0.0, 1.0, rana.spheres_per_link)
     coordinates = []
-    for base, one, two in zip(
-        rana.bases[arm],
-        (np.cos(first), np.sin(first)),
-        (np.cos(second), np.sin(second)),
-        strict=True,
-    ):
+    ways = (np.cos(first), np.cos(second)), (np.sin(first), np.sin(second))
+    for base, (one, two) in zip(rana.bases[arm], ways, strict=True):
         upper = base + lengths[0] * one[..., None] * fractions
         lower = upper[..., -1:] + lengths[1] * two[..., None] * fractions[1:]
         coordinates.append(np.concatenate([upper, lower], axis=-1))
@@ -278,9 +222,7 @@ def crossover(rana: Rana, rng: np.random.Generator, parents: Array) -> Array:
     children = parents.copy()
     if num < 2:
         return children
-    sites = 1 + np.minimum(
-        (uniforms[:, 1:] * (num - 1)).astype(int), num - 2
-    )  # (pairs, arms), 1 … N − 1
+    sites = 1 + np.minimum((uniforms[:, 1:] * (num - 1)).astype(int), num - 2)  # 1 … N − 1
     pair, arm = np.arange(len(first))[:, None], np.arange(arms)
     gap = np.linalg.norm(first[pair, arm, sites] - second[pair, arm, sites], axis=2)
     crossed = (uniforms[:, 0] < rana.crossover_rate) & (gap < rana.crossover_distance).all(axis=1)

@@ -1,7 +1,6 @@
 """RRT-Connect and shortcuts, slow and obvious: lists of nodes, one configuration after the other.
 
-A configuration is asked for by a function of one configuration, so that this knows nothing of
-collision models. Random numbers are drawn as the planner draws them.
+Random numbers are drawn as the planner draws them.
 """
 
 import itertools
@@ -13,28 +12,19 @@ import numpy as np
 
 
 class Outcome(NamedTuple):
-    """What a search came to.
+    """What a search came to."""
 
-    Attributes:
-        path: Configurations from start to goal; none if there is no path.
-        first_length: Length of the path before any shortcut [deg].
-        asked: Configurations that were asked for.
-        iterations: Random configurations.
-        nodes: Of both trees.
-    """
-
-    path: list[Any]
-    first_length: float
-    asked: int
-    iterations: int
-    nodes: int
+    path: list[Any]  # configurations from start to goal; none if there is no path
+    first_length: float  # of the path before any shortcut [deg]
+    asked: int  # configurations that were asked for
+    iterations: int  # random configurations
+    nodes: int  # of both trees
 
 
 class Planner:
     """Grows two trees and shortens what they find."""
 
     def __init__(self, collides: Callable[[Any], bool], step: float, substeps: int) -> None:
-        """Begin with an obstacle test of one configuration, and the length of a step [deg]."""
         self.collides, self.step, self.resolution = collides, step, step / substeps
         self.asked = 0
 

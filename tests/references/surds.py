@@ -80,12 +80,9 @@ def direction_times_4(degrees: int) -> Point:
 
 
 def exact_arm(base: tuple[int, int], link: int, posture: tuple[int, int]) -> list[Point]:
-    """Return base, elbow and tip of an arm of two links.
+    """Return base, elbow and tip of an arm of two links as long as `link`, a multiple of 4.
 
-    Args:
-        base: x, y.
-        link: Length of both links, a multiple of 4.
-        posture: Angles of the links from +x [deg], multiples of 15.
+    Angles of links are from +x [deg], multiples of 15.
     """
     points = [(Surd(base[0]), Surd(base[1]))]
     for degrees in posture:

@@ -1,61 +1,49 @@
 """What is known of the shipped maps, and the script that finds it."""
 
-from importlib.machinery import SourceFileLoader
-from importlib.util import module_from_spec, spec_from_loader
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from composed import composed
+import composed
 from evoexp.references.grid_frontier import GridFrontier, known_maps
 from planners.grid_samples import planner, solvable
-from references.all_paths import all_simple_paths, path_cost
-from references.test_grid_frontier import SETTINGS
+from references.test_grid_frontier import SETTINGS, all_simple_paths, path_cost
 from shipped_conditions import expanded
 
-SCRIPT = Path(__file__).parents[2] / "scripts" / "update-grid-truths"
 EXPERIMENTS = ("chen_path", "chen_lingering", "chen_assumptions")
 
 
 @pytest.fixture(scope="module")
 def script() -> Any:
-    spec = spec_from_loader(
-        "update_grid_truths", SourceFileLoader("update_grid_truths", str(SCRIPT))
-    )
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return composed.script("update-grid-truths")
+
+
+def reference(label: str, experiment: str = "chen_path") -> Any:
+    return dict(expanded(experiment, "paper").conditions)[f"{label}, exact"].prepare()
 
 
 def test_the_best_path_of_a_shipped_map_is_a_path_and_no_bound_is_above_it() -> None:
-    own, problem = dict(expanded("chen_path", "paper").conditions)["(b), exact"].prepare()
+    own, problem = reference("(b)")
     known = known_maps()[own.key(problem)]
     costs = [path_cost(own.planner, problem, path) for path in known.paths]
     assert 32.567 < min(known.bounds) <= min(costs) < 32.7304
     for path in known.paths:
         assert (path[0], path[-1]) == problem.ends and len(set(path)) == len(path)
     assert own.truth(problem).cost == pytest.approx(min(costs), rel=1e-12)
-
-
-def test_a_map_is_known_by_all_that_its_truth_depends_on() -> None:
-    own, problem = dict(expanded("chen_path", "paper").conditions)["(b), exact"].prepare()
+    # a map is known by all that its truth depends on
     heavier = own.planner.objective.model_copy(update={"distance_weight": 0.123})
-    for update in (
-        {"max_nodes": own.max_nodes - 1},
-        {"planner": own.planner.model_copy(update={"objective": heavier})},
-    ):
+    planner_of_another = own.planner.model_copy(update={"objective": heavier})
+    for update in ({"max_nodes": own.max_nodes - 1}, {"planner": planner_of_another}):
         assert own.model_copy(update=update).key(problem) not in known_maps()
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize(("label", "least"), [("(b), exact", 31.540), ("(c), exact", 55.998)])
+@pytest.mark.parametrize(("label", "least"), [("(b)", 31.540), ("(c)", 55.998)])
 def test_the_truth_of_the_papers_workspace_is_known_within_one_per_cent(
     label: str, least: float
 ) -> None:
-    own, problem = composed("experiment=chen_path", label=label).prepare()
+    own, problem = reference(label)
     truth = own.truth(problem)
     assert least < truth.terms["lower_bound"] <= truth.cost
     assert truth.cost <= 1.01 * truth.terms["lower_bound"]
@@ -75,8 +63,7 @@ def test_every_shipped_map_is_known_and_nothing_else(script: Any) -> None:
 
 @pytest.mark.matrix
 def test_the_script_finds_what_is_stored(script: Any) -> None:
-    label = "every other obstacle, exact"  # the fastest map
-    own, problem = dict(expanded("chen_assumptions", "paper").conditions)[label].prepare()
+    own, problem = reference("every other obstacle", "chen_assumptions")  # the fastest map
     stored, found = known_maps()[own.key(problem)], script.searched(own, problem)
     assert (found.paths, found.improved) == (stored.paths, stored.improved)
     np.testing.assert_allclose(found.bounds, stored.bounds, rtol=1e-12)

@@ -1,7 +1,4 @@
-"""Exact optima against another parametrisation.
-
-Conventional methods and landscapes against the planner's kernels.
-"""
+"""Exact optima by another parametrisation, conventional methods by the planner's kernels."""
 
 import functools
 
@@ -23,37 +20,30 @@ CASES = {  # E of the optimum as first found; see the test with another parametr
 }
 
 
+def turned(*middle: float, half: float, num: int) -> np.ndarray:
+    """Return a grid of θ1, θ2 [deg] around a place, (2, num²)."""
+    axes = (place + np.linspace(-half, half, num) for place in middle)
+    return np.stack(np.meshgrid(*axes)).reshape(2, -1)
+
+
 @pytest.mark.examples(2)
 @pytest.mark.parametrize("case", CASES)
 def test_the_optimum_is_that_of_another_parametrisation(case: str) -> None:
     truth, _, problem = found(case, "optimum")
     assert truth.cost == pytest.approx(CASES[case], abs=1e-9)
     model = directions_of(problem.model, problem.angle_limits)
-    cost = functools.partial(slow.cost, model)
-    least = dense_least(
-        cost, 1.4, 1200
-    )  # every 0.3°: the cost near a smooth minimum changes by 1e-4 or so
+    # every 0.3°: the cost near a smooth minimum changes by 1e-4 or so
+    least = dense_least(functools.partial(slow.cost, model), 1.4, 1200)
     assert truth.cost <= least * (1.0 + 1e-12)
     assert least == pytest.approx(truth.cost, rel=1e-2)
     minima = truth.arrays["minima"]
     assert (np.diff(minima[:, 2]) >= -1e-8).all()
     assert len(minima) == truth.terms["num_minima"]
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_no_posture_of_a_fine_grid_is_below_the_optimum(case: str) -> None:
-    truth, _, problem = found(case, "optimum")
-    one, two = truth.best
-    grid = np.stack(
-        np.meshgrid(one + np.linspace(-1, 1, 201), two + np.linspace(-1, 1, 201))
-    ).reshape(2, -1)
-    assert problem.model.measure(grid)[0].min() >= truth.cost - 1e-12
-
-
-def test_the_minimax_optimum_has_equal_torques() -> None:
-    truth, _, problem = found("minimax", "optimum")
-    torques = np.abs(problem.model.posture(*truth.best)[1][5:8])
-    np.testing.assert_allclose(torques, truth.cost, atol=1e-10)
+    around = problem.model.measure(turned(*truth.best, half=1, num=201))[0]
+    assert around.min() >= truth.cost - 1e-12
+    if case == "minimax":
+        torques = np.abs(problem.model.posture(*truth.best)[1][5:8])
+        np.testing.assert_allclose(torques, truth.cost, atol=1e-10)
 
 
 @pytest.mark.examples(1)
@@ -63,32 +53,26 @@ def test_the_minimax_optimum_has_equal_torques() -> None:
 )
 def test_optima_within_joint_limits_lie_on_them(limit: list[list[int]], k: int) -> None:
     own = composed("experiment=chen_placement", label="A torque norm, optimum")
-    robot = own.robot.model_copy(
-        update={"joint_limits": tuple((float(low), float(high)) for low, high in limit)}
-    )
+    limits = tuple((float(low), float(high)) for low, high in limit)
+    robot = own.robot.model_copy(update={"joint_limits": limits})
     problem = own.planner.prepare(robot, own.scenario)
     truth = own.planner.truth(problem)
     assert truth.solved
     assert truth.cost > CASES["torque_norm"] + 1e-3
-    fine = np.stack(
-        np.meshgrid(np.linspace(-180, 180, 1801), np.linspace(-180, 180, 1801))
-    ).reshape(2, -1)
-    least = problem.model.measure(fine)[0].min()
+    least = problem.model.measure(turned(0, 0, half=180, num=1801))[0].min()
     assert truth.cost <= least * (1 + 1e-9)
     assert truth.cost == pytest.approx(least, rel=0.05)
     assert min(abs(truth.best[k] - edge) for edge in limit[k]) < 1e-6
 
 
 def test_conventional_ends_are_never_below_the_optimum_and_some_are_stuck() -> None:
-    for case in ("minimax", "manipulability"):
+    for case, names in (("minimax", ["bounded"]), ("manipulability", ["newton"])):
         truth, _, _ = found(case, "conventional")
-        least = CASES[case]
-        names = ["bounded" if case == "minimax" else "newton", "subgradient"]
-        for name in names:
+        for name in [*names, "subgradient"]:
             ends = truth.arrays[name][:, 2]
             assert ends.shape == (60,)
-            assert ends.min() > least * (1.0 - 1e-4), "SLSQP may leave the target by 1e-6"
-            near = np.count_nonzero(ends < least * 1.01)
+            assert ends.min() > CASES[case] * (1.0 - 1e-4), "SLSQP may leave the target by 1e-6"
+            near = np.count_nonzero(ends < CASES[case] * 1.01)
             assert 5 < near < 55, (case, name, near)
         assert ("bounded" in truth.arrays) == (case == "minimax")
 

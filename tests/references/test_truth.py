@@ -16,30 +16,27 @@ from evoexp.batch.reproduction import (
     fingerprint,
     same_fingerprint,
 )
+from evoexp.batch.runner import Batch
+from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.cli import main
 from evoexp.configuration import compose
-from evoexp.errors import EvoexpError, SettingError
+from evoexp.errors import EvoexpError
 from evoexp.report.results.stored_results import gather
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory
 from guests import on_path, write_distribution
 
-EXPERIMENT = (
-    "experiment=rana_obstacles",
-    "ga.population_size=8",
-    "ga.num_generations=2",
-    "runner=serial",
-)
-WORDS = (*EXPERIMENT, "planner.num_new_trajectories=1", "+reference._target_=counted")
+SMALL = ("ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
+EXPERIMENT = ("experiment=rana_obstacles", *SMALL, "runner=serial")
+WORDS = (*EXPERIMENT, "+reference._target_=counted")
 
 
 @pytest.fixture(autouse=True)
 def registered(tmp_path: Path) -> Iterator[None]:
     """Have a reference of our own among the registered components."""
-    write_distribution(
-        tmp_path / "guest", "counted", components={"counted": "references.counted:Counted"}
-    )
+    components = {"counted": "references.counted:Counted"}
+    write_distribution(tmp_path / "guest", "counted", components=components)
     with on_path(tmp_path / "guest"):
         yield
 
@@ -67,8 +64,6 @@ def test_a_reference_stands_around_the_planner_and_overrides_reach_it() -> None:
     assert found.planner.planner.ga.mutation_rate == 0.5
     assert (experiment.num_replicates, found.num_replicates(experiment.num_replicates)) == (9, 1)
 
-
-def test_the_group_is_no_part_of_other_identities() -> None:
     without = composed("experiment=rana_obstacles")
     assert not without.is_reference
     assert without.num_replicates(7) == 7
@@ -76,38 +71,48 @@ def test_the_group_is_no_part_of_other_identities() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("field", "words", "message"),
     [
-        (["control=random_search"], "reference: must be left out beside a control, was 'counted'"),
         (
-            ["+reference.planner=1"],
-            "reference.planner: must be left out: it is the chosen planner, was 1",
+            "reference",
+            ["control=random_search"],
+            "must be left out beside a control, was 'counted'",
         ),
-        (["+reference.rows=x"], "reference.rows: must be a whole number, was 'x'"),
+        (
+            "reference.planner",
+            ["+reference.planner=1"],
+            "must be left out: it is the chosen planner",
+        ),
+        ("reference.rows", ["+reference.rows=x"], "must be a whole number, was 'x'"),
+        ("reference", ["+reference.rows=4"], "must be chosen: "),
     ],
 )
-def test_what_cannot_be(words: list[str], message: str) -> None:
-    with pytest.raises(SettingError) as error:
-        compose.expand([*WORDS, *words])
-    assert str(error.value) == message
-
-
-def test_a_reference_needs_its_name() -> None:
-    with pytest.raises(EvoexpError, match="reference: must be chosen: "):
-        compose.expand([*EXPERIMENT, "planner.num_new_trajectories=1", "+reference.rows=4"])
+def test_what_cannot_be(field: str, words: list[str], message: str) -> None:
+    with pytest.raises(EvoexpError) as error:
+        compose.expand([*(EXPERIMENT if "chosen: " in message else WORDS), *words])
+    assert str(error.value).startswith(f"{field}: {message}")
 
 
 def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
     found = composed(*WORDS)
-    content = run_replicate(found, 0).content
-    log = read_log(content)
+    log = read_log(run_replicate(found, 0).content)
     assert len(log.generations) == 1
     assert log.summary.terms["share"] == 0.25
-    assert list(log.arrays()) == ["counts", "table"]
-    np.testing.assert_array_equal(log.arrays()["table"][:, 0], [0.0, 0.1, 0.2])
-    assert np.isinf(log.arrays()["table"][:, 1]).all()
-    assert log.arrays()["counts"].dtype == np.int64
+    arrays = log.arrays()
+    assert list(arrays) == ["counts", "table"]
+    np.testing.assert_array_equal(arrays["table"][:, 0], [0.0, 0.1, 0.2])
+    assert np.isinf(arrays["table"][:, 1]).all()
+    assert arrays["counts"].dtype == np.int64
     assert run_replicate(found, 0).summary.digest == log.summary.digest
+    # arrays that are missing differ
+    other = read_log(run_replicate(composed(*WORDS, "+reference.rows=4"), 0).content)
+    for changed, name, distance in (
+        (log, "", 0.0),
+        (log._replace(attachments=other.attachments), "attachment table.npy: values", np.inf),
+        (log._replace(attachments={}), "attachment counts.npy", np.inf),
+    ):
+        assert farthest(field_differences(log, changed)) == (name, distance)
+    assert fingerprint(found, log.summary) == f"cost {log.summary.best_cost!r}"
 
 
 @pytest.mark.matrix
@@ -137,10 +142,7 @@ def test_the_report_reads_references_beside_the_planners(
 ) -> None:
     said("run", *WORDS[:-1], "num_replicates=2")
     said("run", *WORDS, "num_replicates=2")
-    conditions = [
-        ("ga", composed(*WORDS[:-1])),
-        ("truth", composed(*WORDS)),
-    ]
+    conditions = [("ga", composed(*WORDS[:-1])), ("truth", composed(*WORDS))]
     results = gather(tmp_path / "outputs", conditions, 2, "", "", "")
     ga, truth = results.conditions
     assert (ga.planned, truth.planned, ga.done, truth.done) == (2, 1, 2, 1)
@@ -152,10 +154,8 @@ def test_the_report_reads_references_beside_the_planners(
     with pytest.raises(KeyError):
         ga.array("table")
     page = said("report", *(c.id[:12] for _, c in conditions)).split("report: ")[1].strip()
-    text = Path(page).read_text()
-    assert "reference" in text
-    table = Path(page).with_name("convergence.csv").read_text()
-    assert table.count("reference") == 1
+    assert "reference" in Path(page).read_text()
+    assert Path(page).with_name("convergence.csv").read_text().count("reference") == 1
 
 
 def test_numbers_are_compared_to_a_tolerance() -> None:
@@ -169,22 +169,7 @@ def test_numbers_are_compared_to_a_tolerance() -> None:
     assert not same_fingerprint("0" * 32, "cost 0.0")
 
 
-def test_arrays_that_are_missing_differ() -> None:
-    found = composed(*WORDS)
-    other = composed(*WORDS, "+reference.rows=4")
-    one, two = (read_log(run_replicate(c, 0).content) for c in (found, other))
-    assert farthest(field_differences(one, one)) == ("", 0.0)
-    taller = one._replace(attachments=two.attachments)
-    assert farthest(field_differences(one, taller)) == ("attachment table.npy: values", np.inf)
-    fewer = one._replace(attachments={})
-    assert farthest(field_differences(one, fewer)) == ("attachment counts.npy", np.inf)
-    assert fingerprint(found, one.summary) == f"cost {one.summary.best_cost!r}"
-
-
 def test_references_run_first(tmp_path: Path) -> None:
-    from evoexp.batch.runner import Batch
-    from evoexp.batch.runner_settings import RunnerSettings
-
     planner, truth = (composed(*w) for w in (WORDS[:-1], WORDS))
     batch = Batch([(planner, 2, {}), (truth, 1, {})], RunnerSettings(num_workers=1), tmp_path)
     assert [job.condition_id for job in batch.jobs] == [truth.id, planner.id, planner.id]

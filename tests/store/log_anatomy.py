@@ -8,18 +8,9 @@ from typing import Any
 
 import orjson
 import zstandard
+from mcap import records as mcap
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-)
 
 from evoexp.store.digests import ContentDigest
 from evoexp.store.log import CONTENT_DIGEST, SUMMARY
@@ -27,35 +18,21 @@ from evoexp.store.log import CONTENT_DIGEST, SUMMARY
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log_time, publish_time
-_KINDS: dict[int, Any] = {
-    Opcode.ATTACHMENT: Attachment,
-    Opcode.METADATA: Metadata,
-    Opcode.CHUNK: Chunk,
-    Opcode.CHANNEL: Channel,
-    Opcode.SCHEMA: Schema,
-}
+Record = tuple[int, bytes]  # opcode, body
 
 
 class Part:
-    """A record of the data section.
-
-    Attributes:
-        opcode: Its kind.
-        body: Its bytes; of a chunk its content, uncompressed.
-        size: Of a chunk: the size that it claims; None: its own.
-        frame: Of a chunk: its compressed content; None: its content, compressed.
-        length: The length of the record that its head tells; None: its own.
-    """
+    """A record of the data section."""
 
     def __init__(self, opcode: int, body: bytes) -> None:
-        self.opcode, self.body = opcode, body
-        self.size: int | None = None
-        self.frame: bytes | None = None
-        self.length: int | None = None
+        self.opcode, self.body = opcode, body  # of a chunk: its content, uncompressed
+        self.size: int | None = None  # that a chunk claims; None: its own
+        self.frame: bytes | None = None  # compressed content; None: of the body
+        self.length: int | None = None  # that the record's head tells; None: its own
 
 
-def records(content: bytes) -> list[tuple[int, bytes]]:
-    """Return (opcode, body) of records that follow each other."""
+def records(content: bytes) -> list[Record]:
+    """Return records that follow each other."""
     found, start = [], 0
     while start < len(content):
         opcode, length = HEAD.unpack_from(content, start)
@@ -88,22 +65,18 @@ def take_apart(content: bytes) -> list[Part]:
         if opcode == Opcode.DATA_END:
             break
         if opcode == Opcode.CHUNK:
-            chunk = parsed(Chunk, body)
+            chunk = parsed(mcap.Chunk, body)
             body = zstandard.decompress(chunk.data, chunk.uncompressed_size)
         if opcode != Opcode.MESSAGE_INDEX:  # nobody reads it
             parts.append(Part(opcode, body))
     return parts
 
 
-def put_together(parts: list[Part], summary: list[tuple[int, bytes]] | None = None) -> bytes:
-    """Return the log of some records, with the index of what is in them and fitting checksums.
-
-    Args:
-        parts: The records of the data section.
-        summary: Records of the summary section instead of those that describe the parts.
-    """
-    _digest(parts)
-    content, index = MAGIC, list[tuple[int, bytes]]()
+def put_together(parts: list[Part], summary: list[Record] | None = None) -> bytes:
+    """Return the log of some records; `summary` stands in the place of their index if given."""
+    with suppress(Exception):  # of what is damaged no digest fits
+        _digest(parts)
+    content, index = MAGIC, list[Record]()
     for part in parts:
         body = _chunk(part) if part.opcode == Opcode.CHUNK else part.body
         with suppress(Exception):  # what is damaged has no entry
@@ -116,7 +89,7 @@ def put_together(parts: list[Part], summary: list[tuple[int, bytes]] | None = No
     return content + tail + struct.pack("<I", zlib.crc32(tail)) + MAGIC
 
 
-def index_of(content: bytes) -> list[tuple[int, bytes]]:
+def index_of(content: bytes) -> list[Record]:
     """Return the records of a log's summary section."""
     start = struct.unpack_from("<Q", content, len(content) - 8 - 20)[0]
     return records(content[start : -8 - 20 - HEAD.size])
@@ -131,47 +104,50 @@ def _chunk(part: Part) -> bytes:
     frame = zstandard.compress(part.body) if part.frame is None else part.frame
     size = len(part.body) if part.size is None else part.size
     crc = 0 if part.frame is not None else zlib.crc32(part.body)
-    return written(Chunk("zstd", frame, 0, 0, crc, size))
+    return written(mcap.Chunk("zstd", frame, 0, 0, crc, size))
 
 
-def _entries(part: Part, body: bytes, offset: int) -> list[tuple[int, bytes]]:
-    found: list[tuple[int, bytes]] = []
-    if part.opcode == Opcode.CHUNK:
-        inner = records(part.body)
-        channels = {struct.unpack_from("<H", b)[0] for op, b in inner if op == Opcode.MESSAGE}
-        found += [entry for entry in inner if entry[0] in (Opcode.SCHEMA, Opcode.CHANNEL)]
-        entry = ChunkIndex(len(body), offset, "zstd", 0, 0, 0, dict.fromkeys(channels, 0), 0, 0)
-        found.append((Opcode.CHUNK_INDEX, written(entry)))
-    elif part.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-        found.append((part.opcode, body))
-    elif part.opcode == Opcode.ATTACHMENT:
-        one = parsed(Attachment, body)
-        place = AttachmentIndex(offset, len(body), 0, 0, len(one.data), one.name, one.media_type)
-        found.append((Opcode.ATTACHMENT_INDEX, written(place)))
-    elif part.opcode == Opcode.METADATA:
-        name = parsed(Metadata, body).name
-        found.append((Opcode.METADATA_INDEX, written(MetadataIndex(offset, len(body), name))))
-    return found
+def _entries(part: Part, body: bytes, offset: int) -> list[Record]:
+    """Return what the index says of a record that begins at an offset."""
+    place: Any
+    match part.opcode:
+        case Opcode.CHUNK:
+            inner = records(part.body)
+            channels = {struct.unpack_from("<H", b)[0] for op, b in inner if op == Opcode.MESSAGE}
+            known = dict.fromkeys(channels, 0)
+            place = mcap.ChunkIndex(len(body), offset, "zstd", 0, 0, 0, known, 0, 0)
+            described = [entry for entry in inner if entry[0] in (Opcode.SCHEMA, Opcode.CHANNEL)]
+            return [*described, (Opcode.CHUNK_INDEX, written(place))]
+        case Opcode.SCHEMA | Opcode.CHANNEL:
+            return [(part.opcode, body)]
+        case Opcode.ATTACHMENT:
+            one = parsed(mcap.Attachment, body)
+            named = (len(one.data), one.name, one.media_type)
+            place = mcap.AttachmentIndex(offset, len(body), 0, 0, *named)
+            return [(Opcode.ATTACHMENT_INDEX, written(place))]
+        case Opcode.METADATA:
+            place = mcap.MetadataIndex(offset, len(body), parsed(mcap.Metadata, body).name)
+            return [(Opcode.METADATA_INDEX, written(place))]
+    return []
 
 
 def _digest(parts: list[Part]) -> None:
     """Put the digest of the messages, as they are now, into the summary."""
-    digest, channels, schemas = ContentDigest(), dict[int, Channel](), dict[int, str]()
-    with suppress(Exception):
-        for part in parts:
-            for opcode, body in records(part.body) if part.opcode == Opcode.CHUNK else ():
-                if opcode == Opcode.SCHEMA:
-                    schemas[parsed(Schema, body).id] = parsed(Schema, body).name
-                elif opcode == Opcode.CHANNEL:
-                    channels[parsed(Channel, body).id] = parsed(Channel, body)
-                elif opcode == Opcode.MESSAGE:
-                    number, sequence, log_time, _ = MESSAGE.unpack_from(body)
-                    own = channels[number]
-                    identity = (own.topic, schemas[own.schema_id], own.message_encoding)
-                    digest.update(identity, log_time, sequence, body[MESSAGE.size :])
-        for part in parts:
-            if part.opcode == Opcode.METADATA:
-                metadata = parsed(Metadata, part.body)
-                if metadata.name == SUMMARY:
-                    metadata.metadata[CONTENT_DIGEST] = orjson.dumps(digest.hexdigest()).decode()
-                    part.body = written(metadata)
+    digest, channels, schemas = ContentDigest(), dict[int, mcap.Channel](), dict[int, str]()
+    chunks = [records(part.body) for part in parts if part.opcode == Opcode.CHUNK]
+    for opcode, body in (record for chunk in chunks for record in chunk):
+        if opcode == Opcode.SCHEMA:
+            schemas[parsed(mcap.Schema, body).id] = parsed(mcap.Schema, body).name
+        elif opcode == Opcode.CHANNEL:
+            channels[parsed(mcap.Channel, body).id] = parsed(mcap.Channel, body)
+        elif opcode == Opcode.MESSAGE:
+            number, sequence, log_time, _ = MESSAGE.unpack_from(body)
+            own = channels[number]
+            identity = (own.topic, schemas[own.schema_id], own.message_encoding)
+            digest.update(identity, log_time, sequence, body[MESSAGE.size :])
+    for part in parts:
+        if part.opcode == Opcode.METADATA:
+            metadata = parsed(mcap.Metadata, part.body)
+            if metadata.name == SUMMARY:
+                metadata.metadata[CONTENT_DIGEST] = orjson.dumps(digest.hexdigest()).decode()
+                part.body = written(metadata)

@@ -13,12 +13,38 @@ from evoexp.store.log import Finished, Log
 CONFIG = b'{"planner": "demo", "seed": 1}'
 CONDITION = hashlib.sha256(CONFIG).hexdigest()
 ENVIRONMENT = {"versions": {"numpy": "2.4.6"}, "cpu": {"features": ["avx2", "fma"]}}
+SUMMARY = ReplicateSummary(
+    condition=CONDITION,
+    replicate=7,
+    status="done",
+    stop_reason="num_generations",
+    num_generations=9,
+    best_cost=math.inf,
+    first_feasible_generation=None,
+    evaluations=200,
+    collision_queries=2**40 + 9,
+    solved=False,
+    certified=None,
+    certified_margin=False,
+    clearance=math.nan,
+    clearance_at=2.5,
+    clearance_pair="arm_1_link_2 – obstacle_1",
+    refuted_at=None,
+    refuted_pair="",
+    length_unit="m",
+    terms={"length": 3.5, "clearance": -0.0, "torque": math.nan},
+    digest="",
+    certificate_queries=12,
+    certificate_s=0.001,
+    cpu_s=0.25,
+    wall_s=0.5,
+)
 
 
 def generations(num: int, seed: int = 0, reverse_terms: bool = False) -> list[Generation]:
     """Return generations of which the first three are infeasible, and about a third improve."""
     rng = np.random.default_rng(seed)
-    found, best_cost, best = [], math.inf, rng.random(12)
+    rows, best_cost, best = [], math.inf, rng.random(12)
     for index in range(num):
         if index >= 3 and (index == 3 or rng.random() < 0.3):
             best_cost, best = 100.0 - index + rng.random(), rng.random(12)
@@ -27,9 +53,9 @@ def generations(num: int, seed: int = 0, reverse_terms: bool = False) -> list[Ge
         terms = {
             "length": rng.random() if index >= 3 else math.inf,
             "clearance": -math.inf if index < 2 else -0.0,
+            "torque": math.nan if index == 1 else 1e-300,
         }
-        terms["torque"] = math.nan if index == 1 else 1e-300
-        found.append(
+        rows.append(
             Generation(
                 index=index,
                 best=best,
@@ -46,57 +72,7 @@ def generations(num: int, seed: int = 0, reverse_terms: bool = False) -> list[Ge
                 population=rng.random((20, 12)),
             )
         )
-    return found
-
-
-def summary(replicate: int = 7, **changes: Any) -> ReplicateSummary:
-    """Return a summary as `run_replicate` hands it to the log."""
-    terms = {"length": 3.5, "clearance": -0.0, "torque": math.nan}
-    row = ReplicateSummary(
-        condition=CONDITION,
-        replicate=replicate,
-        status="done",
-        stop_reason="num_generations",
-        num_generations=9,
-        best_cost=math.inf,
-        first_feasible_generation=None,
-        evaluations=200,
-        collision_queries=2**40 + 9,
-        solved=False,
-        certified=None,
-        certified_margin=False,
-        clearance=math.nan,
-        clearance_at=2.5,
-        clearance_pair="arm_1_link_2 – obstacle_1",
-        refuted_at=None,
-        refuted_pair="",
-        length_unit="m",
-        terms=terms,
-        digest="",
-        certificate_queries=12,
-        certificate_s=0.001,
-        cpu_s=0.25,
-        wall_s=0.5,
-    )
-    return row._replace(**changes)
-
-
-def in_blocks(written: Sequence[Generation], most: int) -> list[Block]:
-    """Return the same generations, so many together."""
-    found = []
-    for begin in range(0, len(written), most):
-        own = [Block.of(each) for each in written[begin : begin + most]]
-        columns = [[value for each in own for value in each[k]] for k in range(2, 8)]
-        found.append(
-            Block(
-                own[0].first,
-                [each.bests[0]._replace(place=k) for k, each in enumerate(own)],
-                *columns,
-                costs=np.concatenate([each.costs for each in own]),
-                population=lambda place, own=own: own[place].population(0),
-            )
-        )
-    return found
+    return rows
 
 
 def write(
@@ -109,11 +85,10 @@ def write(
     """Write a log of these generations, logged at the given seconds of CPU time."""
     rng = np.random.default_rng(5)
     log = Log(CONDITION, CONFIG, replicate, rng, {"map.txt": b"\x00\xff"}, ENVIRONMENT)
-    by_generation = {front.generation: front for front in fronts}
-    for generation in written:
+    criteria = {front.generation: front.criteria.T[None] for front in fronts}
+    for row in written:
         rng.random()
-        if generation.index in by_generation:
-            criteria = by_generation[generation.index].criteria.T[None]
-            generation = generation._replace(criteria=criteria)
-        log.write(Block.of(generation), seconds[generation.index] if seconds else 0.0)
-    return log.finish(summary(replicate, **changes))
+        if row.index in criteria:
+            row = row._replace(criteria=criteria[row.index])
+        log.write(Block.of(row), seconds[row.index] if seconds else 0.0)
+    return log.finish(SUMMARY._replace(replicate=replicate, **changes))

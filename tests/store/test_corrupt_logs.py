@@ -8,56 +8,40 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
-from store_samples import generations, summary, write
+from store_samples import SUMMARY, generations, write
 
 from evoexp.errors import CorruptLog
 from evoexp.store import log as log_module
 from evoexp.store.digests import ContentDigest
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
-READERS = [read_log, read_summary, read_solution, generation_columns]
 Reader = Callable[[bytes | Path], object]
-
-
-@pytest.fixture(scope="module")
-def content() -> bytes:
-    return write(generations(60)).content
+CONTENT, SMALL = write(generations(60)).content, generations(3)
+each_reader = pytest.mark.parametrize(
+    "reader", [read_log, read_summary, read_solution, generation_columns]
+)
 
 
 def refusal(reader: Reader, source: bytes | Path) -> str:
     with pytest.raises(CorruptLog) as caught:
         reader(source)
-    text = str(caught.value)
-    assert "\n" not in text
-    return text
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_cut_anywhere(reader: Reader, content: bytes) -> None:
-    for size in range(0, len(content), 29):
-        refusal(reader, content[:size])
-    assert "cut" in refusal(reader, content[:-1])
-    assert "empty" in refusal(reader, b"")
-
-
-@pytest.mark.parametrize("reader", READERS)
-def test_altered_anywhere(reader: Reader, content: bytes) -> None:
-    rng = np.random.default_rng(1)
-    damaged = bytearray(content)
-    for position in rng.integers(len(content), size=500).tolist():
+@each_reader
+def test_a_log_that_is_cut_or_altered_anywhere_is_refused(reader: Reader) -> None:
+    for size in range(0, len(CONTENT), 29):
+        refusal(reader, CONTENT[:size])
+    half, rng, damaged = len(CONTENT) // 2, np.random.default_rng(1), bytearray(CONTENT)
+    refusal(reader, CONTENT + CONTENT)
+    refusal(reader, CONTENT[:half] + bytes(half))
+    for position in rng.integers(len(CONTENT), size=500).tolist():
         flip = int(rng.integers(1, 256))
         damaged[position] ^= flip
         refusal(reader, bytes(damaged))
         damaged[position] ^= flip
     reader(bytes(damaged))
-
-
-@pytest.mark.parametrize("reader", READERS)
-def test_something_else(reader: Reader, content: bytes) -> None:
-    assert "not an MCAP" in refusal(reader, b"PAR1" * 100)
-    assert "cut or overwritten" in refusal(reader, content + b"\0")
-    refusal(reader, content + content)
-    refusal(reader, content[: len(content) // 2] + bytes(len(content) // 2))
 
 
 NO_SUMMARY = {
@@ -73,57 +57,73 @@ def foreign(checksums: bool, **options: Any) -> bytes:
     buffer = BytesIO()
     writer = Writer(buffer, enable_data_crcs=checksums, **options)
     writer.start()
-    channel = writer.register_channel(
-        "/generation", "json", writer.register_schema("other", "jsonschema", b"{}")
-    )
-    writer.add_message(channel, 0, b"{}", 0)
+    schema = writer.register_schema("other", "jsonschema", b"{}")
+    writer.add_message(writer.register_channel("/generation", "json", schema), 0, b"{}", 0)
     writer.finish()
     return buffer.getvalue()
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_foreign_mcap(reader: Reader) -> None:
-    assert "evoexp.run" in refusal(reader, foreign(checksums=True))
-    for options in ({}, NO_SUMMARY, {"compression": CompressionType.LZ4}, {"use_chunking": False}):
-        text = refusal(reader, foreign(checksums=False, **options))
-        assert text.endswith("not a log of evoexp: an MCAP of another program")
+OTHER_PROGRAM = "not a log of evoexp: an MCAP of another program"
+REASONS = {
+    "the last byte is missing": (CONTENT[:-1], "cut"),
+    "a byte more": (CONTENT + b"\0", "cut or overwritten"),
+    "nothing": (b"", "empty"),
+    "a table": (b"PAR1" * 100, "not an MCAP"),
+    "with checksums": (foreign(checksums=True), "evoexp.run"),
+    "without checksums": (foreign(checksums=False), OTHER_PROGRAM),
+    "without a summary": (foreign(checksums=False, **NO_SUMMARY), OTHER_PROGRAM),
+    "LZ4": (foreign(checksums=False, compression=CompressionType.LZ4), OTHER_PROGRAM),
+    "without chunks": (foreign(checksums=False, use_chunking=False), OTHER_PROGRAM),
+}
 
 
-def test_the_file_is_named(tmp_path: Path, content: bytes) -> None:
+@each_reader
+@pytest.mark.parametrize(("content", "reason"), REASONS.values(), ids=REASONS)
+def test_the_reason_is_told(reader: Reader, content: bytes, reason: str) -> None:
+    assert reason in refusal(reader, content)
+
+
+def test_the_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "0003.mcap"
     assert refusal(read_log, path).startswith(f"{path}: cannot be read: No such file")
-    path.write_bytes(content[:100])
+    path.write_bytes(CONTENT[:100])
     assert refusal(read_summary, path).startswith(f"{path}: cut")
     assert refusal(read_log, tmp_path).startswith(f"{tmp_path}: cannot be read")
 
 
-@pytest.mark.parametrize("reader", READERS)
+@each_reader
 @pytest.mark.parametrize(("other", "age"), [(1, "an older"), (3, "a newer")])
 def test_other_schema_version(
     reader: Reader, monkeypatch: pytest.MonkeyPatch, other: int, age: str
 ) -> None:
     monkeypatch.setattr(log_module, "SCHEMA_VERSION", other)
-    foreign = write(generations(3)).content
-    reader(foreign)
+    of_another_version = write(SMALL).content
+    reader(of_another_version)
     monkeypatch.undo()
-    assert f"written by {age} evoexp: schema version {other}, this one reads 2" in refusal(
-        reader, foreign
-    )
+    expected = f"written by {age} evoexp: schema version {other}, this one reads 2"
+    assert expected in refusal(reader, of_another_version)
 
 
-def test_content_digest_sees_what_good_checksums_hide(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ContentDigest, "hexdigest", lambda self: "0" * 32)
-    forged = write(generations(3)).content
+encode = log_module.encode_summary
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "forged", "reason"),
+    [
+        (ContentDigest, "hexdigest", lambda self: "0" * 32, "content digest"),
+        (log_module, "encode_summary", lambda row: {"replicate": "7"}, "unreadable: KeyError"),
+        (
+            log_module,
+            "encode_summary",
+            lambda row: encode(SUMMARY._replace(replicate=8)),
+            "another replicate",
+        ),
+    ],
+)
+def test_what_good_checksums_hide_is_seen(
+    monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, forged: Any, reason: str
+) -> None:
+    monkeypatch.setattr(owner, name, forged)
+    content = write(SMALL).content
     monkeypatch.undo()
-    assert "content digest" in refusal(read_log, forged)
-
-
-def test_a_summary_without_a_field(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_module, "encode_summary", lambda summary: {"replicate": "7"})
-    assert "unreadable: KeyError" in refusal(read_summary, write(generations(3)).content)
-
-
-def test_a_summary_of_another_replicate(monkeypatch: pytest.MonkeyPatch) -> None:
-    encode = log_module.encode_summary
-    monkeypatch.setattr(log_module, "encode_summary", lambda row: encode(summary(8)))
-    assert "another replicate" in refusal(read_log, write(generations(3)).content)
+    assert reason in refusal(read_log, content)

@@ -5,18 +5,18 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, write
+from store_samples import CONDITION, CONFIG, ENVIRONMENT, SUMMARY, generations, write
 
 from evoexp import attachments
-from evoexp.errors import DamagedStore, StoreError, UnknownHash
+from evoexp.commands.chosen_motions import chosen_log
+from evoexp.errors import DamagedStore, NothingStored, StoreError, UnknownHash
 from evoexp.records import Block
 from evoexp.store import log as log_module
-from evoexp.store import log_reader
 from evoexp.store.files import is_set_aside, set_aside, write_files
 from evoexp.store.integrity import lost_replicates, mend
 from evoexp.store.log import Finished
@@ -25,10 +25,22 @@ from evoexp.store.summaries import damaged_logs, summary_table, whole_logs
 from store_lookup import find_runs
 
 Add = Callable[..., Finished]
+Fault = Callable[[Path], object]
+OTHER = b"other"
 
 
-def cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-10])
+def log_of(config: bytes, replicate: int, files: dict[str, bytes] | None = None) -> bytes:
+    """Return a log of one generation."""
+    condition = hashlib.sha256(config).hexdigest()
+    log = log_module.Log(condition, config, replicate, np.random.default_rng(0), files or {})
+    log.write(Block.of(generations(1)[0]))
+    return log.finish(SUMMARY._replace(replicate=replicate, condition=condition)).content
+
+
+def other_run(outputs: Path) -> RunDirectory:
+    run = RunDirectory(outputs, hashlib.sha256(OTHER).hexdigest())
+    run.create(OTHER, {})
+    return run
 
 
 def empty(path: Path) -> None:
@@ -41,66 +53,46 @@ def flip(path: Path) -> None:
     path.write_bytes(bytes(content))
 
 
-def become_a_directory(path: Path) -> None:
-    path.unlink()
-    path.mkdir()
+def replaced_by(make: Fault) -> Fault:
+    return lambda path: (path.unlink(), make(path))
 
 
-def become_a_pipe(path: Path) -> None:
-    path.unlink()
-    os.mkfifo(path)
+directory, pipe = replaced_by(Path.mkdir), replaced_by(os.mkfifo)
+loop = replaced_by(lambda path: path.symlink_to(path.name))  # even root cannot read it
+FAULTS: list[tuple[Fault, str]] = [
+    (lambda path: path.write_bytes(path.read_bytes()[:-10]), "cut"),
+    (empty, "empty file"),
+    (flip, "altered"),
+    (directory, "cannot be read: Is a directory"),
+    (pipe, "cannot be read: no regular file"),
+    (loop, "cannot be read"),
+    (replaced_by(lambda path: path.symlink_to("nowhere")), "cannot be read: No such file"),
+    (lambda path: path.write_bytes(write(generations(6), 9).content), "holds replicate 9"),
+    (lambda path: path.write_bytes(log_of(OTHER, 1)), "holds replicate 1 of"),
+]
 
 
-def become_unreadable(path: Path) -> None:
-    path.unlink()
-    path.symlink_to(path.name)  # a loop: even root cannot read it
+def mended(run: RunDirectory, *told: str, again: Iterable[int] = range(3)) -> None:
+    """Mend a run, and have this told."""
+    with run.lock(), pytest.warns(DamagedStore) as warned:
+        mend(run, CONFIG, set(again))
+    assert len(warned) == len(told)
+    assert all(text in str(each.message) for text, each in zip(told, warned, strict=True))
 
 
-def lead_nowhere(path: Path) -> None:
-    path.unlink()
-    path.symlink_to("nowhere")
-
-
-def be_of_another_replicate(path: Path) -> None:
-    path.write_bytes(write(generations(6), 9).content)
-
-
-def be_of_another_run(path: Path) -> None:
-    other = hashlib.sha256(b"other").hexdigest()
-    log = log_module.Log(other, b"other", 1, np.random.default_rng(0))
-    log.write(Block.of(generations(1)[0]))
-    path.write_bytes(log.finish(summary(1, condition=other)).content)
-
-
-FAULTS = {
-    cut: "cut",
-    empty: "empty file",
-    flip: "altered",
-    become_a_directory: "cannot be read: Is a directory",
-    become_a_pipe: "cannot be read: no regular file",
-    become_unreadable: "cannot be read",
-    lead_nowhere: "cannot be read: No such file",
-    be_of_another_replicate: "holds replicate 9",
-    be_of_another_run: "holds replicate 1 of",
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(("fault", "reason"), FAULTS, ids=[reason for _, reason in FAULTS])
 def test_a_damaged_log_is_left_out_and_set_aside(
-    run: RunDirectory, add: Add, fault: Callable[[Path], None]
+    run: RunDirectory, add: Add, fault: Fault, reason: str
 ) -> None:
     for replicate in (0, 1, 2):
         add(replicate)
     run.note_plan(3)
     summary_table(run)
     fault(run.log_path(1))
-    with pytest.warns(DamagedStore, match=f"left out, damaged: 0001.mcap .{FAULTS[fault]}"):
+    with pytest.warns(DamagedStore, match=f"left out, damaged: 0001.mcap .{reason}"):
         assert summary_table(run)["replicate"].to_pylist() == [0, 2]
     assert (whole_logs(run), lost_replicates(run)) == ({0, 2}, {1})
-    with run.lock(), pytest.warns(DamagedStore, match="and run again: 0001.mcap") as said:
-        mend(run, CONFIG, range(3))
-    assert len(said) == 1
-    assert "kept as 0001.mcap.damaged" in str(said[0].message)
+    mended(run, "and run again: 0001.mcap")
     assert os.path.lexists(run.replicates / "0001.mcap.damaged")
     assert run.completed() == {0, 2}
     assert not damaged_logs(run)
@@ -132,25 +124,6 @@ def test_damage_that_keeps_size_and_time_is_seen_by_who_reads_the_logs(
     assert whole_logs(run) == {0}, "and by everybody from then on"
 
 
-def test_logs_that_are_noted_are_not_read_again(
-    run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for replicate in range(4):
-        add(replicate)
-    empty(run.log_path(3))
-    with pytest.warns(DamagedStore):
-        summary_table(run)
-    names: list[str] = []
-    read = log_reader.read_summary
-    monkeypatch.setattr(
-        log_reader, "read_summary", lambda path: names.append(path.name) or read(path)
-    )  # type: ignore[func-returns-value]
-    assert whole_logs(run) == {0, 1, 2}
-    assert set(names) == {"0003.mcap"}, "the damaged one alone: it may have been repaired"
-    add(3)
-    assert whole_logs(run) == {0, 1, 2, 3}
-
-
 def test_a_log_of_another_version_is_left_out_and_left_alone(
     run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -174,61 +147,54 @@ def test_a_damaged_failure_stays_a_failure(run: RunDirectory, add: Add, content:
         rows = summary_table(run).to_pylist()
     assert [row["status"] for row in rows] == ["done", "failed"]
     assert rows[1]["stop_reason"].startswith("unknown: 0001.failed.json: damaged")
-    with run.lock(), pytest.warns(DamagedStore, match=r"0001\.failed\.json\.damaged"):
-        mend(run, CONFIG, range(3))
+    mended(run, "0001.failed.json.damaged")
     assert run.failed() == set()
 
 
-def test_a_directory_or_a_pipe_for_a_table(run: RunDirectory, add: Add) -> None:
-    add(0)
-    for replace in (become_a_directory, become_a_pipe):
-        summary_table(run)
-        replace(run.summary_path)
-        assert summary_table(run).num_rows == 1
-        assert run.summary_path.is_file()
-    assert (run.path / "summary.parquet.damaged").is_dir()
-
-
-def test_the_table_of_another_run_is_not_taken(run: RunDirectory, add: Add, tmp_path: Path) -> None:
-    add(0)
-    summary_table(run)
-    other = RunDirectory(tmp_path, hashlib.sha256(b"other").hexdigest())
-    other.create(b"other", {})
-    other.summary_path.write_bytes(run.summary_path.read_bytes())
-    assert summary_table(other).num_rows == 0
+def test_the_best_worst_and_refuted_replicates_are_chosen_of_whole_logs(
+    run: RunDirectory, add: Add
+) -> None:
+    with pytest.raises(NothingStored, match="no finished replicate among 0"):
+        chosen_log(run, "best")
+    add(0, best_cost=3.0, certified=True)
+    add(1, best_cost=float("inf"), certified=None)
+    with pytest.raises(NothingStored, match="no refuted replicate among 2"):
+        chosen_log(run, "refuted")
+    add(2, best_cost=1.0, certified=False)
+    add(3, best_cost=5.0, certified=False)
+    run.write_failure(9, "ValueError: no", "Traceback")
+    choices = {"best": 2, "worst": 3, "refuted": 2, 1: 1}
+    assert {choice: int(chosen_log(run, choice).stem) for choice in choices} == choices
+    run.failure_path(9).write_text("{")
+    flip(run.log_path(2))
+    with pytest.warns(DamagedStore, match=r"damaged: 0002\.mcap") as warned:
+        assert chosen_log(run, "best").name == "0000.mcap"
+    assert any("0009.failed.json" in str(each.message) for each in warned)
 
 
 # Configuration and manifest
 
 
-@pytest.mark.parametrize("fault", [Path.unlink, empty, flip, become_a_directory])
-def test_a_lost_file_of_the_configuration_is_taken_from_a_log(
-    tmp_path: Path, fault: Callable[[Path], object]
-) -> None:
+@pytest.mark.parametrize("fault", [Path.unlink, empty, flip, directory])
+def test_a_lost_file_of_the_configuration_is_taken_from_a_log(tmp_path: Path, fault: Fault) -> None:
     content = b"<robot/>"
     sha256 = hashlib.sha256(content).hexdigest()
+    name = f"files/{sha256}"
     config = json.dumps({"robot": {"path": {"sha256": sha256}}}).encode()
-    run, files = (
-        RunDirectory(tmp_path, hashlib.sha256(config).hexdigest()),
-        {f"files/{sha256}": content},
-    )
-    run.create(config, {}, files)
-    path = run.path / "files" / sha256
-    log = log_module.Log(run.condition_id, config, 0, np.random.default_rng(0), files)
-    log.write(Block.of(generations(1)[0]))
-    row = summary(0, condition=run.condition_id)
-    run.write_logs({0: log.finish(row).content})
+    run = RunDirectory(tmp_path, hashlib.sha256(config).hexdigest())
+    run.create(config, {}, {name: content})
+    run.write_logs({0: log_of(config, 0, {name: content})})
     assert run.config_json() == config
-    fault(path)
+    fault(run.path / name)
     attachments._contents.pop(sha256)
-    with pytest.warns(DamagedStore, match=f"files/{sha256}: .*; taken from 0000.mcap"):
+    with pytest.warns(DamagedStore, match=f"{name}: .*; taken from 0000.mcap"):
         assert run.config_json() == config
     assert attachments.File(sha256=sha256).content == content
-    assert list(run.damaged_files()) == [f"files/{sha256}"]
+    assert list(run.damaged_files()) == [name]
     with run.lock(), pytest.warns(DamagedStore, match="written again"):
         mend(run, config, range(3))
-    run.create(config, {}, files)
-    assert path.read_bytes() == content
+    run.create(config, {}, {name: content})
+    assert (run.path / name).read_bytes() == content
     assert not run.damaged_files()
 
 
@@ -245,9 +211,8 @@ def test_a_lost_configuration_is_taken_from_a_log(
 ) -> None:
     empty(run.log_path(0))
     add(1)
-    (run.path / "config.json").unlink()
-    if content is not None:
-        (run.path / "config.json").write_bytes(content)
+    path = run.path / "config.json"
+    path.unlink() if content is None else path.write_bytes(content)
     (run.path / "manifest.json").unlink()
     assert resolve(tmp_path, run.hash12[:4]).condition_id == CONDITION
     assert [each.condition_id for each in find_runs(tmp_path)] == [CONDITION]
@@ -255,20 +220,14 @@ def test_a_lost_configuration_is_taken_from_a_log(
         assert run.config_json() == CONFIG
     with pytest.warns(DamagedStore, match=r"manifest\.json: .*; taken from 0001\.mcap"):
         manifest = run.manifest()
-    expected = {"condition": CONDITION, **ENVIRONMENT}
-    assert manifest == expected | {"git": None, "restored_from": "0001.mcap"}
+    restored = {"git": None, "restored_from": "0001.mcap"}
+    assert manifest == {"condition": CONDITION, **ENVIRONMENT, **restored}
     assert set(run.damaged_files(CONFIG)) == {"config.json", "manifest.json"}
-    with (
-        run.lock(),
-        pytest.warns(DamagedStore, match="and written again: config.json"),
-        pytest.warns(DamagedStore, match="and run again: 0000.mcap"),
-    ):
-        mend(run, CONFIG, range(3))
+    mended(run, "and written again: config.json", "and run again: 0000.mcap")
     run.create(CONFIG, manifest)
     assert not run.damaged_files(CONFIG)
     assert (run.config_json(), run.manifest()) == (CONFIG, manifest)
-    aside = run.path / "config.json.damaged"
-    assert aside.exists() == (content is not None)
+    assert (run.path / "config.json.damaged").exists() == (content is not None)
 
 
 def test_a_manifest_of_another_run_is_foreign(run: RunDirectory, add: Add) -> None:
@@ -289,20 +248,36 @@ def test_the_manifest_alone_knows_the_name(run: RunDirectory, tmp_path: Path) ->
         resolve(tmp_path, run.hash12)  # nothing of a run is there
 
 
-def test_a_damaged_run_hides_no_other(run: RunDirectory, tmp_path: Path) -> None:
-    other = RunDirectory(tmp_path, hashlib.sha256(b"other").hexdigest())
-    other.create(b"other", {})
-    (run.path / "config.json").write_bytes(b"")
-    (run.path / "manifest.json").write_bytes(b"")
+def test_damage_is_named_and_a_damaged_run_hides_no_other(
+    run: RunDirectory, tmp_path: Path
+) -> None:
+    run.write_failure(1, "x", "y")
+    run.failure_path(1).write_text("{}")
+    with pytest.raises(StoreError, match=r"0001\.failed\.json: damaged"):
+        run.failure(1)
+    (run.path / "manifest.json").write_text('{"condition": ')
+    (run.path / "config.json").write_bytes(CONFIG[:-1])
+    for action, name in (
+        (run.manifest, "manifest"),
+        (run.check, "config"),
+        (run.config_json, "config"),
+        (lambda: run.create(CONFIG, {}), "config"),
+        (lambda: resolve(tmp_path, run.hash12), "config"),
+    ):
+        with pytest.raises(StoreError, match=rf"{name}\.json: damaged"):
+            action()
+    other = other_run(tmp_path)
     assert [each.path for each in find_runs(tmp_path)] == [other.path]
     assert resolve(tmp_path, other.hash12).path == other.path
+    (run.path / "config.json").unlink()
+    with pytest.raises(StoreError, match="cannot be read: No such file"):
+        run.check()
 
 
 @pytest.mark.parametrize("content", ["", "{", '{"plans": 1}', '{"plans": [{"n": 1}]}'])
 def test_damaged_plans_are_set_aside(run: RunDirectory, content: str) -> None:
     (run.path / "plans.json").write_text(content)
-    with run.lock(), pytest.warns(DamagedStore, match="plans.json"):
-        mend(run, CONFIG, range(3))
+    mended(run, "plans.json")
     run.note_plan(3)
     assert run.plans()[0].num_replicates == 3
 
@@ -311,8 +286,7 @@ def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
     run.replicates.rmdir()
     run.replicates.touch()
     assert (run.completed(), summary_table(run).num_rows) == (set(), 0)
-    with run.lock(), pytest.warns(DamagedStore, match="replicates .damaged: not a directory"):
-        mend(run, CONFIG, range(3))
+    mended(run, "replicates (damaged: not a directory")
     run.create(CONFIG, {})
     assert run.replicates.is_dir()
 
@@ -332,16 +306,12 @@ def test_an_interrupted_writer_leaves_no_temporary_file(
     """Its threads are in the middle of their files when the signal arrives."""
     others, begun, interrupted = set(threading.enumerate()), threading.Event(), threading.Event()
 
-    def slow_sync(descriptor: int) -> None:
-        begun.set()
-        interrupted.wait()
-
     def interrupt() -> None:
         begun.wait()
         os.kill(os.getpid(), signal.SIGINT)
         interrupted.set()
 
-    monkeypatch.setattr(os, "fsync", slow_sync)
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (begun.set(), interrupted.wait()))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         threading.Thread(target=interrupt).start()

@@ -6,65 +6,46 @@ import signal
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from store_samples import CONDITION, CONFIG
 
-from evoexp.errors import (
-    AmbiguousHash,
-    Busy,
-    EvoexpError,
-    StoreError,
-    UnknownHash,
-)
+from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash
 from evoexp.store.files import NUM_THREADS
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import (
-    RunDirectory,
-    lock_all,
-    outputs_root,
-    resolve,
-)
+from evoexp.store.run_directory import RunDirectory, lock_all, resolve
 from store_lookup import find_runs
 
 HOLD = """
-    import signal, sys
-    from pathlib import Path
-    from evoexp.store.run_directory import RunDirectory
-    with RunDirectory(Path(sys.argv[1]), sys.argv[2]).lock():
-        print("held", flush=True)
-        signal.pause()
-"""
-WRITE = """
-    import sys
+    import itertools, sys, time
     from pathlib import Path
     from evoexp.store.run_directory import RunDirectory
     run = RunDirectory(Path(sys.argv[1]), sys.argv[2])
-    content = Path(sys.argv[3]).read_bytes()
     with run.lock():
         print("held", flush=True)
-        while True:
-            for replicate in range(0, 50, 10):
-                run.write_logs({replicate: content})
-                run.write_logs(dict.fromkeys(range(replicate, replicate + 10), content))
+        if len(sys.argv) < 4:
+            time.sleep(1000)
+        content = Path(sys.argv[3]).read_bytes()
+        for replicate in itertools.cycle(range(0, 50, 10)):
+            run.write_logs({replicate: content})
+            run.write_logs(dict.fromkeys(range(replicate, replicate + 10), content))
 """
 
 
-def start(code: str, *arguments: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", textwrap.dedent(code), *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None and process.stdout.readline() == "held\n"
-    return process
-
-
-def kill(process: subprocess.Popen[str]) -> None:
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert process.stdout is not None
-    process.stdout.close()
+@contextmanager
+def holder(*arguments: str | Path) -> Iterator[subprocess.Popen[str]]:
+    """Have another process hold the lock of a run, and write a log again and again if named."""
+    command = [sys.executable, "-c", textwrap.dedent(HOLD), *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "held\n"
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGKILL)
 
 
 def create(outputs: Path, config: bytes) -> RunDirectory:
@@ -86,14 +67,12 @@ def test_completion_is_the_file_itself(run: RunDirectory, add: Callable[..., Fin
     run.write_failure(12345, "no path", "")
     assert run.failed() == {3, 12345}
     assert run.failure(3)["reason"] == "no path" and run.failure(3)["traceback"] == "Traceback …\n"
-    finished = add(3)
+    content = add(3).content
     assert (run.completed(), run.failed()) == ({3}, {12345})
     assert not run.failure_path(3).exists()
-    assert (run.replicates / "0003.mcap").read_bytes() == finished.content
+    assert (run.replicates / "0003.mcap").read_bytes() == content
     (run.replicates / ".0004.mcap.1.tmp").write_bytes(b"half")
-    (run.replicates / "4.mcap").write_bytes(b"")
-    assert run.completed() == {3}
-    run.write_logs({5: finished.content, 12345: finished.content})
+    run.write_logs({5: content, 12345: content})
     assert (run.completed(), run.failed()) == ({3, 5, 12345}, set())
 
 
@@ -111,10 +90,7 @@ def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.Mo
 def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     run: RunDirectory, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:
-    """What a machine that loses its power keeps is what was synced.
-
-    Every file before the first name, names after.
-    """
+    """A machine that loses its power keeps what was synced: every file before the first name."""
     events: list[tuple[str, str]] = []
     fsync, replace = os.fsync, os.replace
 
@@ -129,29 +105,25 @@ def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     monkeypatch.setattr(os, "fsync", note_fsync)
     monkeypatch.setattr(os, "replace", note_replace)
     run.write_logs({k: bytes([k]) * 1000 for k in range(count)})
-    renamed = [path for kind, path in events if kind == "rename"]
-    assert len(renamed) == count
     assert [kind for kind, _ in events] == ["sync"] * count + ["rename"] * count + ["sync"]
-    assert sorted(path for _, path in events[:count]) == sorted(renamed), "each file itself"
+    synced, renamed = (
+        sorted(path for _, path in part) for part in (events[:count], events[count:-1])
+    )
+    assert synced == renamed and len(set(synced)) == count, "each file itself"
     assert events[-1] == ("sync", str(run.replicates)), "then their names"
-    assert [run.log_path(k).read_bytes() for k in range(count)] == [
-        bytes([k]) * 1000 for k in range(count)
-    ]
+    assert all(run.log_path(k).read_bytes() == bytes([k]) * 1000 for k in range(count))
 
 
 def test_killed_while_writing_leaves_whole_files(
     run: RunDirectory, add: Callable[..., Finished], tmp_path: Path
 ) -> None:
-    content = add(0).content
-    source = tmp_path / "source"
+    content, source = add(0).content, tmp_path / "source"
     source.write_bytes(content)
     for num_logs in (2, 17, 40):
-        process = start(WRITE, str(tmp_path), CONDITION, str(source))
-        while len(run.completed()) < num_logs:
-            assert process.poll() is None
-        kill(process)
-        for replicate in run.completed():
-            assert run.log_path(replicate).read_bytes() == content
+        with holder(tmp_path, CONDITION, source) as process:
+            while len(run.completed()) < num_logs:
+                assert process.poll() is None
+        assert all(run.log_path(k).read_bytes() == content for k in run.completed())
     (run.replicates / ".0001.mcap.1.tmp").write_bytes(b"half")
     (run.path / ".summary.parquet.1.tmp").write_bytes(b"half")
     with run.lock():
@@ -160,12 +132,9 @@ def test_killed_while_writing_leaves_whole_files(
 
 
 def test_the_lock_dies_with_its_process(run: RunDirectory, tmp_path: Path) -> None:
-    process = start(HOLD, str(tmp_path), CONDITION)
-    try:
+    with holder(tmp_path, CONDITION):
         with pytest.raises(Busy, match=f"run {CONDITION[:12]}"), run.lock():
             pass
-    finally:
-        kill(process)
     with run.lock(), run.lock():
         with pytest.raises(Busy), RunDirectory(tmp_path, CONDITION).lock():
             pass
@@ -174,20 +143,15 @@ def test_the_lock_dies_with_its_process(run: RunDirectory, tmp_path: Path) -> No
 
 
 def test_lock_all_releases_what_it_took(tmp_path: Path) -> None:
-    runs = sorted(
-        (create(tmp_path, bytes([65 + k])) for k in range(4)), key=lambda run: run.condition_id
-    )
-    process = start(HOLD, str(tmp_path), runs[2].condition_id)
-    try:
+    runs = [create(tmp_path, bytes([65 + k])) for k in range(4)]
+    runs.sort(key=lambda run: run.condition_id)
+    with holder(tmp_path, runs[2].condition_id):
         with pytest.raises(Busy, match=runs[2].hash12), lock_all(reversed(runs)):
             pass
         for run in (runs[0], runs[1], runs[3]):
             with RunDirectory(tmp_path, run.condition_id).lock():
                 pass
-    finally:
-        kill(process)
-    again = RunDirectory(tmp_path, runs[0].condition_id)
-    with lock_all([*runs, again]):
+    with lock_all([*runs, RunDirectory(tmp_path, runs[0].condition_id)]):
         with pytest.raises(Busy), RunDirectory(tmp_path, runs[3].condition_id).lock():
             pass
 
@@ -200,50 +164,23 @@ def test_another_condition_with_the_same_twelve_digits(run: RunDirectory, tmp_pa
         resolve(tmp_path, CONDITION[:12] + ("0" if CONDITION[12] != "0" else "1"))
 
 
-def test_damage_is_named(run: RunDirectory, tmp_path: Path) -> None:
-    assert issubclass(StoreError, EvoexpError)
-    run.write_failure(1, "x", "y")
-    run.failure_path(1).write_text("{}")
-    with pytest.raises(StoreError, match=r"0001\.failed\.json: damaged"):
-        run.failure(1)
-    (run.path / "manifest.json").write_text('{"condition": ')
-    with pytest.raises(StoreError, match=r"manifest\.json: damaged"):
-        run.manifest()
-    (run.path / "config.json").write_bytes(CONFIG[:-1])
-    damaged = r"config\.json: damaged"
-    for action in (run.check, run.config_json, lambda: run.create(CONFIG, {})):
-        with pytest.raises(StoreError, match=damaged):
-            action()
-    with pytest.raises(StoreError, match=f"{damaged}.*; neither a log nor the manifest has it"):
-        resolve(tmp_path, run.hash12)
-    other = create(tmp_path, b"other")
-    assert [each.path for each in find_runs(tmp_path)] == [other.path]
-    (run.path / "config.json").unlink()
-    with pytest.raises(StoreError, match="cannot be read: No such file"):
-        run.check()
-
-
 def test_prefixes(tmp_path: Path) -> None:
     runs = [create(tmp_path, str(number).encode()) for number in range(20)]
     (tmp_path / "runs" / ("0" * 12)).mkdir()  # killed before it had a configuration
     (tmp_path / "runs" / "notes").mkdir()
-    stored = find_runs(tmp_path)
-    assert [run.condition_id for run in stored] == sorted(run.condition_id for run in runs)
-    for run in runs:
+    ids = sorted(run.condition_id for run in runs)
+    assert [run.condition_id for run in find_runs(tmp_path)] == ids
+    for condition_id in ids:
         for length in (12, 13, 64):
-            assert (
-                resolve(tmp_path, run.condition_id[:length].upper()).condition_id
-                == run.condition_id
-            )
-    digits = [run.condition_id[0] for run in runs]
+            prefix = condition_id[:length].upper()
+            assert resolve(tmp_path, prefix).condition_id == condition_id
+    digits = [condition_id[0] for condition_id in ids]
     shared = next(digit for digit in digits if digits.count(digit) > 1)
     alone = next(digit for digit in digits if digits.count(digit) == 1)
     assert resolve(tmp_path, alone).condition_id[0] == alone
     with pytest.raises(AmbiguousHash) as caught:
         resolve(tmp_path, shared)
-    assert caught.value.candidates == sorted(
-        run.hash12 for run in runs if run.condition_id[0] == shared
-    )
+    assert caught.value.candidates == [each[:12] for each in ids if each[0] == shared]
 
 
 def test_unknown_prefixes_say_what_there_is(tmp_path: Path) -> None:
@@ -256,10 +193,3 @@ def test_unknown_prefixes_say_what_there_is(tmp_path: Path) -> None:
     for text in ("", "xyz", "abc ", "../..", "0" * 65):
         with pytest.raises(UnknownHash, match="hexadecimal"):
             resolve(tmp_path, text)
-
-
-def test_outputs_root(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("EVOEXP_OUTPUTS", raising=False)
-    assert outputs_root() == Path("outputs")
-    monkeypatch.setenv("EVOEXP_OUTPUTS", "/data/evo")
-    assert outputs_root() == Path("/data/evo")

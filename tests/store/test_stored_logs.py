@@ -15,12 +15,7 @@ import pytest
 
 from evoexp.cli import main
 from evoexp.condition import Condition, revisions
-from evoexp.store.log_reader import (
-    generation_columns,
-    read_log,
-    read_solution,
-    read_summary,
-)
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
 DATA = Path(__file__).parent / "data"
 DIGESTS = {  # as they were written
@@ -35,54 +30,36 @@ DIGESTS = {  # as they were written
     "via_point_ga": "bcf5cc5a1d6ee1be599733e5df47fd3d",
 }
 
-each = pytest.mark.parametrize("name", DIGESTS)
-
-
-def of(name: str) -> Path:
-    return DATA / f"{name}.mcap"
-
-
-def stale(path: Path) -> bool:
-    """Whether a component of a log has another revision than the installed one."""
-    config = json.loads(read_log(path).config_json)
-    return any(stored != installed for _, stored, installed in revisions(config))
-
 
 def test_they_are_few_and_small() -> None:
     assert {path.stem for path in DATA.glob("*.mcap")} == DIGESTS.keys()
     assert sum(path.stat().st_size for path in DATA.iterdir()) < 100_000
 
 
-@each
-def test_it_loads(name: str) -> None:
-    log = read_log(of(name))
+@pytest.mark.parametrize("name", DIGESTS)
+def test_it_loads_is_shown_and_is_reproduced_while_the_revisions_are_the_same(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = DATA / f"{name}.mcap"
+    log = read_log(path)
     assert log.condition_id == hashlib.sha256(log.config_json).hexdigest()
     assert log.summary.digest == DIGESTS[name]
-    assert read_summary(of(name)) == log.summary
-    assert (read_solution(of(name)).values == log.solutions[-1].values).all()
-    assert len(generation_columns(of(name))["best_cost"]) == len(log.generations) > 0
+    assert read_summary(path) == log.summary
+    assert (read_solution(path).values == log.solutions[-1].values).all()
+    assert len(generation_columns(path)["best_cost"]) == len(log.generations) > 0
     assert bool(log.fronts) == (name == "coevolution")
-    assert np.isnan(log.cpu_s).all()  # older than that these times were logged
     assert len(log.cpu_s) == len(log.generations)
-    arrays = read_log(of(name)).arrays()
+    assert np.isnan(log.cpu_s).all()  # older than that these times were logged
+    arrays = log.arrays()
     assert list(arrays) == (["minima"] if name == "placement_optimum" else [])
     assert all(array.size for array in arrays.values())
     assert bool(set(log.attachments) - {"minima.npy"}) == (name == "urdf")
-
-
-@each
-def test_it_is_shown(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["show", str(of(name))]) == 0
-    assert read_log(of(name)).condition_id[:12] in capsys.readouterr().out
-
-
-@each
-def test_it_is_reproduced_while_the_revisions_are_the_same(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code = main(["reproduce", str(of(name))])
+    assert main(["show", str(path)]) == 0
+    assert log.condition_id[:12] in capsys.readouterr().out
+    changed = [pair for pair in revisions(json.loads(log.config_json)) if pair[1] != pair[2]]
+    code = main(["reproduce", str(path)])
     said = capsys.readouterr()
-    if stale(of(name)):
+    if changed:
         assert (code, said.err.count("\n")) == (2, 1)
         assert "was revision" in said.err
     else:
@@ -93,16 +70,16 @@ def test_it_is_reproduced_while_the_revisions_are_the_same(
 def test_another_revision_is_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = of("via_point_ga")
-    planner = Condition.from_json(read_log(path).config_json).planner
+    config = read_log(DATA / "via_point_ga.mcap").config_json
+    planner = Condition.from_json(config).planner
     monkeypatch.setattr(type(planner), "revision", planner.revision + 1)
-    assert stale(path)
-    test_it_loads("via_point_ga")
-    test_it_is_shown("via_point_ga", capsys)
-    test_it_is_reproduced_while_the_revisions_are_the_same("via_point_ga", capsys)
+    assert any(stored != installed for _, stored, installed in revisions(json.loads(config)))
+    test_it_loads_is_shown_and_is_reproduced_while_the_revisions_are_the_same(
+        "via_point_ga", capsys
+    )
 
 
 def test_the_files_of_a_robot_are_taken_from_the_log_alone(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "evoexp", "reproduce", str(of("urdf"))]
+    words = [sys.executable, "-m", "evoexp", "reproduce", str(DATA / "urdf.mcap")]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert "1 of 1 MATCH" in done.stdout or "was revision" in done.stderr

@@ -7,8 +7,11 @@ import select
 import shutil
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
@@ -18,6 +21,12 @@ FLAGS = (
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
     "--remote-debugging-pipe",
 )
+NEEDS_BROWSER = [
+    pytest.mark.browser,
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="needs chromium on PATH (Debian: apt-get install chromium)"
+    ),
+]
 PATIENCE = 120.0  # [s] for any one answer, on a busy machine
 SPEED = "GPU stall due to ReadPixels"  # a driver's word on how fast pictures are read back
 
@@ -119,3 +128,11 @@ class Browser:
             text = json.dumps(parameters)
             if SPEED not in text:
                 self.complaints.append(text)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Start a browser for the tests of one module."""
+    found = Browser(tmp_path_factory.mktemp("profile"))
+    yield found
+    found.close()

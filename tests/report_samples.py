@@ -1,10 +1,11 @@
 """Small experiments to report on."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
@@ -15,6 +16,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.report.figures import style
 from evoexp.report.pages import build
 from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results.planner_runs import PlannerRuns, Problem
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.claim_rules import Rule
 from evoexp.report.statistics.judging import Hearing
@@ -75,6 +77,18 @@ def made_up(experiment: Experiment, columns: Callable[[str], dict[str, Any]]) ->
         rows = pd.DataFrame(columns(label))
         found.append(ConditionResults(label, condition, len(rows), rows, {}, None, {}))
     return Results(experiment.name, experiment.budget, tuple(found))
+
+
+def made_up_runs(
+    planner: str, problem: str, rows: list[tuple[int, float, float]], spent: Sequence[float]
+) -> PlannerRuns:
+    """Return runs with proven answers: replicate, collision queries, length; and all queries."""
+    table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length"])
+    seeds, effort = tuple(range(len(spent))), np.array(spent)
+    whole = table.assign(certified=True)
+    return PlannerRuns(
+        planner, Problem(problem), f"{problem}, {planner}", whole, seeds, effort, None
+    )
 
 
 def page_settings(name: str, figures: str | None = None) -> ReportSettings:

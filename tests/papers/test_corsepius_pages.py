@@ -1,7 +1,6 @@
 """The pages on Corsépius 2001: what they hold, and the tables behind their figures."""
 
 import functools
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,100 +22,54 @@ from evoexp.report.pages.page_builder import page_of
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import Results, gather
 from evoexp.report.statistics.inference import Interval, Proportion
-from report_samples import (
-    can_be_drawn,
-    page_settings,
-    smoke_results,
-    store,
-)
+from report_samples import can_be_drawn, page_settings, smoke_results, store
 
 FEW = 3  # replicates
 
 
 @functools.cache
 def solved(outputs: Path, name: str) -> Results:
-    """Return results of three runs at the paper's budget.
-
-    Whose cycles the smoke budget would cut.
-    """
+    """Return three runs at the paper's budget: the smoke budget would cut their cycles."""
     experiment = compose.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
     store(outputs, experiment)
     return gather(outputs, experiment.conditions, FEW, name, experiment.budget, "")
 
 
-@pytest.mark.examples(1)
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("corsepius_population", {"effort", "ratios"}),
-        ("corsepius_scope", {"floor"}),
-        ("corsepius_options", {"shares", "values", "effects"}),
-    ],
-)
-def test_studies_have_figures_and_a_row_per_condition(
-    outputs: Path, name: str, expected: set[str]
-) -> None:
-    results = smoke_results(outputs, name)
-    found = page_of(results, page_settings(name))
-    assert {drawing.stem for drawing in found.drawings} <= {*expected, "scene"}
-    assert len(found.tables[0].rows) == len(results.conditions)
-    for drawing in found.drawings:
-        table = drawing.table()
-        assert len(table)
-        assert can_be_drawn(table, drawing.draw)
-
-
-def test_the_study_reads_no_log(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Thousands of runs: summaries say all of it."""
-
-    def refuse(*_: object) -> None:
-        raise AssertionError("a log was read")
-
-    results = smoke_results(outputs, "corsepius_population")
-    monkeypatch.setattr("evoexp.report.results.stored_results.read_generations", refuse)
-    monkeypatch.setattr("evoexp.report.results.stored_results.read_solution", refuse)
-    for drawing in page_of(results, page_settings("corsepius_population")).drawings:
-        drawing.table()
-
-
 def test_a_way_through_subgoals_has_phases_and_is_no_manoeuvre(outputs: Path) -> None:
     results = smoke_results(outputs, "corsepius_wall")
-    found = page_of(results, page_settings("corsepius_wall"))
-    stems = {drawing.stem for drawing in found.drawings}
-    assert "phases" in stems
-    assert not any(stem.startswith("manoeuvre") for stem in stems)
     two = results._replace(conditions=results.main[:2])  # enough to be compared
-    swept = page_of(two, page_settings("corsepius_wall", "corsepius_sweep"))
-    assert "values" in {drawing.stem for drawing in swept.drawings}
+    pages = (
+        page_of(results, page_settings("corsepius_wall")),
+        page_of(two, page_settings("corsepius_wall", "corsepius_sweep")),
+    )
+    stems, swept = ({drawing.stem for drawing in found.drawings} for found in pages)
+    assert "phases" in stems and "values" in swept
+    assert not any(stem.startswith("manoeuvre") for stem in stems)
 
 
 def test_conditions_of_one_task_are_told_by_all_but_the_setting(outputs: Path) -> None:
     found = measures.tasks(smoke_results(outputs, "corsepius_population"), "num_offspring")
-    assert [task.name for task in found] == [
-        *("ball", "pose", "bottle", "shelf", "wide gate", "narrow gate", "wall", "pick and place")
-    ]
+    names = "ball, pose, bottle, shelf, wide gate, narrow gate, wall, pick and place"
+    assert ", ".join(task.name for task in found) == names
     assert all(task.values == (10, 25, 50, 100, 200, 400, 800) for task in found)
-    first = found[0].by_value[100.0]
-    assert first.label == "ball, λ = 100"
+    assert found[0].by_value[100.0].label == "ball, λ = 100"
 
 
 def test_phases_add_up_to_the_cycles_of_the_run(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_wall").conditions[2]
-    table = measures.phase_cycles(condition)
-    assert list(table.groupby("replicate")["cycles"].sum()) == list(measures.cycles(condition))
-    expected = {k: bool(v) for k, v in condition.summaries["solved"].items()}
-    reached = table.groupby("replicate")["reached"].all() & (table.groupby("replicate").size() == 2)
-    assert reached.to_dict() == expected
-    assert any(expected.values())
+    runs = measures.phase_cycles(condition).groupby("replicate")
+    assert list(runs["cycles"].sum()) == list(measures.cycles(condition))
+    reached = runs["reached"].all() & (runs.size() == 2)
+    assert reached.any() and list(reached) == list(condition.summaries["solved"])
 
 
 def test_lengths_and_detours_of_paths(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_ball").conditions[0]
     lengths, detours = measures.path_lengths(condition), measures.detours(condition)
     for k, q in enumerate(measures.paths(condition).values()):
-        steps = [np.linalg.norm(b - a) for a, b in zip(q[:-1], q[1:], strict=True)]
-        assert lengths[k] == pytest.approx(sum(steps))
-        assert detours[k] == pytest.approx(sum(steps) / np.linalg.norm(q[-1] - q[0]))
+        length = sum(np.linalg.norm(b - a) for a, b in zip(q[:-1], q[1:], strict=True))
+        assert lengths[k] == pytest.approx(length)
+        assert detours[k] == pytest.approx(length / np.linalg.norm(q[-1] - q[0]))
     assert (detours >= 1.0).all()
 
 
@@ -127,15 +80,14 @@ def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     problem = measures.problem(condition)
     assert list(bodies["name"]) == list(problem.bodies.names)
     assert len(covers) == problem.bodies.num_shapes
-    least, most = solids.corners(covers).min(axis=0), solids.corners(covers).max(axis=0)
-    assert (solids.corners(bodies).min(axis=0) >= least - 1e-9).all()
-    assert (solids.corners(bodies).max(axis=0) <= most + 1e-9).all()
+    inner, outer = solids.corners(bodies), solids.corners(covers)
+    assert (inner.min(axis=0) >= outer.min(axis=0) - 1e-9).all()
+    assert (inner.max(axis=0) <= outer.max(axis=0) + 1e-9).all()
     assert can_be_drawn(table, solids.draw_models)
 
 
 def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
-    condition = solved(outputs, "corsepius_ball").conditions[0]
-    table = posture_motions.scope_table(condition)
+    table = posture_motions.scope_table(solved(outputs, "corsepius_ball").conditions[0])
     path = table[table["element"] == posture_motions.POSTURE].sort_values("order")
     for axis in ("x", "y"):
         assert (path[axis].diff().abs().dropna() <= path[f"half_{axis}"].iloc[0] + 1e-9).all()
@@ -157,18 +109,13 @@ def test_histories_keep_the_last_value_of_searches_that_ended(outputs: Path) -> 
 @pytest.mark.matrix
 def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_pick_and_place").conditions[0]
-    replicate = measures.shown_replicate(condition)
     assert run_measures.solved(condition).any()
-    table = posture_motions.motions_table([ShownPath("x", condition, replicate, True)])
-    assert list(dict.fromkeys(table["title"])) == [
-        *("1  approach", "2  grasp", "3  lift", "4  carry", "5  place", "6  detach")
-    ]
+    shown = ShownPath("x", condition, measures.shown_replicate(condition), True)
+    table = posture_motions.motions_table([shown])
     held = table[table["element"] == posture_motions.HELD]
     assert sorted(held["panel"].unique()) == [2, 3, 4]
     carried = held[held["panel"] == 3].sort_values("instant")[["x", "y", "z"]].to_numpy()
-    assert (
-        np.linalg.norm(carried[-1] - (0.52, -0.22, 0.745)) < 0.0101
-    )  # the goal of carrying, within its tolerance
+    assert np.linalg.norm(carried[-1] - (0.52, -0.22, 0.745)) < 0.0101  # goal and its tolerance
     standing = table[(table["element"] == posture_motions.OBSTACLE) & (table["name"] == "bottle")]
     assert sorted(standing["panel"].unique()) == [0, 1, 5]
     assert can_be_drawn(table, posture_motions.draw_motions)
@@ -179,51 +126,42 @@ def test_the_trap_shows_both_kinds_of_runs(outputs: Path) -> None:
     pair = posture_trap.stuck_pair(solved(outputs, "corsepius_wall").main)
     assert [c.label for c in pair] == ["wall", "with a sub-goal"]
     table = posture_trap.trap_table(*pair)
-    tools = table[table["element"] == posture_trap.TOOL]
-    ends = tools.sort_values("order").groupby(["series", "replicate"])["value"].last()
-    assert (ends["stuck"] > 0.1).all()
-    assert (ends["helped"] < 0.01).all()
-    escape = table[table["element"] == posture_trap.ESCAPE]
-    assert list(escape["x"]) == list(posture_trap.BOXES)
+    tools = table[table["element"] == posture_trap.TOOL].sort_values("order")
+    ends = tools.groupby(["series", "replicate"])["value"].last()
+    assert (ends["stuck"] > 0.1).all() and (ends["helped"] < 0.01).all()
+    assert list(table[table["element"] == posture_trap.ESCAPE]["x"]) == list(posture_trap.BOXES)
     assert can_be_drawn(table, posture_trap.draw_trap)
 
 
 def test_expected_effort_counts_failures(outputs: Path) -> None:
     found = measures.tasks(smoke_results(outputs, "corsepius_population"), "num_offspring")[:1]
-    shares, effort = (
-        {"goal met": lambda c: Proportion(1, 2)},
-        {"spent [-]": lambda c: np.array([3.0, 5.0])},
-    )
+    shares = {"goal met": lambda c: Proportion(1, 2)}
+    effort = {"spent [-]": lambda c: np.array([3.0, 5.0])}
     table = population_effort.effort_table(found, shares, effort, 0.95, 50)
-    assert set(table.loc[table["quantity"] == "goal met", "expected"]) == {0.5}
-    own = table[table["quantity"] == "spent [-]"]
-    for c, expected in zip(found[0].conditions, own["expected"], strict=True):
-        assert expected == (8.0 / c.solved if c.solved else np.inf)
-    assert can_be_drawn(table, partial(population_effort.draw_effort, setting="λ", marked=100.0))
+    rows = dict(list(table.groupby("quantity")["expected"]))
+    assert set(rows["goal met"]) == {0.5}
+    expected = [8.0 / c.solved if c.solved else np.inf for c in found[0].conditions]
+    assert list(rows["spent [-]"]) == expected
+    draw = functools.partial(population_effort.draw_effort, setting="λ", marked=100.0)
+    assert can_be_drawn(table, draw)
 
 
 def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
     found = measures.tasks(smoke_results(outputs, "corsepius_scope"), "scope", "")
     assert [task.name for task in found] == ["surface", "point", "snake at a point"]
-    table = population_effort.floor_table(found)
+    table = population_effort.floor_table(found).set_index(["quantity", "task"])
     for task in found:
         assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
-        own = table[
-            (table["quantity"] == population_effort.RESIDUAL) & (table["task"] == task.name)
-        ]
-        medians = own["median"].to_numpy(dtype=np.float64)
+        medians = table.loc[(population_effort.RESIDUAL, task.name), "median"].astype(float)
         expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
         assert population_effort.slope(task) == pytest.approx(expected)
-    assert can_be_drawn(table, population_effort.draw_floor)
+    assert can_be_drawn(table.reset_index(), population_effort.draw_floor)
 
 
 def test_a_series_without_points_is_not_in_the_legend() -> None:
-    rows = {
-        "cycles": [
-            SizeComparison("ball", 200.0, 0.5, Interval(0.4, 0.6), 1.0),
-            SizeComparison("narrow gate", 200.0, 0.0, Interval(0.0, 0.0), 1.0),
-        ]
-    }
+    shown = SizeComparison("ball", 200.0, 0.5, Interval(0.4, 0.6), 1.0)
+    empty = SizeComparison("narrow gate", 200.0, 0.0, Interval(0.0, 0.0), 1.0)
+    rows = {"cycles": [shown, empty]}
     table = population_effort.ratios_table(rows, ["ball", "narrow gate"], 100.0)
     figure = population_effort.draw_ratios(table, "λ [-]")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["ball"]
@@ -231,15 +169,10 @@ def test_a_series_without_points_is_not_in_the_legend() -> None:
 
 @pytest.mark.matrix
 def test_released_objects_stand_upright_on_the_table(outputs: Path) -> None:
-    results = solved(outputs, "corsepius_pick_and_place")
-    found = measures.releases(results.conditions[0])
+    condition = solved(outputs, "corsepius_pick_and_place").conditions[0]
+    found = measures.releases(condition)
     assert found
-    for one in found:
-        assert abs(one.gap) <= 0.001 + 1e-9
-        assert one.tilt <= 1.0 * DEGREE
-    condition = results.conditions[0]
+    assert all(abs(one.gap) <= 0.001 + 1e-9 and one.tilt <= 1.0 * DEGREE for one in found)
     told = measures.allowed_contacts(condition)
-    assert told is not None
-    assert "table – bottle" in told.pairs
-    deepest = condition.summaries["penetration"].max()
-    assert 0.0 <= deepest <= 0.001 + 3e-6
+    assert told is not None and "table – bottle" in told.pairs
+    assert 0.0 <= condition.summaries["penetration"].max() <= 0.001 + 3e-6

@@ -10,64 +10,74 @@ from evoexp.papers.rana import measures, motions
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.records import generations
 from evoexp.report.pages.page_builder import page_of
-from evoexp.report.results import run_measures
-from evoexp.report.results import stored_results as report_results
-from evoexp.report.results.stored_results import Results
+from evoexp.report.pages.page_parts import Page
+from evoexp.report.results import run_measures, stored_results
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.shipped import Shipped
 from report_samples import page_settings, smoke_results
 
 WORDS = ("ga.population_size=12", "ga.num_generations=3")
+TWO = (*WORDS, "num_replicates=2")
+
+
+def page(outputs: Path, name: str, *words: str) -> Page:
+    return page_of(smoke_results(outputs, name, *words), page_settings(name))
 
 
 @pytest.fixture(scope="module")
-def obstacles(outputs: Path) -> Results:
-    return smoke_results(outputs, "rana_obstacles")
+def obstacles(outputs: Path) -> ConditionResults:
+    return smoke_results(outputs, "rana_obstacles").conditions[0]
 
 
-def test_approaches_by_kind_make_the_recorded_clearance(obstacles: Results) -> None:
-    condition = obstacles.conditions[0]
-    found = motions.approaches(condition)
+def of_best(condition: ConditionResults, values: np.ndarray) -> float:
+    return float(values[list(condition.summaries.index).index(condition.best_replicate)])
+
+
+def steps_of_arms(condition: ConditionResults) -> list[np.ndarray]:
+    """Return the lengths of the steps of each arm in the best motion [deg]."""
+    q = motions.best_motion(condition)
+    parts = (q[a:b] for a, b in motions.problem(condition).arm_slices)
+    return [np.linalg.norm(np.diff(part, axis=1), axis=0) for part in parts]
+
+
+def test_approaches_by_kind_make_the_recorded_clearance(obstacles: ConditionResults) -> None:
+    found = motions.approaches(obstacles)
     assert set(found["kind"]) == {motions.ARMS, motions.OBSTACLES}
-    least = found.groupby("replicate")["clearance"].min()
-    assert least.to_numpy() == pytest.approx(condition.column("clearance"), abs=1e-6)
-    kept = found.groupby("replicate")["kept"].all().to_numpy()
-    assert kept.tolist() == condition.summaries["certified_margin"].tolist()
+    runs = found.groupby("replicate")
+    assert runs["clearance"].min().to_numpy() == pytest.approx(obstacles.column("clearance"))
+    kept = obstacles.summaries["certified_margin"].tolist()
+    assert runs["kept"].all().tolist() == kept
 
 
-def test_distances_to_obstacles_are_drawn_for_every_replicate(obstacles: Results) -> None:
-    condition = obstacles.conditions[0]
-    sampled = planar_motion.sampled_distances(condition, 5)
-    table = planar_motion.distances_table(condition, sampled)
+def test_distances_to_obstacles_are_drawn_for_every_replicate(obstacles: ConditionResults) -> None:
+    sampled = planar_motion.sampled_distances(obstacles, 5)
+    table = planar_motion.distances_table(obstacles, sampled)
     for kind, margin in ((motions.ARMS, 1.0), (motions.OBSTACLES, 0.5)):
         own = table[table["kind"] == kind]
         assert set(own["safety_distance"]) == {margin}
         exact = own[own["series"].isin([planar_motion.CLOSEST, planar_motion.REFUTED])]
-        assert len(exact) == condition.done, "no replicate is dropped"
-    # by hand: the least distance of circle centres to the ball at (5, 4.6) of radius 0.4 and others
-    problem = motions.problem(condition)
-    q = problem.start[:, None]
+        assert len(exact) == obstacles.done, "no replicate is dropped"
+    # by hand: the least distance of circle centres to the ball at (5, 4.6) of radius 0.4
+    problem = motions.problem(obstacles)
     centres = np.vstack(problem.sphere_centres(problem.start))
     ball = np.linalg.norm(centres - [5.0, 4.6, 0.0], axis=1).min() - 0.4
-    assert problem.obstacle_distances(q)[0] <= ball + 1e-9
+    assert problem.obstacle_distances(problem.start[:, None])[0] <= ball + 1e-9
     assert sampled["centres_to_obstacles"].min() >= 0.0
     titles = [axes.get_title() for axes in planar_motion.draw_distances(table).axes]
     assert [title[0] for title in titles] == ["a", "c", "b", "d"]
 
 
-def test_extensions_have_claims_about_points_motions_and_margins(obstacles: Results) -> None:
-    claims = page_of(obstacles, page_settings("rana_obstacles")).claims
+def test_extensions_have_claims_about_points_motions_and_margins(outputs: Path) -> None:
+    claims = page(outputs, "rana_obstacles").claims
     assert len(claims) == 3
     assert all("static obstacles" in claim.text for claim in claims)
     assert "required 0.5, kept in" in claims[2].evidence
     assert "required 1, kept in" in claims[2].evidence
 
 
-def test_runs_without_a_free_individual_count_as_never(obstacles: Results) -> None:
-    condition = obstacles.conditions[0]
-    first = run_measures.first_feasible(condition)
-    recorded = condition.column("first_feasible_generation")
-    assert np.array_equal(np.isinf(first), np.isnan(recorded))
-    assert len(first) == condition.done
+def test_runs_without_a_free_individual_count_as_never(obstacles: ConditionResults) -> None:
+    first, recorded = run_measures.first_feasible(obstacles), "first_feasible_generation"
+    assert np.array_equal(np.isinf(first), np.isnan(obstacles.column(recorded)))
 
 
 @pytest.mark.parametrize(
@@ -84,15 +94,9 @@ def test_a_part_improves_if_nothing_is_worse(says: list[int], expected: bool | N
     assert paper_claims.improves(says) is expected
 
 
-def test_unevenness_is_the_sum_over_arms(obstacles: Results) -> None:
-    condition = obstacles.conditions[0]
-    q = motions.best_motion(condition)
-    by_hand = 0.0
-    for a, b in motions.problem(condition).arm_slices:
-        steps = np.linalg.norm(np.diff(q[a:b], axis=1), axis=0)
-        by_hand += float(np.abs(steps - steps.mean()).sum())
-    place = list(condition.summaries.index).index(condition.best_replicate)
-    assert measures.unevenness(condition)[place] == pytest.approx(by_hand, rel=1e-9)
+def test_unevenness_is_the_sum_over_arms(obstacles: ConditionResults) -> None:
+    by_hand = sum(np.abs(steps - steps.mean()).sum() for steps in steps_of_arms(obstacles))
+    assert of_best(obstacles, measures.unevenness(obstacles)) == pytest.approx(by_hand, rel=1e-9)
 
 
 def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
@@ -101,77 +105,56 @@ def test_pairs_kept_apart_are_counted_against_all_pairs(outputs: Path) -> None:
     assert list(shares) == [0]  # three generations only
     planner, problem = condition.planner, motions.problem(condition)
     first = next(iter(generations(planner.evolve(problem, condition.condition.rng(0)))))
-    strings = first.population[:, :, :12]
-    apart = 0.0  # over all pairs and all sites of both arms
+    parts = [first.population[a:b, 1:-1, :12] for a, b in problem.arm_slices]
     near = [
-        np.linalg.norm(strings[a:b, 1:-1, :, None] - strings[a:b, 1:-1, None, :], axis=0) < 100.0
-        for a, b in problem.arm_slices
+        np.mean(np.linalg.norm(p[..., :, None] - p[..., None, :], axis=0) < 100.0, axis=0)
+        for p in parts
     ]
-    for one in range(12):
-        for two in range(12):
-            if one != two:
-                both = np.mean(near[0][:, one, two]) * np.mean(near[1][:, one, two])
-                apart += (1.0 - both) / (12 * 11)
+    apart = (1.0 - near[0] * near[1])[~np.eye(12, dtype=bool)].mean()  # all pairs, sites, arms
     assert shares[0] == pytest.approx(apart, abs=0.05)  # 2000 pairs: four standard errors
 
 
 def test_the_page_of_the_cross_over_tells_its_distance(outputs: Path) -> None:
-    results = smoke_results(outputs, "rana_crossover", *WORDS)
-    page = page_of(results, page_settings("rana_crossover"))
-    texts = [title for title, _ in page.checks]
-    assert any("cross_over_distance = 100°" in text for text in texts)
-    (told,) = (finding for title, finding in page.checks if title.startswith("Other distances"))
+    checks = page(outputs, "rana_crossover", *WORDS).checks
+    assert any("cross_over_distance = 100°" in title for title, _ in checks)
+    (told,) = (finding for title, finding in checks if title.startswith("Other distances"))
     assert all(label in told for label in ("25°", "50°", "200°", "any distance"))
     assert "no cross-over" not in told
 
 
 def test_the_page_of_the_weights_tells_what_a_collision_costs(outputs: Path) -> None:
-    results = smoke_results(outputs, "rana_collision_weight", *WORDS)
-    page = page_of(results, page_settings("rana_collision_weight"))
-    assert [row[1] for row in page.tables[0].rows] == ["10°", "1°", "3°", "30°", "100°"]
-    printed = results.conditions[0]
+    found = page(outputs, "rana_collision_weight", *WORDS)
+    assert [row[1] for row in found.tables[0].rows] == ["10°", "1°", "3°", "30°", "100°"]
+    printed = smoke_results(outputs, "rana_collision_weight", *WORDS).conditions[0]
     problem = motions.problem(printed)
-    straight = sum(
-        float(np.linalg.norm((problem.goal - problem.start)[a:b])) for a, b in ((0, 3), (3, 6))
-    )
-    assert f"{100 * 10 / straight:.1f} %" in page.claims[1].evidence
-    q = motions.best_motion(printed)
-    by_hand = sum(
-        np.linalg.norm(np.diff(q[a:b], axis=1), axis=0).sum() for a, b in ((0, 3), (3, 6))
-    )
-    place = list(printed.summaries.index).index(printed.best_replicate)
-    assert measures.length(printed)[place] == pytest.approx(by_hand, rel=1e-9)
+    way = problem.goal - problem.start
+    straight = np.linalg.norm(way[:3]) + np.linalg.norm(way[3:])
+    assert f"{100 * 10 / straight:.1f} %" in found.claims[1].evidence
+    by_hand = sum(steps.sum() for steps in steps_of_arms(printed))
+    assert of_best(printed, measures.length(printed)) == pytest.approx(by_hand, rel=1e-9)
 
 
 def test_ablations_that_are_stored_judge_the_papers_page(
     outputs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = (*WORDS, "num_replicates=2")
-    ablations = smoke_results(outputs, "rana_planar_ablations", *words)
-    rows = tuple(
-        Shipped("rana_planar_ablations", c.label, "paper", c.condition.id, "0" * 32)
-        for c in ablations.conditions
-    )
-    never_run = Shipped("rana_planar_ablations", "never run", "paper", "f" * 64, "0" * 32)
-    monkeypatch.setattr(report_results, "shipped", lambda: (*rows, never_run))
-    results = smoke_results(outputs, "rana_planar", *words)
-    beside = results.beside("rana_planar_ablations")
-    assert {c.label for c in beside.conditions} == {c.label for c in ablations.conditions}
-    assert [c.done for c in beside.conditions] == [2] * len(rows)
-    claims = page_of(results, page_settings("rana_planar")).claims
-    told = [claim for claim in claims if "Relaxation and redistribution" in claim.text]
-    assert len([c for c in told if "refuted motions" in c.evidence]) == 3
+    name = "rana_planar_ablations"
+    ablations = smoke_results(outputs, name, *TWO).conditions
+    ids = [(c.label, c.condition.id) for c in ablations] + [("never run", "f" * 64)]
+    rows = tuple(Shipped(name, label, "paper", each, "0" * 32) for label, each in ids)
+    monkeypatch.setattr(stored_results, "shipped", lambda: rows)
+    results = smoke_results(outputs, "rana_planar", *TWO)
+    beside = {c.label: c.done for c in results.beside(name).conditions}
+    assert beside == dict.fromkeys([c.label for c in ablations], 2)
+    claims = page(outputs, "rana_planar", *TWO).claims
+    told = [c.evidence for c in claims if "Relaxation and redistribution" in c.text]
+    assert len([evidence for evidence in told if "refuted motions" in evidence]) == 3
     assert results.beside("rana_puma_ablations").conditions == ()
 
 
 def test_what_evolution_adds_is_told_of_the_best_control_first(outputs: Path) -> None:
-    results = smoke_results(outputs, "rana_planar", *WORDS, "num_replicates=2")
-    (claim,) = (
-        claim
-        for claim in page_of(results, page_settings("rana_planar")).claims
-        if claim.text.startswith("Evolution adds")
-    )
-    medians = {c.label: float(np.median(c.column("best_cost"))) for c in results.conditions[1:]}
-    best = min(medians, key=lambda label: medians[label])
-    assert f"to the best control, {best}, evolution adds" in claim.evidence
+    claims = page(outputs, "rana_planar", *TWO).claims
+    (claim,) = (claim for claim in claims if claim.text.startswith("Evolution adds"))
+    controls = smoke_results(outputs, "rana_planar", *TWO).conditions[1:]
+    best = min(controls, key=lambda c: float(np.median(c.column("best_cost"))))
+    assert f"to the best control, {best.label}, evolution adds" in claim.evidence
     assert "straight line −527.3" in claim.evidence

@@ -1,224 +1,250 @@
-import copy
+"""Figures of runs and sweeps: curves, boxes, shares, and the paper's figures of planar arms."""
+
+import dataclasses
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import cbook
+from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures import planar_models, planar_motion
-from evoexp.report.figures import convergence, style
+from evoexp.report.figures import convergence, effects, shares, style
+from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results import motion_geometry
-from evoexp.report.results.stored_results import Results
+from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.statistics.inference import Proportion
+from report_samples import can_be_drawn
 
 
-def texts(figure: Figure) -> list[str]:
+def texts(figure: Figure) -> set[str]:
     """Return every word that a figure shows, its legends included."""
     found = [
-        text.get_text()
+        text
         for axes in figure.axes
-        for text in (axes.xaxis.label, axes.yaxis.label, *axes.texts)
+        for text in (axes.xaxis.label, axes.yaxis.label, *axes.texts, axes.title)
     ]
-    found += [axes.get_title(loc=place) for axes in figure.axes for place in ("left", "center")]
-    return found + [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    found += [text for legend in figure.legends for text in legend.get_texts()]
+    left = {axes.get_title(loc="left") for axes in figure.axes}
+    return left | {text.get_text() for text in found}
 
 
-def curves(condition: str, position: int, evaluations: float) -> pd.DataFrame:
-    parts = []
-    for quantity in convergence.NAMES.values():
-        generation = np.arange(6)
+def curves(*evaluations: float) -> pd.DataFrame:
+    """Return curves of conditions that take so many evaluations in a generation."""
+    generation, parts = np.arange(6), []
+    for position, each in enumerate(evaluations):
         median = 100.0 + generation * (position + 1.0)
         columns = {
-            "condition": condition,
+            "condition": f"condition {position}",
             "position": position,
-            "quantity": quantity,
             "generation": generation,
-            "evaluations": evaluations * (generation + 1),
+            "evaluations": each * (generation + 1),
             "median": median,
             "lower": median - 5.0,
             "upper": median + 5.0,
             "replicates": [4, 4, 4, 3, 3, 3],
         }
-        parts.append(pd.DataFrame(columns))
+        names = convergence.NAMES.values()
+        parts += [pd.DataFrame(columns | {"quantity": quantity}) for quantity in names]
     return pd.concat(parts, ignore_index=True)
 
 
 @pytest.mark.parametrize("draw", [convergence.draw_cost, convergence.draw_fitness])
 def test_convergence_shows_medians_bands_and_counts(draw: object) -> None:
-    table = pd.concat([curves("GA", 0, 50.0), curves("random", 1, 50.0)])
-    figure = draw(table)  # type: ignore[operator]
+    figure = draw(curves(50.0, 50.0))
     axes = figure.axes[0]
     lines = [line for line in axes.get_lines() if len(line.get_xdata()) == 6]
     np.testing.assert_array_equal(lines[0].get_ydata(), 100.0 + np.arange(6))
     assert len(lines) == 4
     assert {to_hex(line.get_color()).upper() for line in lines} == set(style.CONDITION_COLOURS[:2])
-    assert "GA, best so far (n = 3…4)" in texts(figure)
-    assert axes.get_xlabel() == "generation"
+    assert "condition 0, best so far (n = 3…4)" in texts(figure)
     above = axes.child_axes[0]
-    assert above.get_xlabel() == "evaluations"
+    assert (axes.get_xlabel(), above.get_xlabel()) == ("generation", "evaluations")
     assert above._functions[0](5.0) == pytest.approx(300.0)
+    infinite, single = curves(50.0), curves(50.0).query("generation == 0")
+    infinite.loc[infinite["generation"] < 2, ["median", "lower", "upper"]] = np.inf
+    assert can_be_drawn(infinite, draw) and can_be_drawn(single, draw)
 
 
 def test_conditions_of_other_effort_share_an_axis_of_evaluations() -> None:
-    figure = convergence.draw_cost(pd.concat([curves("small", 0, 20.0), curves("large", 1, 50.0)]))
-    axes = figure.axes[0]
-    assert axes.get_xlabel() == "evaluations"
-    assert axes.get_xlim()[1] == 300.0
+    axes = convergence.draw_cost(curves(20.0, 50.0)).axes[0]
+    assert (axes.get_xlabel(), axes.get_xlim()[1]) == ("evaluations", 300.0)
 
 
-def test_convergence_of_infinite_costs_and_of_one_generation() -> None:
-    table = curves("GA", 0, 50.0)
-    table.loc[table["generation"] < 2, ["median", "lower", "upper"]] = np.inf
-    single = curves("GA", 0, 50.0).query("generation == 0")
-    for data in (table, single):
-        for draw in (convergence.draw_cost, convergence.draw_fitness):
-            images = style.drawn(lambda data=data, draw=draw: draw(data), ("png",), 50)  # type: ignore[misc]
-            assert images["png"].startswith(b"\x89PNG")
+@pytest.mark.parametrize("count", [3, 8, 9, 20])
+def test_no_two_conditions_of_a_panel_share_a_colour(count: int) -> None:
+    table = curves(*[10.0] * count)
+    best = table[table["quantity"] == convergence.NAMES["best_cost"]]
+    named: list[str] = []
+    for axes in convergence.draw_best(best).axes:
+        own = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
+        assert len({to_hex(line.get_color()) for line in own}) == len(own)
+        assert len(axes.get_lines()) == count, "the others are there, in grey"
+        named += [str(line.get_label()).partition(" (")[0] for line in own]
+    assert set(named) == {f"condition {k}" for k in range(count)}
+
+
+def values(*runs: list[float]) -> Axes:
+    """Return the axes that show the values of some conditions' runs."""
+    parts = [
+        {"position": k, "condition": str(k), "replicate": n, "value": value}
+        for k, found in enumerate(runs)
+        for n, value in enumerate(found)
+    ]
+    table = pd.DataFrame(parts).assign(quantity="evaluations", failed=0)
+    return effects.draw_values(table).axes[0]
+
+
+def medians(axes: Axes) -> list[float]:
+    lines = [line for line in axes.get_lines() if line.get_linewidth() == 2.0]
+    return [float(line.get_xdata()[0]) for line in lines]
+
+
+def test_runs_that_never_get_there_count_in_the_box() -> None:
+    """Of 2, 4, 6, never, never the median is 6; of the three successful runs alone it is 4."""
+    axes = values([2.0, 3.0, 4.0, 5.0, 6.0], [2.0, 4.0, 6.0, np.inf, np.inf])
+    assert medians(axes) == [4.0, 6.0]
+    assert [text.get_text() for text in axes.texts] == ["5 of 5", "3 of 5"]
+    assert axes.get_xticklabels()[-1].get_text() == "never"
+    *ticks, never = axes.get_xticks()
+    assert never == pytest.approx(6.0 + effects.BEYOND * 4.0) and max(ticks) <= 6.0
+    some = values([np.inf] * 4, [1.0, *[np.inf] * 3])  # a median may be never
+    assert medians(some) == [pytest.approx(1.0 + effects.BEYOND)] * 2
+    assert medians(values([np.inf] * 4)) == [1.0]
+    axes = values([2.0, 3.0, 4.0])
+    assert not axes.texts
+    assert "never" not in [label.get_text() for label in axes.get_xticklabels()]
+
+
+@pytest.mark.parametrize("size", [5, 30, 200])
+def test_a_box_is_tukeys(size: int) -> None:
+    sample = np.random.default_rng(3).standard_t(2, size)
+    axes = style.figure(2.0).subplots()
+    draw_box(axes, 0.0, sample, "#000000")
+    (expected,) = cbook.boxplot_stats(sample)
+    drawn = np.concatenate([np.ravel(line.get_xdata()) for line in axes.get_lines()])
+    for name in ("q1", "med", "q3", "whislo", "whishi"):
+        assert np.isclose(drawn, expected[name]).any(), name
+
+
+def test_panels_of_shares_have_one_scale() -> None:
+    rows = [
+        ("high", 0, "a", Proportion(180, 200)),
+        ("high", 1, "b", Proportion(200, 200)),
+        ("low", 0, "a", Proportion(4, 200)),
+        ("low", 1, "b", Proportion(0, 0)),
+    ]
+    panels = shares.draw_shares(shares.shares_table(rows, {}, 0.95)).axes
+    (one, two), (three, four) = (axes.get_xlim() for axes in panels)
+    assert two - one == pytest.approx(four - three)
+    assert one < 100 * Proportion(180, 200).interval(0.95).low
+    assert two > 100.0 and three < 0.0
+    wide = [*rows, ("low", 2, "c", Proportion(150, 200))]
+    panels = shares.draw_shares(shares.shares_table(wide, {}, 0.95)).axes
+    assert panels[0].get_xlim() == panels[1].get_xlim()
+
+
+@pytest.fixture
+def ga(results: Results) -> ConditionResults:
+    return results.conditions[0]
 
 
 def test_fitness_is_the_papers(results: Results) -> None:
     costs, fitness = convergence.cost_table(results), convergence.fitness_table(results)
     np.testing.assert_allclose(fitness["median"], 500.0 - costs["median"])
-    np.testing.assert_allclose(
-        fitness["upper"] - fitness["lower"], costs["upper"] - costs["lower"], atol=1e-9
-    )
-    best = fitness[
-        (fitness["condition"] == "via-point GA") & (fitness["quantity"] == "best so far")
-    ]
+    widths = [table["upper"] - table["lower"] for table in (fitness, costs)]
+    np.testing.assert_allclose(*widths, atol=1e-9)
+    best = fitness.set_index(["condition", "quantity"]).loc[("via-point GA", "best so far")]
     assert list(best["generation"]) == [0, 1, 2, 3, 4]
     assert best["median"].is_monotonic_increasing
 
 
-def test_arms_stand_at_start_and_goal_of_table_2(results: Results) -> None:
-    table = planar_models.arms_table(results.conditions[0])
+def test_arms_stand_at_start_and_goal_of_table_2(ga: ConditionResults) -> None:
+    table = planar_models.arms_table(ga)
     first = table[(table["posture"] == "start") & (table["joint"] == 0)]
     assert list(first["angle_deg"]) == [45.0, 225.0]
-    assert list(first["reference_deg"]) == [0.0, -360.0] or list(
-        first["reference_deg"] % 360.0
-    ) == [0.0, 0.0]
+    assert list(first["reference_deg"] % 360.0) == [0.0, 0.0]
     np.testing.assert_allclose(first[["x", "y"]], [[0.0, 0.0], [0.0, 8.0]])
     length = np.hypot(table["x_end"] - table["x"], table["y_end"] - table["y"])
     np.testing.assert_allclose(length, 4.0)
-    assert {"θ₁ = 45°", "θ₂ = 225°", "α₁ = 225°", "x [unit]"} <= set(
-        texts(planar_models.draw_arms(table))
-    )
+    words = {"θ₁ = 45°", "θ₂ = 225°", "α₁ = 225°", "x [unit]"}
+    assert words <= texts(planar_models.draw_arms(table))
 
 
-def test_via_points_are_those_of_the_solution(results: Results) -> None:
-    condition = results.conditions[0]
-    table = planar_models.via_points_table(condition)
-    final = table[table["stage"] == "best at the end"]
-    flat = final[["joint_1_deg", "joint_2_deg"]].to_numpy().ravel()
-    np.testing.assert_array_equal(flat, condition.solutions[condition.best_replicate])
-    figure = planar_models.draw_via_points(table)
-    assert {"θ₁ [deg]", "α₂ [deg]", "0", "20", "arm 2"} <= set(texts(figure))
+def test_via_points_are_those_of_the_solution(ga: ConditionResults) -> None:
+    table = planar_models.via_points_table(ga)
+    final = table[table["stage"] == "best at the end"][["joint_1_deg", "joint_2_deg"]]
+    np.testing.assert_array_equal(final.to_numpy().ravel(), ga.solutions[ga.best_replicate])
+    words = texts(planar_models.draw_via_points(table))
+    assert {"θ₁ [deg]", "α₂ [deg]", "0", "20", "arm 2"} <= words
 
 
-def test_circles_show_the_least_distance(results: Results) -> None:
-    condition = results.conditions[0]
-    table = planar_models.circles_table(condition)
-    assert (table["element"] == "circle").sum() == 18
-    row = table[table["element"] == "centres"].iloc[0]
-    q = motion_geometry.configurations(
-        condition.prepared, condition.solutions[condition.best_replicate]
-    )
-    assert row["distance"] == pytest.approx(
-        condition.prepared.problem.centre_distances(q).min(), abs=1e-9
-    )
-    assert np.hypot(row["x_end"] - row["x"], row["y_end"] - row["y"]) == pytest.approx(
-        row["distance"]
-    )
-    bodies = table[table["element"] == "bodies"].iloc[0]
-    assert bodies["distance"] <= row["distance"] + 1e-9
+def test_circles_show_the_least_distance(ga: ConditionResults) -> None:
+    table = planar_models.circles_table(ga)
+    elements = table.set_index("element")
+    assert len(elements.loc["circle"]) == 18
+    centres = elements.loc["centres"]
+    q = motion_geometry.configurations(ga.prepared, ga.solutions[ga.best_replicate])
+    truth = ga.prepared.problem.centre_distances(q).min()
+    assert centres["distance"] == pytest.approx(truth, abs=1e-9)
+    drawn = np.hypot(centres["x_end"] - centres["x"], centres["y_end"] - centres["y"])
+    assert drawn == pytest.approx(truth)
+    assert elements.loc["bodies", "distance"] <= truth + 1e-9
     words = texts(planar_models.draw_circles(table))
-    assert f"least distance of circle centres: {row['distance']:.3f} unit" in words
+    assert f"least distance of circle centres: {truth:.3f} unit" in words
 
 
-def test_snapshots_cut_the_motion_into_stages(results: Results) -> None:
-    table = planar_motion.snapshots_table(results.conditions[0])
+def test_snapshots_cut_the_motion_into_stages(ga: ConditionResults) -> None:
+    table = planar_motion.snapshots_table(ga)
     stages = table.groupby("stage")[["first", "last"]].first().to_numpy().tolist()
     assert stages == [[0, 4], [4, 8], [8, 12], [12, 16], [16, 20], [0, 20]]
-    whole = table[table["stage"] == 5]
+    whole = table[table["stage"] == 5].set_index(["instant", "arm", "link"])
     assert len(whole) == 21 * 4
-    start = whole[(whole["instant"] == 0) & (whole["arm"] == 0) & (whole["link"] == 1)].iloc[0]
-    assert (start["x_end"], start["y_end"]) == pytest.approx(
-        (4.0 * np.sqrt(0.5), 4.0 * np.sqrt(0.5) - 4.0)
-    )
-    figure = planar_motion.draw_snapshots(table)
-    assert {"instants 0–4", "all instants 0–20", "arm 1", "arm 2", "y [unit]"} <= set(texts(figure))
+    tip = whole.loc[(0, 0, 1), ["x_end", "y_end"]].tolist()
+    assert tip == pytest.approx([4.0 * np.sqrt(0.5), 4.0 * np.sqrt(0.5) - 4.0])
+    words = {"instants 0–4", "all instants 0–20", "arm 1", "arm 2", "y [unit]"}
+    assert words <= texts(planar_motion.draw_snapshots(table))
 
 
-def test_paths_of_all_replicates(results: Results) -> None:
-    table = planar_motion.paths_table(results.conditions[0])
-    assert sorted(table["replicate"].unique()) == [-1, 0, 1]
-    ends = table[(table["arm"] == 0) & (table["instant"] == 20)]
-    np.testing.assert_allclose(ends[["joint_1_deg", "joint_2_deg"]], [[135.0, 135.0]] * 3)
-    assert "all replicates (n = 2)" in texts(planar_motion.draw_paths(table))
-
-
-def test_of_many_replicates_some_paths_are_drawn(
-    results: Results, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("copies", "most", "words"),
+    [
+        (1, 50, "all replicates (n = 2)"),
+        (2, 2, "2 of 4 replicates"),
+        (2, 4, "all replicates (n = 4)"),
+    ],
+)
+def test_paths_of_all_or_of_some_replicates_are_drawn(
+    ga: ConditionResults, monkeypatch: pytest.MonkeyPatch, copies: int, most: int, words: str
 ) -> None:
-    condition = copy.copy(results.conditions[0])
-    first, second = condition.solutions.values()
-    vars(condition)["solutions"] = {0: first, 1: second, 2: first, 3: second}
-    monkeypatch.setattr(motions, "MOST_PATHS", 2)
+    condition = dataclasses.replace(ga)
+    solutions = [*ga.solutions.values()] * copies
+    vars(condition)["solutions"] = dict(enumerate(solutions))
+    monkeypatch.setattr(motions, "MOST_PATHS", most)
     table = planar_motion.paths_table(condition)
-    assert sorted(table["replicate"].unique()) == [-1, 0, 1]
-    assert "2 of 4 replicates" in texts(planar_motion.draw_paths(table))
-    monkeypatch.setattr(motions, "MOST_PATHS", 4)
-    everything = planar_motion.paths_table(condition)
-    assert "all replicates (n = 4)" in texts(planar_motion.draw_paths(everything))
+    assert sorted(table["replicate"].unique()) == list(range(-1, min(len(solutions), most)))
+    ends = table[(table["arm"] == 0) & (table["instant"] == 20)][["joint_1_deg", "joint_2_deg"]]
+    np.testing.assert_allclose(ends, [[135.0, 135.0]] * len(ends))
+    assert words in texts(planar_motion.draw_paths(table))
 
 
-def test_distances_are_best_and_envelope(results: Results) -> None:
-    condition = results.conditions[0]
-    sampled = planar_motion.sampled_distances(condition, 4)
+def test_distances_are_best_and_envelope(ga: ConditionResults) -> None:
+    sampled = planar_motion.sampled_distances(ga, 4)
     assert len(sampled) == 4 * 81  # straight line, best replicate, lowest and highest of all
-    table = planar_motion.distances_table(condition, sampled)
-    sets = {
-        key: rows.set_index("instant")["distance"]
-        for key, rows in table.groupby(["measure", "series"])
-    }
-    for measure in (planar_motion.CENTRES, planar_motion.LINKS):
-        best, low, high = (
-            sets[measure, s]
-            for s in (planar_motion.BEST, planar_motion.LOWEST, planar_motion.HIGHEST)
-        )
-        assert (low <= best).all()
-        assert (best <= high).all()
-        at = sets[measure, planar_motion.AT_VIA_POINTS]
-        assert list(at.index) == list(range(21))
-        np.testing.assert_array_equal(at, best[at.index])
-    centres, links = (
-        sets[m, planar_motion.STRAIGHT] for m in (planar_motion.CENTRES, planar_motion.LINKS)
-    )
-    assert (links <= centres + 1e-9).all()  # circles sit on the links
-    assert links.min() == 0.0
+    table = planar_motion.distances_table(ga, sampled)
+    rows = table.set_index(["measure", "series", "instant"])["distance"]
+    centres, links = rows.loc[planar_motion.CENTRES], rows.loc[planar_motion.LINKS]
+    for each in (centres, links):
+        best = each.loc[planar_motion.BEST]
+        assert (each.loc[planar_motion.LOWEST] <= best).all()
+        assert (best <= each.loc[planar_motion.HIGHEST]).all()
+        at = each.loc[planar_motion.AT_VIA_POINTS]
+        assert list(at.index) == list(range(21)) and at.equals(best[at.index])
+    straight = links.loc[planar_motion.STRAIGHT]
+    assert (straight <= centres.loc[planar_motion.STRAIGHT] + 1e-9).all()  # circles on links
+    assert straight.min() == 0.0
     words = texts(planar_motion.draw_distances(table))
-    assert {
-        "below the required distance: 1 unit between arms",
-        "least distance [unit]",
-        planar_motion.AT_VIA_POINTS,
-    } <= set(words)
-
-
-def test_a_figure_has_the_same_bytes_each_time_whatever_the_users_style() -> None:
-    import matplotlib as mpl
-
-    table = curves("GA", 0, 50.0)
-    first = style.drawn(lambda: convergence.draw_cost(table), ("svg", "png", "pdf"), 60)
-    with mpl.rc_context({"font.size": 20.0, "lines.linewidth": 9.0}):
-        again = style.drawn(lambda: convergence.draw_cost(table), ("svg", "png", "pdf"), 60)
-        assert mpl.rcParams["font.size"] == 20.0
-    assert first == again
-    assert b"<dc:date>" not in first["svg"]
-
-
-def test_colours_repeat_only_after_all_are_used() -> None:
-    assert len({style.arm_colour(k) for k in range(6)}) == 6
-    assert style.arm_colour(6) == style.arm_colour(0)
-    assert len({style.condition_colour(k) for k in range(8)}) == 8
-    assert style.joint_symbol(1, 11) == "α₁₂"
-    assert style.joint_symbol(7, 0) == "q8,₁"
+    assert {"below the required distance: 1 unit between arms", "least distance [unit]"} <= words

@@ -1,6 +1,5 @@
 """Runs from a CSV file: what is read, what is refused, and where it stands."""
 
-import csv
 import math
 from pathlib import Path
 
@@ -11,84 +10,83 @@ from evoexp.errors import SettingError
 from evoexp.report.figures.effort_curves import length_table, share_table
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.given_data import COLUMNS, of_given, read_given, strange_problems
+from evoexp.report.results.given_data import (
+    COLUMNS,
+    GivenData,
+    of_given,
+    read_given,
+    strange_problems,
+)
 from evoexp.report.results.planner_runs import MULTIPLES, of_results
 from evoexp.report.results.stored_results import Results
 
 HEAD, SEMICOLONS = ",".join(COLUMNS), ";".join(COLUMNS)
 
 
-@pytest.fixture
-def given(tmp_path: Path) -> Path:
-    """Return a file of two planners: one on our problem, with a run that failed."""
+ROWS = f"""{HEAD}
+RRT*,link_motion,7,50,9.0
+RRT*,link_motion,7,400,5.0
+RRT*,link_motion,3,900,
+"my, own",elsewhere,0,10,1.5
+"my, own",elsewhere,0,99,
+"""
+
+
+def given(tmp_path: Path, problem: str = "link_motion", text: str = ROWS) -> GivenData:
+    """Read a file of two planners: one on our problem, with a run that failed."""
     path = tmp_path / "given.csv"
-    rows = [
-        ("RRT*", "link_motion", 7, 50, 9.0),
-        ("RRT*", "link_motion", 7, 400, 5.0),
-        ("RRT*", "link_motion", 3, 900, ""),
-        ("my, own", "elsewhere", 0, 10, 1.5),
-        ("my, own", "elsewhere", 0, 99, ""),
-    ]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([COLUMNS, *rows])
-    return path
+    path.write_text(text.replace("link_motion", problem), newline="")
+    return read_given(str(path))
 
 
-def test_given_runs_are_those_of_the_file(given: Path, results: Results) -> None:
+def test_given_runs_are_those_of_the_file(tmp_path: Path, results: Results) -> None:
     ours = of_results(results.evolved)
     name = ours[0].problem.name
-    text = given.read_text().replace("link_motion", name)
-    given.write_text(text)
-    found = of_given(read_given(str(given)), ours)
-    assert [(own.planner, own.problem.name) for own in found] == [
-        ("RRT* (given)", name),
-        ("my, own (given)", "elsewhere"),
-    ]
+    found = of_given(given(tmp_path, name), ours)
+    planners = [(own.planner, own.problem.name) for own in found]
+    assert planners == [("RRT* (given)", name), ("my, own (given)", "elsewhere")]
     tree, other = found
     assert tree.problem == ours[0].problem and tree.replicates == (3, 7)
     assert tree.best_lengths.tolist() == [math.inf, 5.0]
-    assert [part.tolist() for part in tree.first_reached()] == [[900.0, 50.0], [False, True]]
-    assert [part.tolist() for part in tree.first_reached(6.0)] == [[900.0, 400.0], [False, True]]
+    for most, efforts in ((math.inf, [900.0, 50.0]), (6.0, [900.0, 400.0])):
+        assert [part.tolist() for part in tree.first_reached(most)] == [efforts, [False, True]]
     assert (other.problem.key, other.problem.targets) == ("", MULTIPLES[:1])
     assert other.spent.tolist() == [99.0] and other.best_lengths.tolist() == [1.5]
     counts = share_table([*ours, *found]).groupby("planner")["targets"].first()
     assert counts["RRT* (given)"] == 2 * len(MULTIPLES) and counts["my, own (given)"] == 1
 
 
-def test_a_problem_is_called_by_its_name_a_label_or_its_key(given: Path, results: Results) -> None:
+def test_a_problem_is_called_by_its_name_a_label_or_its_key(
+    tmp_path: Path, results: Results
+) -> None:
     ours = of_results(results.evolved)
-    problem = ours[0].problem
-    text = given.read_text()
-    for called in (problem.name, ours[1].label, problem.key):
-        given.write_text(text.replace("link_motion", called))
-        data = read_given(str(given))
+    problem, label = ours[0].problem, ours[1].label
+    for called in (problem.name, label, problem.key):
+        data = given(tmp_path, called)
         assert of_given(data, ours)[0].problem == problem
         assert [line.split("'")[1] for line in strange_problems(data, ours)] == ["elsewhere"]
-    given.write_text(text.replace("link_motion", ours[1].label.upper()[:-1].lower()))
-    lines = list(strange_problems(read_given(str(given)), ours))
-    assert f"did you mean '{ours[1].label}'?" in lines[0]
+    wrong, *_ = strange_problems(given(tmp_path, label[:-1].lower()), ours)
+    assert f"did you mean '{label}'?" in wrong
 
 
 def test_the_page_marks_given_planners(
-    given: Path, results: Results, settings: ReportSettings
+    tmp_path: Path, results: Results, settings: ReportSettings
 ) -> None:
-    ours = of_results(results.evolved)
-    data = read_given(str(given))
+    ours, data = of_results(results.evolved), given(tmp_path)
     page = comparison.page(results, settings, [*ours, *of_given(data, ours)], data)
     assert data.sha256[:12] in page.introduction and "(given)" in page.introduction
     last = page.tables[1].rows[-1]
     assert last[0] == "elsewhere: my, own (given)" and last[-1] == "–"
     assert not any("given" in row.quantity for _, rows in page.comparisons for row in rows)
-    assert not np.isnan(float(str(last[4]).split(" ")[0]))
+    assert math.isfinite(float(str(last[4]).split(" ")[0]))
 
 
 def test_a_planner_without_any_answer_does_not_widen_the_axis(
     tmp_path: Path, results: Results
 ) -> None:
     ours = of_results(results.evolved)
-    path = tmp_path / "given.csv"
-    path.write_text(f"{HEAD}\nnever,{ours[0].problem.name},0,90000,\n")
-    table = length_table([*ours, *of_given(read_given(str(path)), ours)])
+    data = given(tmp_path, text=f"{HEAD}\nnever,{ours[0].problem.name},0,90000,\n")
+    table = length_table([*ours, *of_given(data, ours)])
     first = min(float(own.table["collision_queries"].min()) for own in ours if len(own.table))
     assert table["collision_queries"].min() == pytest.approx(first)
     assert np.isinf(table[table["planner"] == "never (given)"]["median"]).all()
@@ -128,10 +126,8 @@ REFUSED = {
 
 @pytest.mark.parametrize(("text", "said"), REFUSED.items())
 def test_a_bad_row_is_named_by_line_and_column(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "bad.csv"
-    path.write_text(text, newline="")
-    with pytest.raises(SettingError, match=f"^bad.csv.*{said.replace('(', '[(]')}") as caught:
-        read_given(str(path))
+    with pytest.raises(SettingError, match=f"^given.csv.*{said.replace('(', '[(]')}") as caught:
+        given(tmp_path, text=text)
     assert "\n" not in str(caught.value)
 
 

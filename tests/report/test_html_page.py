@@ -1,4 +1,4 @@
-"""The page in HTML: the same words as in Markdown, well-formed, offline, and inert."""
+"""Pages in HTML, reports' and home: well-formed, offline, and inert, whatever strangers write."""
 
 import json
 from pathlib import Path
@@ -6,7 +6,14 @@ from pathlib import Path
 import pytest
 
 from evoexp.report.pages import markdown
-from evoexp.report.pages.home_page import read_summary
+from evoexp.report.pages.home_page import (
+    Paper,
+    ReportSummary,
+    StoredRun,
+    home_page,
+    read_summary,
+    site,
+)
 from evoexp.report.pages.html_page import html_page, inline, number_columns, verdict_counts
 from evoexp.report.pages.page_parts import (
     Document,
@@ -21,98 +28,70 @@ from evoexp.report.pages.page_parts import (
 from html_reader import Page, markdown_tables
 from report_samples import smoke_report
 
-SCRIPT = "<script>alert(1)</script>"
 HOSTILE = (
-    SCRIPT,
+    "<script>alert(1)</script>",
     '"><img src=x onerror=alert(1)>',
     "</title></script><script>alert(1)</script>",
     "[x](javascript:alert(1))",
     "{{ 7 * 7 }} {% if %} `<b>` `",
     "<!-- & &lt; &amp;lt;",
 )
-ID = "0123456789ab" + "0" * 52
-
+HASH = "0123456789ab"
+ID = HASH + "0" * 52
 LOGS = (
-    LogText(0, f"../../runs/{ID[:12]}/replicates/0000.mcap", "162.8, certified"),
-    LogText(1, f"../../runs/{ID[:12]}/replicates/0001.failed.json", "failed"),
+    LogText(0, f"../../runs/{HASH}/replicates/0000.mcap", "162.8, certified"),
+    LogText(1, f"../../runs/{HASH}/replicates/0001.failed.json", "failed"),
 )
-FIGURE = FigureText("figure", "", "", ("svg", "png"), (Player("GA", "motion_1.html"),))
+PLAYER = Player("GA", "motion_1.html")
 
 
 def page_of(text: str) -> Document:
     """Return a page on which nothing is told but one text."""
-    table = Table(text, (text, "n"), ((text, 1), (f"`{text}`", 2)), text)
-    claims = Table("Claims", ("claim", "verdict"), ((text, Verdict("reproduced")),))
-    failures = Table("Failures", ("condition", "replicate", "reason"), ((text, 0, text),))
-    return Document(
-        text,
-        f"evoexp report {text}",
-        text,
-        text,
-        (("Partial results", text),),
-        text,
-        (
-            table,
-            claims,
-            Figures((FIGURE._replace(title=text, caption=text),)),
-            failures,
-        ),
-        (RunText(text, ID, 1, 1, False, LOGS),),
+    sections = (
+        Table(text, (text, "n"), ((text, 1), (f"`{text}`", 2)), text),
+        Table("Claims", ("claim", "verdict"), ((text, Verdict("reproduced")),)),
+        Figures((FigureText("figure", text, text, ("svg", "png"), (PLAYER,)),)),
+        Table("Failures", ("condition", "replicate", "reason"), ((text, 0, text),)),
     )
+    runs, notice = (RunText(text, ID, 1, 1, False, LOGS),), (("Partial results", text),)
+    return Document(text, f"evoexp report {text}", text, text, notice, text, sections, runs)
 
 
-def hrefs(page: Page) -> list[str]:
-    return [address for address in page.addresses() if not address.startswith("data:")]
+PLAIN = page_of("plain")
+
+
+def read(document: Document = PLAIN) -> Page:
+    return Page(html_page(document, {}))
+
+
+def skeleton(page: Page) -> tuple[list[str], set[str], set[str]]:
+    """Return all that no text may change: tags, names of attributes, and addresses."""
+    tags = [each.tag for each in page.elements if each.tag not in ("code", "a", "li")]
+    addresses = {each.split("#")[0] for each in page.addresses() if not each.startswith("data:")}
+    return tags, {name for each in page.elements for name in each.attributes}, addresses
 
 
 @pytest.mark.parametrize("text", HOSTILE)
-def test_texts_of_strangers_are_only_text(text: str) -> None:
-    page, plain = Page(html_page(page_of(text), {})), Page(html_page(page_of("plain"), {}))
-    assert [each.tag for each in page.elements if each.tag not in ("code", "a", "li")] == [
-        each.tag for each in plain.elements if each.tag not in ("code", "a", "li")
-    ]
-    assert {each.split("#")[0] for each in hrefs(page)} == {
-        each.split("#")[0] for each in hrefs(plain)
-    }
-    names = {name for each in page.elements for name in each.attributes}
-    assert names == {name for each in plain.elements for name in each.attributes}
-    assert page.all("h1")[0].text == text
-    assert page.all("title")[0].text == text
+def test_texts_of_strangers_are_only_text_and_read_back(text: str, tmp_path: Path) -> None:
+    content = html_page(page_of(text), {})
+    page = Page(content)
+    assert skeleton(page) == skeleton(read())
+    assert page.all("h1")[0].text == page.all("title")[0].text == text
     assert page.all("img", alt=text)
     assert page.tables()[0][1][0] == " ".join(text.replace("`<b>`", "<b>").split())
-
-
-@pytest.mark.parametrize("text", HOSTILE)
-def test_the_summary_is_read_back_and_ends_no_script(text: str, tmp_path: Path) -> None:
-    (tmp_path / "index.html").write_bytes(html_page(page_of(text), {}))
+    (tmp_path / "index.html").write_bytes(content)
     found = read_summary(tmp_path)
-    assert found is not None
     assert (found.title, found.command, found.partial) == (text, f"report {text}", text)
-    assert found.claims == ((text, "reproduced"),)
-    assert found.runs == ((ID[:12], text),)
+    assert (found.claims, found.runs) == (((text, "reproduced"),), ((HASH, text),))
     assert (found.failed, found.picture) == (1, "figure.svg")
+
+
+FIELDS = '{"title": "t", "command": "", "partial": "", "failed": 0, "headings": [], "claims": []'
 
 
 @pytest.mark.parametrize(
     "data",
-    [
-        "null",
-        "[]",
-        "{}",
-        '{"title": 1}',
-        json.dumps(
-            {
-                "title": "t",
-                "command": "",
-                "partial": "",
-                "failed": 0,
-                "headings": [],
-                "claims": [],
-                "runs": [],
-                "picture": "../../x.svg",
-            }
-        ),
-    ],
+    ["null", "[]", "{}", '{"title": 1}', FIELDS + ', "runs": [], "picture": "../../x.svg"}'],
 )
 def test_a_page_of_nobody_is_no_report(data: str, tmp_path: Path) -> None:
     page = f'<script type="application/json" id="summary">{data}</script>'
@@ -121,32 +100,22 @@ def test_a_page_of_nobody_is_no_report(data: str, tmp_path: Path) -> None:
 
 
 def test_codes_that_name_a_run_of_the_page_link_to_its_commands() -> None:
-    known = frozenset([ID[:12]])
-    assert inline(f"`{ID[:12]}` `ffffffffffff` {ID[:12]}", known) == (
-        f'<a href="#run-{ID[:12]}"><code>{ID[:12]}</code></a> <code>ffffffffffff</code> {ID[:12]}'
-    )
+    found = inline(f"`{HASH}` `ffffffffffff` {HASH}", frozenset([HASH]))
+    link = f'<a href="#run-{HASH}"><code>{HASH}</code></a>'
+    assert found == f"{link} <code>ffffffffffff</code> {HASH}"
     assert inline("a `b") == "a `b"
     assert inline("`a` `b") == "<code>a</code> `b"
 
 
 def test_heads_that_name_a_condition_link_to_its_run() -> None:
     table = Table("Results", ("quantity", "GA (n\u00a0=\u00a020)", "GA 2"), (("GA", "GA", 1),))
-    text = page_of("plain")._replace(sections=(table,))
-    page = Page(html_page(text._replace(runs=(RunText("GA", ID, 1, 0, False),)), {}))
-    links = [e.text for e in page.all("a") if e.attributes["href"] == f"#run-{ID[:12]}"]
+    page = read(PLAIN._replace(sections=(table,), runs=(RunText("GA", ID, 1, 0, False),)))
+    links = [e.text for e in page.all("a") if e.attributes["href"] == f"#run-{HASH}"]
     assert links == ["GA (n\u00a0=\u00a020)", "GA"]
 
 
-def test_every_log_of_a_run_is_linked() -> None:
-    page = Page(html_page(page_of("plain"), {}))
-    found = {e.attributes["href"]: e.text for e in page.all("a")}
-    assert {file: str(k) for k, file, _ in LOGS}.items() <= found.items()
-    (logs,) = page.all("ol", class_="logs")
-    assert logs.text == "0 162.8, certified1 failed"
-
-
 def test_a_motion_is_played_inside_the_figure_that_shows_it() -> None:
-    page = Page(html_page(page_of("plain"), {}))
+    page = read()
     (frame,) = page.all("iframe")
     figure, after = page.all("figure")[0], page.all("section", id="failures")[0]
     order = [page.elements.index(each) for each in (figure, frame, after)]
@@ -177,25 +146,25 @@ def test_verdicts_are_counted_in_one_order() -> None:
 
 def test_failures_stand_at_the_top() -> None:
     failures = tuple(("GA", k, f"ValueError: {k}") for k in range(5))
-    text = page_of("plain")._replace(sections=(Table("Failures", ("a", "b", "c"), failures),))
-    page = Page(html_page(text, {}))
+    page = read(PLAIN._replace(sections=(Table("Failures", ("a", "b", "c"), failures),)))
     (notice,) = page.all("div", class_="notice failed")
     assert "5 replicates failed." in notice.text
-    assert "GA, replicate 2: ValueError: 2" in notice.text
-    assert "ValueError: 3" not in notice.text
+    assert "GA, replicate 2: ValueError: 2" in notice.text and "ValueError: 3" not in notice.text
     assert page.elements.index(notice) < page.elements.index(page.all("h2")[0])
-    assert [e.attributes["href"] for e in page.all("a") if e.text == "All failures"] == [
-        "#failures"
-    ]
+    (link,) = (e for e in page.all("a") if e.text == "All failures")
+    assert link.attributes["href"] == "#failures"
 
 
-def test_commands_of_a_run_can_be_copied() -> None:
-    page = Page(html_page(page_of("plain"), {}))
-    assert [each.text for each in page.all("code", class_="copy")] == [
-        f"evoexp {command} {ID[:12]}" for command in ("show", "reproduce", "view")
-    ]
-    alone = page_of("plain")._replace(runs=(RunText("none", ID, 0, 0, False),))
-    assert len(Page(html_page(alone, {})).all("code", class_="copy")) == 1
+def test_logs_of_a_run_are_linked_and_its_commands_can_be_copied() -> None:
+    page, commands = read(), ("show", "reproduce", "view")
+    found = {e.attributes["href"]: e.text for e in page.all("a")}
+    assert {file: str(k) for k, file, _ in LOGS}.items() <= found.items()
+    (logs,) = page.all("ol", class_="logs")
+    assert logs.text == "0 162.8, certified1 failed"
+    copied = [each.text for each in page.all("code", class_="copy")]
+    assert copied == [f"evoexp {command} {HASH}" for command in commands]
+    alone = read(PLAIN._replace(runs=(RunText("none", ID, 0, 0, False),)))
+    assert len(alone.all("code", class_="copy")) == 1
 
 
 @pytest.mark.parametrize("name", ["rana_planar", "rana_three_arms"])
@@ -210,10 +179,98 @@ def test_a_report_in_html_says_what_it_says_in_markdown(
     headings = [line.lstrip("# ") for line in text.splitlines() if line.startswith("#")]
     shown = [e.text for e in page.elements if e.tag in ("h1", "h2", "h3")]
     assert [markdown.inert(each) for each in shown] == [*headings, "Runs, logs, commands"]
-    assert b"http" not in content
-    assert len(content) < 5_000_000
+    assert b"http" not in content and len(content) < 5_000_000
     files = {path.name for path in folder.iterdir()} - {"index.html"}
-    assert files <= set(page.addresses())
-    known = [e.attributes["id"] for e in page.all("tr") if "id" in e.attributes]
-    assert known
-    assert {f"#{each}" for each in known} <= set(page.addresses())
+    known = {f"#{e.attributes['id']}" for e in page.all("tr") if "id" in e.attributes}
+    assert known and files | known <= set(page.addresses())
+
+
+RANA = Paper("rana", "Rana 1995", "arms", ("rana_planar", "rana_puma", "lavoie"), {"rana_puma": 3})
+CLAIMS = (("free", "reproduced"), ("short", "contradicted"), ("fast", "not judged (no runs)"))
+RUN = StoredRun(HASH, "rana_planar", "GA", "paper", 3, 20, 0)
+
+
+def summary(folder: str, command: str = "", picture: str = "") -> ReportSummary:
+    headings = (("Claims", "claims"), ("GA against others", "ga-against-others"))
+    words, runs = command or f"report {folder}", ((HASH, "GA"),)
+    return ReportSummary(folder, f"about {folder}", words, "", 0, headings, CLAIMS, runs, picture)
+
+
+def test_a_card_counts_the_claims_of_whole_experiments() -> None:
+    pictures = {"rana_planar": "fig_5.svg", "rana_planar+12345678": "scene.svg"}
+    found = [summary(folder, picture=picture) for folder, picture in pictures.items()]
+    found.append(summary("rana_three@smoke"))
+    (card,) = site(found, [RANA], [])["papers"]
+    assert card["counts"] == (("reproduced", 1), ("contradicted", 1), ("not judged", 1))
+    assert (card["unjudged"], card["missing"]) == (3, ["rana_puma"])
+    assert card["face"].picture_url == "rana_planar/fig_5.svg"
+    assert card["reports"] == found
+    assert found[1].url() == "rana_planar%2B12345678/index.html?home"
+
+
+def test_reports_of_no_paper_stand_by_themselves() -> None:
+    compared = summary("compare_rana_planar", "compare rana_planar")
+    others = site([summary("arena_rana"), compared, summary("ranaplanar")], [RANA], [])["others"]
+    assert {name: [report.folder for report in reports] for name, reports in others} == {
+        "Arenas and other experiments": ["arena_rana", "ranaplanar"],
+        "Comparisons": ["compare_rana_planar"],
+    }
+
+
+@pytest.mark.parametrize(
+    ("done", "planned", "failed", "damage", "state"),
+    [
+        (20, 20, 0, "", "done"),
+        (3, 20, 0, "", "partial"),
+        (0, 20, 0, "", "planned"),
+        (3, 20, 1, "", "failed"),
+        (0, 0, 0, "config.json: damaged", "damaged"),
+    ],
+)
+def test_a_run_has_a_state(done: int, planned: int, failed: int, damage: str, state: str) -> None:
+    run = RUN._replace(done=done, planned=planned, failed=failed, damage=damage)
+    page = Page(home_page([summary("rana_planar")], [RANA], [run]))
+    cells = dict(zip(*page.tables()[0], strict=True))
+    assert (cells["hash"], cells["state"], cells["done"]) == (HASH, state, str(done))
+    assert cells["reports"] == "rana_planar"
+    assert f"rana_planar/index.html?home#run-{HASH}" in page.addresses()
+    assert ("not finished" in page.all("main")[0].text) == (state != "done")
+
+
+def test_partial_reports_are_named_at_the_top() -> None:
+    partial = summary("rana_planar")._replace(partial="GA: 3 of 20 replicates done, 0 failed")
+    page = Page(home_page([partial, summary("rana_puma")], [RANA], []))
+    (notice,) = page.all("div", class_="notice")
+    assert "1 of 2 reports were drawn before all planned replicates were there" in notice.text
+    assert "rana_planar" in notice.text and "rana_puma" not in notice.text
+    assert page.elements.index(notice) < page.elements.index(page.all("h2")[0])
+
+
+def test_the_search_knows_titles_headings_claims_and_hashes() -> None:
+    content = home_page([summary("rana_planar")], [RANA], [RUN])
+    entries = json.loads(Page(content).all("script", id="search-index")[0].text)
+    assert [(each["kind"], each["text"]) for each in entries] == [
+        ("report", "about rana_planar"),
+        ("heading", "GA against others"),
+        *((f"claim, {verdict}", text) for text, verdict in CLAIMS),
+        ("run", f"{HASH} GA"),
+    ]
+    assert entries[1]["url"] == "rana_planar/index.html?home#ga-against-others"
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_texts_of_strangers_are_only_text_at_home(text: str) -> None:
+    pairs, runs = ((text, text),), ((HASH, text),)
+    folder = text.replace("/", "")
+    hostile = ReportSummary(folder, text, text, text, 1, pairs, pairs, runs, "figure.svg")
+    run = RUN._replace(experiment=text, label=text, budget=text)
+    paper = Paper("rana", text, text, (f"rana_{text}",), {})
+    page = Page(home_page([hostile], [paper], [run]))
+    tags = [each.tag for each in page.elements]
+    assert tags.count("script") == 2 and not {"b", "img"} & set(tags)
+    assert not [name for each in page.elements for name in each.attributes if name[:2] == "on"]
+    assert all(":" not in each.replace("data:,", "") for each in page.addresses())
+    assert page.tables()[0][1][2] == " ".join(text.split())
+    first, *_ = json.loads(page.all("script", id="search-index")[0].text)
+    assert first["text"] == text
+    assert ":" not in first["url"] and not first["url"].startswith("/")

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from evoexp.report.results.ioh_format import NO_ANSWER, ioh_files, run_rows
-from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results
+from evoexp.report.results.planner_runs import PlannerRuns, of_results
 from evoexp.report.results.stored_results import Results
+from report_samples import made_up_runs
 
 
 class Run(NamedTuple):
@@ -32,31 +32,21 @@ def read(folder: Path) -> list[Run]:
     for path in sorted(folder.glob("**/*.json")):
         data = json.loads(path.read_text(), parse_constant=lambda name: 1 / 0)
         assert data["maximization"] is False and data["version"] and data["suite"]
+        function = data["function_id"], data["function_name"]
         for scenario in data["scenarios"]:
             header, *lines = (path.parent / scenario["path"]).read_text().splitlines()
             assert header.split() == data["attributes"] == ["evaluations", "raw_y"]
             rows = [line.split() for line in lines if line != header]
             numbers = [(int(evaluations), float(y)) for evaluations, y in rows]
             # iohinspector drops rows that repeat the value before them, whatever their run
-            first = numbers[:1]
-            kept = first + [b for a, b in pairwise(numbers) if b[1] != a[1]]
+            kept = numbers[:1] + [b for a, b in pairwise(numbers) if b[1] != a[1]]
             starts = [k for k, row in enumerate(kept) if row[0] == 1]
-            assert len(starts) == len(scenario["runs"])
-            for run, (start, end) in zip(
-                scenario["runs"], pairwise([*starts, len(kept)]), strict=True
-            ):
-                assert set(run["best"]) == {"evals", "y", "x"} and run["instance"] == 1
-                found.append(
-                    Run(
-                        data["algorithm"]["name"],
-                        (data["function_id"], data["function_name"]),
-                        scenario["dimension"],
-                        run["seed"],
-                        run["evals"],
-                        (run["best"]["evals"], run["best"]["y"]),
-                        kept[start:end],
-                    )
-                )
+            spans = pairwise([*starts, len(kept)])
+            for run, (start, end) in zip(scenario["runs"], spans, strict=True):
+                best = run["best"]
+                assert set(best) == {"evals", "y", "x"} and run["instance"] == 1
+                head = data["algorithm"]["name"], function, scenario["dimension"], run["seed"]
+                found.append(Run(*head, run["evals"], (best["evals"], best["y"]), kept[start:end]))
     return found
 
 
@@ -86,18 +76,9 @@ def test_stored_runs_are_read_back(results: Results, tmp_path: Path) -> None:
                 assert first == (int(effort[k]) if reached[k] else None)
 
 
-def given(
-    planner: str, problem: str, rows: list[tuple[int, int, float]], spent: list[float]
-) -> PlannerRuns:
-    table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length"])
-    table["certified"] = True
-    seeds = tuple(range(len(spent)))
-    return PlannerRuns(planner, Problem(problem), "", table, seeds, np.array(spent), None)
-
-
 def test_runs_without_an_answer_are_not_lost(tmp_path: Path) -> None:
     rows = [(1, 1, 7.0), (1, 1, 6.0), (1, 9, 6.5), (1, 9, 5.0), (1, 20, 5.0), (4, 3, 5.0)]
-    own = given("A", "p", rows, [10.0, 99.0, 20.0, 30.0, 3.0])
+    own = made_up_runs("A", "p", rows, [10.0, 99.0, 20.0, 30.0, 3.0])
     found = written([own], tmp_path)
     assert [run.seed for run in found] == [0, 1, 2, 3, 4]
     assert [run.evals for run in found] == [10, 99, 20, 30, 3]
@@ -109,7 +90,7 @@ def test_runs_without_an_answer_are_not_lost(tmp_path: Path) -> None:
 
 def test_names_that_files_cannot_have_stay_apart(tmp_path: Path) -> None:
     names = ["a/b", "a b", "A_B", "../..", "λ", "con*", "x" * 30]
-    runs = [given(name, f"{name}?", [(0, 5, 2e6)], [9.0]) for name in names]
+    runs = [made_up_runs(name, f"{name}?", [(0, 5, 2e6)], [9.0]) for name in names]
     paths = [path.split("/") for path in ioh_files(runs)]
     assert all(len(parts) in (2, 3) and ".." not in parts for parts in paths)
     assert len({parts[0].lower() for parts in paths}) == len(names)

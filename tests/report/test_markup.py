@@ -1,25 +1,49 @@
-"""Names with markup are text on every page: labels, experiments, options, reasons of failures."""
+"""Numbers, tables, names and notes as text: inert on every page, in terminals and in LaTeX."""
 
-import matplotlib as mpl
+import itertools
+import re
+from math import inf, nan
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
-from matplotlib.figure import Figure
+from hypothesis import given
+from hypothesis import strategies as st
 
 from evoexp.commands.console import coloured, new_table, plain_console
 from evoexp.configuration import compose
 from evoexp.errors import SettingError, printable
-from evoexp.report.figures.style import drawn
-from evoexp.report.pages import markdown
+from evoexp.report.pages import markdown, motion_pictures
+from evoexp.report.pages.index import have_two_parts, in_few_words
+from evoexp.report.pages.latex_tables import SIZES, escaped, latex_tables
+from evoexp.report.pages.page_parts import Document, RunText, Table, Verdict, provenance
 
-SCRIPT, LINK = "<script>alert(1)</script>", "[x](javascript:alert(1))"
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (-3.0, "−3"),
+        (123456.0, "123456"),
+        (123456.7, "1.235e+05"),
+        (-1e-9, "−1e−09"),
+        (nan, "–"),
+        (inf, "∞"),
+        (-inf, "−∞"),
+    ],
+)
+def test_numbers_have_four_digits_or_are_whole(value: float, text: str) -> None:
+    assert markdown.number(value) == text
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (SCRIPT, "&lt;script>alert(1)&lt;/script>"),
+        ("<script>alert(1)</script>", "&lt;script>alert(1)&lt;/script>"),
         ("<!-- x", "&lt;!-- x"),
         ("<javascript:alert(1)>", "&lt;javascript:alert(1)>"),
-        (LINK, "[x]\\(javascript:alert(1))"),
+        ("[x](javascript:alert(1))", "[x]\\(javascript:alert(1))"),
         ("![x](http://elsewhere/x.png)", "![x]\\(http://elsewhere/x.png)"),
         ("[x](../../../secret.png)", "[x]\\(../../../secret.png)"),
         ("[x](//elsewhere", "[x]\\(//elsewhere)"),
@@ -34,20 +58,6 @@ def test_a_cell_stays_in_its_cell() -> None:
     assert markdown.table(["a"], [["x | y\n# z"]]).splitlines()[-1] == "| x \\| y # z |"
 
 
-@pytest.mark.parametrize("label", ["$x_$", "$\\frac$", "a $ b", "costs $5 or $6_", "\\"])
-def test_a_label_that_is_no_formula_is_drawn_as_it_is(label: str) -> None:
-    def draw() -> Figure:
-        figure = Figure()
-        axes = figure.subplots()
-        axes.plot([1.0, 2.0], label=label)
-        axes.set_title(label)
-        axes.legend()
-        return figure
-
-    assert drawn(draw, ("svg",), 100)["svg"].startswith(b"<?xml")
-    assert mpl.rcParams["text.parse_math"]
-
-
 def test_a_terminal_is_not_steered(capsys: pytest.CaptureFixture[str]) -> None:
     table = new_table("\x1b]0;title\x07[red]t[/red]")
     table.add_column("[bold]c[/bold]")
@@ -55,23 +65,156 @@ def test_a_terminal_is_not_steered(capsys: pytest.CaptureFixture[str]) -> None:
     table.add_row(coloured("\x1b[2J", "red"))
     plain_console().print(table)
     out = capsys.readouterr().out
-    assert "[red]a[/red] :warning: \\x1b[31mb\\x1b[0m \\u202e" in out
-    assert "[red]t[/red]" in out
-    assert "[bold]c[/bold]" in out
-    assert "\\x1b[2J" in out
+    cell = "[red]a[/red] :warning: \\x1b[31mb\\x1b[0m \\u202e"
+    assert all(text in out for text in (cell, "[red]t[/red]", "[bold]c[/bold]", "\\x1b[2J"))
     assert not {"\x1b", "\x07", "\u202e"} & set(out)
+    assert printable("λ = 10 · µm ≤ 3\nnext\udcff") == "λ = 10 · µm ≤ 3\nnext\\udcff"
 
 
-def test_printable_keeps_what_can_be_read() -> None:
-    assert printable("λ = 10 · µm ≤ 3\nnext") == "λ = 10 · µm ≤ 3\nnext"
-    assert printable("\x1b[31m\x00\udcff") == "\\x1b[31m\\x00\\udcff"
+@pytest.mark.parametrize(
+    ("name", "must"), [("mine.yaml", "labels of printable"), ("...yaml", "a plain name")]
+)
+def test_labels_and_names_of_experiments_are_plain(tmp_path: Any, name: str, must: str) -> None:
+    base = (compose.shipped.config_directory() / "experiment/rana_obstacles.yaml").read_text()
+    (tmp_path / name).write_text(base + 'conditions:\n  "a\\nb": []\n')
+    with pytest.raises(SettingError, match=must):
+        compose.expand([f"experiment={tmp_path / name}", "budget=smoke"])
 
 
-def test_labels_and_names_of_experiments_are_plain(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    text = '# @package _global_\ndefaults: []\nconditions:\n  "a\\nb": []\n'
-    for name, must in (("mine.yaml", "labels of printable"), ("...yaml", "a plain name")):
-        path = tmp_path / name
-        base = (compose.shipped.config_directory() / "experiment/rana_obstacles.yaml").read_text()
-        path.write_text(base + text[text.index("conditions") :])
-        with pytest.raises(SettingError, match=must):
-            compose.expand([f"experiment={path}", "budget=smoke"])
+def shown(label: str, *notes: str) -> Any:
+    condition = SimpleNamespace(notes=lambda: [f"robot: {note}" for note in notes])
+    return SimpleNamespace(condition=SimpleNamespace(label=label, condition=condition))
+
+
+def test_equal_notes_on_conditions_stand_in_one_row() -> None:
+    first = shown("I", "covers", "pairs"), shown("I", "covers")
+    found = motion_pictures.notes([*first, shown("II", "covers"), shown("III")])
+    assert found == (("I, II", "robot: covers"), ("I", "robot: pairs"))
+
+
+EVERY = [f"{problem} · {planner}" for problem in "abcd" for planner in ("GA", "RRT", "ES")]
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        ([f"{p} · RRT" for p in "abcd"], "RRT"),
+        (["b · GA", "b · RRT", "b · ES"], "b"),
+        (["a · RRT", "b · RRT"], "RRT on a, b"),
+        (["a · RRT"], "a · RRT"),
+        ([f"{p} · {x}" for p in "abc" for x in ("GA", "ES")], "GA, ES except on d"),
+    ],
+)
+def test_a_part_stands_for_all_labels_that_have_it(labels: list[str], words: str) -> None:
+    assert in_few_words(labels, EVERY) == words
+
+
+def meant(words: str) -> set[str]:
+    """Return the labels that a list stands for."""
+    if all(" · " in word for word in words.split(", ")):
+        return set(words.split(", "))
+    found = set()
+    for group in words.split("; "):
+        names, _, but = group.partition(" except on ")
+        names, _, only = names.partition(" on ")
+        for one in names.split(", "):
+            for label in EVERY:
+                parts = label.split(" · ")
+                (place, *_) = [part for part in parts if part != one]
+                listed = place not in but.split(", ") and place in (only or place).split(", ")
+                found |= {label} if one in parts and listed else set()
+    return found
+
+
+def test_every_list_means_what_it_lists() -> None:
+    for count in range(1, len(EVERY) + 1):
+        for labels in itertools.islice(itertools.combinations(EVERY, count), 0, None, 5):
+            words = in_few_words(labels, EVERY)
+            assert meant(words) == set(labels), words
+            assert len(words) <= len(", ".join(labels))
+
+
+def test_other_labels_stay_as_they_are() -> None:
+    every = ["I", "II · x", "III"]
+    assert not have_two_parts(every) and not have_two_parts(["a · x", "b · y"])
+    assert in_few_words(every[:2], every) == "I, II · x"
+
+
+LONG = "A claim that is too long for one line of a table, and so has a column that breaks lines"
+TABLE = Table(
+    "Claims",
+    ("claim", "λ = 10 & more", "verdict"),
+    ((LONG, "−1.5 [−2, ∞]", Verdict("reproduced")), ("50 %_x", "–", Verdict("not judged"))),
+    "Median `a_b`.",
+    "table_1_claims.tex",
+)
+
+
+def latex(table: Table) -> list[str]:
+    """Return the lines of a table in LaTeX; braces balance."""
+    words = "A & B", "evoexp report x", "exp_1", "paper", (), ""
+    runs = (RunText("condition", "0" * 64, 20, 0, False),)
+    document = Document(*words, (table,), runs, "n = 20, seeds 0, 7; run `000000000000`.")
+    lines = latex_tables(document)[table.file].decode().splitlines()
+    bare = re.sub(r"\\[{}]", "", "".join(line for line in lines if not line.startswith("%")))
+    assert bare.count("{") == bare.count("}")
+    return lines
+
+
+def test_a_latex_table_has_caption_rows_columns_and_rules() -> None:
+    lines = latex(TABLE)
+    assert lines[0] == "% made by evoexp report x"
+    assert r"\caption{A \& B: Claims. Median a\_b. n = 20, seeds 0, 7; run 000000000000.}" in lines
+    assert r"\label{tab:exp-1-claims}" in lines
+    assert [line for line in lines if "rule" in line] == [r"\toprule", r"\midrule", r"\bottomrule"]
+    assert lines[lines.index(r"\midrule") + 1 : lines.index(r"\bottomrule")] == [
+        rf"{LONG} & $-$1.5 {{[}}$-$2, $\infty$] & reproduced \\",
+        r"50 \%\_x & -- & not judged \\",
+    ]
+    assert r"claim & $\lambda$ = 10 \& more & verdict \\" in lines
+    (begin,) = (line for line in lines if line.startswith(r"\begin{tabular}"))
+    assert re.fullmatch(r"\\begin\{tabular\}\{p\{0\.\d\d\\linewidth\}rl\}", begin)
+    with pytest.raises(KeyError):  # no table without a file
+        latex(TABLE._replace(file=""))
+
+
+@pytest.mark.parametrize(
+    ("count", "size", "fits"), [(1, "small", True), (3, "footnotesize", True), (7, "small", False)]
+)
+def test_a_latex_table_fits_on_a_line_or_is_made_to(count: int, size: str, fits: bool) -> None:
+    number = "162.8 [160.7, 168.1]"
+    headers, row = ("quantity", *"abcdefg"[:count]), (LONG, *[number] * count)
+    lines = latex(Table("Claims", headers, (row,), "", "t.tex"))
+    assert rf"\centering\{size}" in lines
+    assert (r"\resizebox{\linewidth}{!}{%" in lines) is not fits
+    assert (r"\end{tabular}}" in lines) is not fits
+    share = float(re.findall(r"p\{(0\.\d+)", "".join(lines))[0])
+    letters = share * SIZES[size] + count * (len(number) + 3) + 3
+    assert letters <= SIZES[size] + 1 or not fits
+
+
+NINE = [(str(k), 2) for k in range(9)]
+
+
+@pytest.mark.parametrize(
+    ("runs", "seeds", "expected"),
+    [
+        ([], (0,), ""),
+        ([("a", 1)], (3,), "n = 1, seed 3; run `a`."),
+        ([("a", 5), ("b", 7)], (0,), "n = 5–7 of each condition, seed 0; runs `a`, `b`."),
+        ([("a", 5), ("a", 5)], (0,), "n = 5 of each condition, seed 0; run `a`."),
+        (NINE, (0, 1), "n = 2 of each condition, seeds 0, 1; runs `0`, `1`, `2`, `3` and 5 more."),
+    ],
+)
+def test_provenance(runs: list[tuple[str, int]], seeds: tuple[int, ...], expected: str) -> None:
+    assert provenance(runs, seeds) == expected
+
+
+@given(st.text(alphabet=st.sampled_from(r"""ab \{}$&#_%~^<>|"[]*'(ü""")))
+def test_escaped_names_hold_no_commands_but_ours(text: str) -> None:
+    found = escaped(text)
+    words = "textbackslash|textasciitilde|textasciicircum|textless|textgreater|textbar"
+    bare = re.sub(rf"\\(?:{words})\{{\}}|\\[{{}}$&#_%]|\{{[\[*]\}}", "", found)
+    assert not set(bare) & set("\\{}$&#_%~^<>|[*"), (text, found)
+    assert bare.count("a") == text.count("a") and bare.count("ü") == text.count("ü")
+    assert escaped("via-point GA, x = 10 (given)") == "via-point GA, x = 10 (given)"

@@ -11,10 +11,9 @@ from evoexp.errors import EvoexpError, SettingError, UnknownSetting
 from evoexp.report.pages.page_builder import build, page_of
 from evoexp.report.pages.page_file import PageFile, read_page_file
 from evoexp.report.pages.page_scope import Functions, Scope
-from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
 from guests import on_path, write_distribution
-from report_samples import REPORT
+from report_samples import page_settings
 
 FUNCTIONS = """
 import pandas as pd
@@ -43,8 +42,7 @@ pages:
     comparisons: [{families: whole, measures: [[doubled cost, doubled]]}]
     checks: [runs]
     figures: [costs, best]
-quantities:
-  costs: [[doubled cost, "–", doubled]]
+quantities: {costs: [[doubled cost, "–", doubled]]}
 tables:
   runs:
     heading: Runs
@@ -57,17 +55,13 @@ checks:
     - title: Best costs
       finding: {each: condition in conditions, text: "{best_cost.min!n}"}
 figures:
-  costs:
-    title: Costs
-    caption: Every cost.
-    functions: [costs_table, draw_costs]
+  costs: {title: Costs, caption: Every cost., functions: [costs_table, draw_costs]}
 """
-SETTINGS = ReportSettings(**REPORT | {"figures": "my_paper"})  # type: ignore[arg-type]
 Read = Callable[[str], PageFile]
 
 
 @pytest.fixture
-def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Read]:
+def read(tmp_path: Path) -> Iterator[Read]:
     """Return the function that reads a page of a package of its own."""
     package = tmp_path / "my_paper"
     package.mkdir()
@@ -85,7 +79,8 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Read]:
 
 
 def test_a_guests_page_is_built_from_its_file(read: Read, results: Results) -> None:
-    page = build(read(PAGE), "my_paper", results, SETTINGS)
+    settings = page_settings("", "my_paper")
+    page = build(read(PAGE), "my_paper", results, settings)
     assert (page.title, page.introduction) == (f"A guest: {results.experiment}", "At 95 %.")
     first = results.with_data[0]
     expected = np.median(2.0 * first.column("best_cost"))
@@ -96,7 +91,7 @@ def test_a_guests_page_is_built_from_its_file(read: Read, results: Results) -> N
     assert page.comparisons[0][0] == f"doubled cost: {first.label} against …"
     assert [drawing.stem for drawing in page.drawings] == ["costs", "convergence"]
     assert list(page.drawings[0].table()["cost"]) == [0.0, 1.0]
-    assert page_of(results, SETTINGS).title == page.title  # by its entry point
+    assert page_of(results, settings).title == page.title  # by its entry point
 
 
 @pytest.mark.parametrize(
@@ -114,8 +109,7 @@ def test_a_mistake_is_one_line(
 ) -> None:
     with pytest.raises(kind) as fault:
         read(PAGE.replace(right, wrong))
-    assert message in str(fault.value)
-    assert "\n" not in str(fault.value)
+    assert message in str(fault.value) and "\n" not in str(fault.value)
 
 
 def test_a_value_is_computed_once_for_all_that_name_it() -> None:

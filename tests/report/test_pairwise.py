@@ -12,19 +12,17 @@ from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import holm
 
 
-def shifted(condition: ConditionResults, number: int) -> ConditionResults:
-    """Return a condition whose costs are higher by a number, under another name."""
-    rows = condition.summaries
-    costs = rows["best_cost"] + number * (1.0 + 0.1 * np.arange(len(rows)))
-    return dataclasses.replace(
-        condition, label=f"+{number}", summaries=rows.assign(best_cost=costs)
-    )
+def changed(condition: ConditionResults, label: str, **columns: object) -> ConditionResults:
+    summaries = condition.summaries.assign(**columns)
+    return dataclasses.replace(condition, label=label, summaries=summaries)
 
 
 def copies(results: Results, count: int) -> Results:
-    """Return results of some conditions that differ in their costs alone."""
+    """Return results of some conditions, each of which costs more than the one before."""
     first = results.conditions[0]
-    return results._replace(conditions=tuple(shifted(first, k) for k in range(count)))
+    costs, slope = first.column("best_cost"), 1.0 + 0.1 * np.arange(first.done)
+    conditions = (changed(first, f"+{k}", best_cost=costs + k * slope) for k in range(count))
+    return results._replace(conditions=tuple(conditions))
 
 
 @pytest.mark.parametrize(("count", "rows"), [(4, 6), (6, 15), (7, 6)])
@@ -33,23 +31,19 @@ def test_every_pair_is_compared_and_of_many_conditions_the_first_with_each(
 ) -> None:
     found = copies(results, count)
     (_, costs), *_ = pairwise.pairs_of_conditions(found, settings, pairwise.differing(found))
-    assert len(costs) == rows
-    assert len({row.quantity for row in costs}) == rows
+    assert len(costs) == len({row.quantity for row in costs}) == rows
     assert [row.p_adjusted for row in costs] == holm([row.better.p_value for row in costs])
     assert all(row.better.a12 > 0.5 for row in costs)  # the first of a pair costs less
 
 
 def test_a_quantity_that_never_differs_is_left_out(results: Results) -> None:
-    same = results._replace(conditions=results.conditions[:1] * 2)
-    names = pairwise.differing(same)
-    assert "evaluations" not in names
-    assert "best cost" in names  # of two seeds
+    names = pairwise.differing(results._replace(conditions=results.conditions[:1] * 2))
+    assert "evaluations" not in names and "best cost" in names  # of two seeds
 
 
 def test_shares_that_differ_are_tested_pair_by_pair(results: Results) -> None:
     first = results.conditions[0]
-    some = dataclasses.replace(first, label="all", summaries=first.summaries.assign(solved=True))
-    none = dataclasses.replace(first, label="none", summaries=first.summaries.assign(solved=False))
+    some, none = changed(first, "all", solved=True), changed(first, "none", solved=False)
     both = results._replace(conditions=(some, none))
     assert [row[:2] for row in pairwise.share_rows_of_all(both, 0.95)] == [
         ("all", "2 of 2 = 100 % [34, 100]"),
@@ -64,33 +58,23 @@ def test_shares_that_differ_are_tested_pair_by_pair(results: Results) -> None:
 def test_the_matrix_shows_each_pair_from_both_sides(
     results: Results, settings: ReportSettings
 ) -> None:
-    (drawing,) = (
-        d for d in generic.page(copies(results, 3), settings).drawings if d.stem == "matrix"
-    )
-    table = drawing.table().set_index(["condition", "other"])
+    drawings = {d.stem: d for d in generic.page(copies(results, 3), settings).drawings}
+    table = drawings["matrix"].table().set_index(["condition", "other"])
     assert len(table) == 6
     for (a, b), row in table.iterrows():
         assert row["a12"] == pytest.approx(1.0 - table.loc[(b, a), "a12"])
         assert row["lower"] <= row["a12"] <= row["upper"]
     assert table.loc[("+0", "+2"), "a12"] > 0.5
-    words = [text.get_text() for text in matrix.draw_matrix(table.reset_index()).axes[0].texts]
-    assert len(words) == 6
+    assert len(matrix.draw_matrix(table.reset_index()).axes[0].texts) == 6
     assert "matrix" not in {d.stem for d in generic.page(copies(results, 2), settings).drawings}
 
 
 def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSettings) -> None:
     page = generic.page(copies(results, 4), settings)
+    names = ("best cost", "CPU time, search [s]")  # all took as many evaluations
     headings = [heading for heading, _ in page.comparisons]
-    quantities = ("best cost", "CPU time, search [s]")  # all took as many evaluations
-    assert headings == [f"{name}: pairs of conditions" for name in quantities]
-    assert [drawing.stem for drawing in page.drawings] == [
-        "convergence",
-        "values",
-        "matrix",
-        "scene",
-        "stages",
-        "joints",
-        "covers",
-    ]
+    assert headings == [f"{name}: pairs of conditions" for name in names]
+    stems = ["convergence", "values", "matrix", "scene", "stages", "joints", "covers"]
+    assert [drawing.stem for drawing in page.drawings] == stems
     assert page.tables[0].headers == ("condition", "solved", "certified", "required margin kept")
     assert {"best cost", "CPU time of the search"} <= {q.name for q in page.quantities}

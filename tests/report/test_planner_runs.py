@@ -1,28 +1,54 @@
-"""Runs by planner and problem: names out of labels, and curves problem by problem."""
+"""Planners by their proven answers: names out of labels, lengths, efforts, shares and files."""
 
+import csv
+import io
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
-from evoexp.report.figures import style
+from evoexp.errors import NothingStored
+from evoexp.paths.motion import Motion, spline_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.report.figures.effort_curves import (
+    draw_shares,
     draw_shares_by_problem,
+    length_table,
     problem_share_table,
     share_table,
 )
-from evoexp.report.results.planner_runs import PlannerRuns, of_results
+from evoexp.report.pages import comparison
+from evoexp.report.pages.comparison import Rated, as_csv
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import proven_answers
+from evoexp.report.results.planner_runs import MULTIPLES, PlannerRuns, Problem, of_results
+from evoexp.report.results.proven_answers import (
+    Answer,
+    answer_table,
+    answers_of,
+    motion_length,
+    straight_line,
+)
 from evoexp.report.results.stored_results import Results, gather
-from report_samples import expand
+from evoexp.report.statistics.inference import Interval, Spread
+from evoexp.store.log_reader import read_log
+from report_samples import expand, store
+
+SOME = [
+    Answer(0, 0, 50, 1000, 9.0, 4.0, True, False),
+    Answer(0, 3, 200, 4000, 6.0, 4.0, True, True),
+    Answer(0, 7, 400, 8000, 5.0, 4.0, True, True),
+    Answer(2, 1, 100, 2000, 7.0, 4.0, False, True),
+]
 
 
 @pytest.fixture
 def both(stored: Path) -> Results:
     """Return two problems with two planners and one, by labels that tell both."""
     planar, arms = expand("rana_planar"), expand("rana_three_arms", "scenario=rana_three_arms")
-    (first, ga), (second, search) = planar.conditions[:2]
-    assert (first, second) == ("via-point GA", "random search")
+    (_, ga), (_, search) = planar.conditions[:2]
     labels = [("small: two arms · GA", ga), ("small: two arms · draws", search)]
     labels += [("small: three arms · GA", arms.conditions[0][1])]
     return gather(stored, labels, None, "", "", "")
@@ -38,8 +64,8 @@ def test_labels_that_tell_problem_and_planner_name_both(both: Results) -> None:
 
 
 def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Results) -> None:
-    labels = iter(("plain", "with draws", "three arms: three arms"))
-    other = [replace(c, label=next(labels)) for c in both.evolved]
+    labels = ("plain", "with draws", "three arms: three arms")
+    other = [replace(c, label=label) for c, label in zip(both.evolved, labels, strict=True)]
     scenario = both.evolved[0].condition.scenario.component
     assert names(of_results(other)) == [
         ("via_point_ga", scenario),
@@ -48,66 +74,177 @@ def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Res
     ]
     alike = [replace(c, label=label) for c, label in zip(other, "aba", strict=True)]
     robots = {c.condition.robot.component for c in alike}
-    assert {name for _, name in names(of_results(alike))} == (
-        {f"{scenario}, {robot}" for robot in robots}
-        if len(robots) > 1
-        else {f"{scenario}, {min(robots)} 1", f"{scenario}, {min(robots)} 2"}
-    )
+    tails = robots if len(robots) > 1 else {f"{min(robots)} 1", f"{min(robots)} 2"}
+    assert {n for _, n in names(of_results(alike))} == {f"{scenario}, {each}" for each in tails}
 
 
 def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -> None:
-    other = [
-        replace(c, label=c.label.replace("draws", "B").replace("arms · GA", "arms · B"))
-        if c.label != "small: two arms · GA"
-        else c
-        for c in both.evolved
-    ]
+    labels = ("small: two arms · GA", "small: two arms · B", "small: three arms · B")
+    other = [replace(c, label=label) for c, label in zip(both.evolved, labels, strict=True)]
     found = [planner for planner, _ in names(of_results(other))]
     assert found == ["via_point_ga", "random_search", "via_point_ga"]
 
 
-def test_a_problem_of_several_planners_is_named_by_its_option_or_component(
-    results: Results,
-) -> None:
-    found = names(of_results(results.evolved))
-    assert [planner for planner, _ in found] == [c.label for c in results.evolved]
-    assert {problem for _, problem in found} == {results.evolved[0].condition.scenario.component}
-
-
-def test_runs_keep_the_order_the_seeds_and_the_effort(results: Results) -> None:
+def test_runs_keep_their_labels_seeds_and_effort(results: Results) -> None:
+    problem = results.evolved[0].condition.scenario.component
     for own, condition in zip(of_results(results.evolved), results.evolved, strict=True):
+        assert (own.planner, own.problem.name) == (condition.label, problem)
         assert own.replicates == tuple(condition.summaries.index)
         assert np.array_equal(own.spent, condition.column("collision_queries"))
-        assert own.label == condition.label
+
+
+def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
+    table, spent = answer_table(SOME), np.array([9000.0, 9100.0, 9200.0])
+    assert tuple(table.columns) == Answer._fields
+    runs = PlannerRuns("", Problem("p"), "", table, (0, 1, 2), spent, None)
+    assert runs.best_lengths.tolist() == [5.0, np.inf, 7.0]
+    for most, first in ((np.inf, [4000.0, 9100.0, 2000.0]), (5.5, [8000.0, 9100.0, 9200.0])):
+        effort, reached = runs.first_reached(most)
+        assert effort.tolist() == first
+        assert reached.tolist() == [True, False, most > 7.0]
+    assert straight_line(table) == 4.0
+    assert np.isnan(straight_line(table.assign(straight=[1.0, 2.0, 2.0, 2.0])))
+
+
+def test_no_answer_at_all_is_a_table_too() -> None:
+    table = answer_table([])
+    assert list(table.dtypes) == list(answer_table(SOME).dtypes)
+    assert tuple(table.columns) == Answer._fields
+    runs = PlannerRuns("", Problem("p"), "", table, (0, 1), np.array([3.0, 4.0]), None)
+    assert runs.best_lengths.tolist() == [np.inf, np.inf]
+    effort, reached = runs.first_reached()
+    assert effort.tolist() == [3.0, 4.0] and not reached.any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lengths_are_those_of_many_short_steps(seed: int) -> None:
+    q = np.random.default_rng(seed).normal(size=(6, 3))
+    smooth = spline_motion(CubicSpline(np.arange(6.0), q))
+    for motion in (Motion(q), smooth):
+        points = np.array([motion.at(t) for t in np.linspace(0.0, 5.0, 20_001)])
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        assert motion_length(motion) == pytest.approx(steps, rel=1e-4)
+
+
+def test_answers_are_the_logged_improvements_judged(
+    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proven_answers, "cache_root", lambda: tmp_path)  # judged anew
+    monkeypatch.setattr(proven_answers, "WORTH_WORKERS", 1)
+    together = answers_of(results.evolved)
+    assert list(together) == [c.label for c in results.evolved]
+    assert len([*(tmp_path / "answers").iterdir()]) == sum(c.done for c in results.evolved)
+    for condition in results.evolved:
+        found, (planner, problem) = together[condition.label], condition.prepared
+        assert found.equals(answers_of([condition])[condition.label])  # out of the cache
+        for k, own in found.groupby("replicate"):
+            log, summary = read_log(condition.run.log_path(k)), condition.summaries.loc[k]
+            assert own["cpu_s"].tolist() == [log.cpu_s[index] for index in own["generation"]]
+            assert own["collision_queries"].is_monotonic_increasing
+            last, motion = own.iloc[-1], planner.motion(problem, condition.solutions[k])
+            assert last["collision_queries"] <= summary["collision_queries"]
+            assert (last["certified"], last["solved"]) == (summary["certified"], summary["solved"])
+            assert bool(judge_motion(planner, problem, motion).certified) == last["certified"]
+            assert last["length"] == motion_length(motion) >= last["straight"] - 1e-9
+
+
+def test_shares_are_counts_of_targets_and_the_last_median_is_of_the_best(results: Results) -> None:
+    runs = of_results(results.evolved)
+    table, lengths = share_table(runs), length_table(runs).groupby("planner")["median"].last()
+    for own, condition in zip(runs, results.evolved, strict=True):
+        assert lengths[own.label] == pytest.approx(np.median(own.best_lengths))
+        answers = own.table[own.table["certified"]]
+        targets = np.array(MULTIPLES) * straight_line(own.table)
+        curve = table[table["planner"] == own.label]
+        assert curve["targets"].unique().tolist() == [len(MULTIPLES) * condition.done]
+        for x, share in zip(curve["collision_queries"], curve["share"], strict=True):
+            good = answers[answers["collision_queries"] <= x].groupby("replicate")["length"].min()
+            count = (good.to_numpy()[:, None] <= targets).sum()
+            assert share == pytest.approx(count / curve["targets"].iloc[0])
+    labels = [str(line.get_label()) for line in draw_shares(table).axes[0].get_lines()]
+    assert [label.partition(" (")[0] for label in labels] == [own.label for own in runs]
 
 
 def test_shares_of_all_problems_are_the_mean_of_those_of_each(both: Results) -> None:
     runs = of_results(both.evolved)
-    table = problem_share_table(runs)
-    axis = table["collision_queries"].astype(float).unique()
-    pooled = share_table(runs, axis)
-    for planner in table["planner"].unique():
-        own = table[table["planner"] == planner]
-        weighted = own["share"].astype(float) * own["targets"]
-        together = weighted.groupby(own["collision_queries"].astype(float)).sum()
+    table = problem_share_table(runs).astype({"collision_queries": float, "share": float})
+    pooled = share_table(runs, table["collision_queries"].unique()).groupby("planner")
+    for planner, own in table.groupby("planner"):
+        weighted = (own["share"] * own["targets"]).groupby(own["collision_queries"]).sum()
         total = own.groupby("problem")["targets"].first().sum()
-        shown = pooled[pooled["planner"] == planner]["share"].astype(float)
-        assert np.allclose(together.to_numpy() / total, shown)
-    figure = draw_shares_by_problem(table)
-    assert [axes.get_title(loc="left") or axes.get_title() for axes in figure.axes] == list(
-        table["problem"].unique()
+        shown = pooled.get_group(planner)["share"].astype(float)
+        assert np.allclose(weighted.to_numpy() / total, shown)
+    axes = draw_shares_by_problem(table).axes
+    titles = [each.get_title(loc="left") or each.get_title() for each in axes]
+    assert titles == list(table["problem"].unique())
+    assert len({each.get_xlim() for each in axes}) == 1
+
+
+def test_the_page_tells_every_condition_and_every_pair(
+    results: Results, settings: ReportSettings
+) -> None:
+    page, count = comparison.page(results, settings), len(results.evolved)
+    assert [row[0] for row in page.tables[1].rows] == [c.label for c in results.evolved]
+    assert "Planners are not ranked" in page.tables[0].note  # one problem
+    assert len(page.comparisons[0][1]) == count * (count - 1) // 2
+    assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "proven_lengths"]
+
+
+def test_planners_of_several_problems_are_named_by_their_components(
+    stored: Path, settings: ReportSettings
+) -> None:
+    several = [expand("rana_planar"), expand("rana_three_arms", "scenario=rana_three_arms")]
+    conditions = [(f"{e.name}: {label}", c) for e in several for label, c in e.conditions]
+    page = comparison.page(gather(stored, conditions, None, "", "", ""), settings)
+    assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "targets_by_problem"]
+    headings = [table.heading for table in page.tables]  # no problem has all planners
+    assert headings == ["Problems", "Answers", "The same in other coins"]
+    planners = set(page.drawings[0].table()["planner"])
+    assert all(p.startswith(("via_point_ga", "random_search", "multi_start")) for p in planners)
+
+
+def test_answers_that_are_no_motions_are_not_compared(
+    tmp_path: Path, settings: ReportSettings
+) -> None:
+    experiment = expand("chen_landscapes")  # postures
+    store(tmp_path, experiment)
+    results = gather(tmp_path, experiment.conditions, None, experiment.name, "smoke", "")
+    with pytest.raises(NothingStored, match="no stored solution is a motion"):
+        comparison.page(results, settings)
+
+
+def test_effort_in_other_coins(results: Results, settings: ReportSettings) -> None:
+    runs = of_results(results.evolved, {})
+    for row, own, condition in zip(
+        comparison.rated(runs, settings), runs, results.evolved, strict=True
+    ):
+        assert row.body_tests == 9 * 9  # circles on two arms
+        assert row.own_cost.median == np.median(condition.column("best_cost"))
+        whole = condition.summaries.assign(
+            cpu_s=condition.summaries["cpu_s"] - condition.summaries["certificate_s"]
+        )[["evaluations", "cpu_s"]]
+        first = own.table[own.table["certified"]].groupby("replicate")[["evaluations", "cpu_s"]]
+        spent = first.first().reindex(whole.index).fillna(whole).sum()
+        if row.proven:
+            assert row.evaluations == spent["evaluations"] / row.proven
+            assert row.cpu_s == pytest.approx(spent["cpu_s"] / row.proven)
+
+
+def test_csv_has_all_digits() -> None:
+    lengths = Spread(4.0 / 3.0, 1.0, 2.0, 4)
+    ours = Rated(
+        *("p_1: A&B", "[A] & B_1 50%", "p_1", 4, 3, 10.0, 1234.5, Interval(900.25, 2000.125)),
+        *(lengths, 1.0, np.nan, 1.0, 0, 4, 20.0, 51.5, 0.25),
     )
-    assert len({axes.get_xlim() for axes in figure.axes}) == 1
-
-
-def test_many_curves_have_six_colours_and_then_other_lines() -> None:
-    looks = [style.curve_look(k) for k in range(24)]
-    assert len({look["color"] for look in looks}) == 6
-    assert len({str(look) for look in looks}) == 24
-    assert all(look["linestyle"] == "-" for look in looks[:6])
-
-
-def test_long_names_lose_their_middle() -> None:
-    assert style.shortened("a" * 10, 10) == "a" * 10
-    assert style.shortened("abcdefghij", 7) == "abc…hij"
-    assert all(len(style.shortened("x" * 40, most)) == most for most in range(3, 12))
+    never = Spread(np.inf, np.inf, np.inf, 2)
+    given = Rated(
+        *("q: C", "C (given)", "q, {a}", 2, 0, np.nan, np.inf, Interval(1e6, np.inf)),
+        *(never, np.nan, np.nan, np.nan, 0, 0),
+    )
+    head, first, second = csv.reader(io.StringIO(as_csv([ours, given]).decode()))
+    assert head[:4] == ["planner", "problem", "n", "proven"] and len(set(head)) == 13
+    assert first[:4] == ["[A] & B_1 50%", "p_1", "4", "3"]
+    numbers = [1234.5, 900.25, 2000.125, 4 / 3, 1.0, 2.0, 24690.0, 51.5, 0.25]
+    assert [float(cell) for cell in first[4:]] == numbers
+    unknown = ["", "", ""]  # of runs that were given
+    assert second == ["C (given)", "q, {a}", "2", "0", "inf", "1000000.0", *["inf"] * 4, *unknown]

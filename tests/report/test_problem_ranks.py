@@ -3,7 +3,6 @@
 import itertools
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,7 +16,7 @@ from evoexp.report.figures.rank_diagrams import (
 )
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results.planner_runs import PlannerRuns, Problem
+from evoexp.report.results.planner_runs import PlannerRuns
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.problem_ranks import (
     Standing,
@@ -27,6 +26,7 @@ from evoexp.report.statistics.problem_ranks import (
     friedman,
     standing,
 )
+from report_samples import made_up_runs
 
 # Demšar 2006, Tab. 6: areas under the curve of four classifiers on fourteen data sets
 AREAS = np.array(
@@ -48,18 +48,13 @@ AREAS = np.array(
     ]
 )
 COSTS = st.sampled_from([1.0, 2.0, 3.0, 4.0, np.inf])
+TABLES = arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS)
 
 
 def stands(lengths: np.ndarray, efforts: np.ndarray | None = None) -> Standing:
-    problems, planners = lengths.shape
-    return Standing(
-        tuple(f"planner {k}" for k in range(planners)),
-        tuple(f"problem {k}" for k in range(problems)),
-        (),
-        (),
-        lengths if efforts is None else efforts,
-        lengths,
-    )
+    problems = tuple(f"problem {k}" for k in range(len(lengths)))
+    planners = tuple(f"planner {k}" for k in range(lengths.shape[1]))
+    return Standing(planners, problems, (), (), lengths if efforts is None else efforts, lengths)
 
 
 def test_mean_ranks_and_critical_differences_are_demsars() -> None:
@@ -85,21 +80,19 @@ def test_friedmans_statistic_is_that_of_the_formula() -> None:
     assert friedman(np.tile([1.0, 2.0, np.inf], (6, 1))).p_value < 0.01
 
 
-@given(arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS))
+@given(TABLES)
 def test_ranks_count_who_is_better(lengths: np.ndarray) -> None:
     ranks = stands(lengths).ranks
-    for (i, j), rank in np.ndenumerate(ranks):
-        better = sum(other < lengths[i, j] for other in lengths[i])
-        equal = sum(other == lengths[i, j] for other in lengths[i])
-        assert rank == better + (equal + 1) / 2
+    better = (lengths[:, None, :] < lengths[:, :, None]).sum(axis=2)
+    equal = (lengths[:, None, :] == lengths[:, :, None]).sum(axis=2)
+    assert np.array_equal(ranks, better + (equal + 1) / 2)
 
 
-@given(arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS))
+@given(TABLES)
 def test_profiles_count_problems(efforts: np.ndarray) -> None:
     ratios = effort_ratios(efforts)
-    for row, got in zip(efforts, ratios, strict=True):
-        for effort, ratio in zip(row, got, strict=True):
-            assert ratio == (np.inf if np.isinf(effort) else effort / min(row))
+    for (i, j), effort in np.ndenumerate(efforts):
+        assert ratios[i, j] == (np.inf if np.isinf(effort) else effort / efforts[i].min())
     table = profiles_table(stands(efforts))
     for row in table.itertuples():
         own = ratios[:, int(str(row.planner).removeprefix("planner "))]
@@ -119,30 +112,22 @@ def test_groups_join_all_pairs_that_do_not_differ(ranks: list[float], difference
         assert not (one[0] >= two[0] and one[1] <= two[1])  # none inside of another
 
 
-def runs_of(planner: str, problem: str, lengths: list[float], spent: float = 100.0) -> PlannerRuns:
+def runs_of(planner: str, problem: str, *lengths: float) -> PlannerRuns:
     """Return runs whose one answer, where there is one, comes at a tenth of the effort."""
-    rows = [(k, 0.1 * spent, x, True) for k, x in enumerate(lengths) if np.isfinite(x)]
-    table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length", "certified"])
-    return PlannerRuns(
-        planner,
-        Problem(problem),
-        f"{problem}, {planner}",
-        table,
-        tuple(range(len(lengths))),
-        np.full(len(lengths), spent),
-        None,
-    )
+    rows = [(k, 10.0, length) for k, length in enumerate(lengths) if np.isfinite(length)]
+    return made_up_runs(planner, problem, rows, [100.0] * len(lengths))
 
 
 def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
-    runs = [
-        runs_of("A", "p", [1.0, 2.0, 9.0]),
-        runs_of("B", "p", [3.0] * 50),
-        runs_of("A", "q", [np.inf, np.inf, 1.0]),
-        runs_of("B", "q", [4.0, 4.0]),
-        runs_of("A", "only A", [1.0]),
-    ]
-    found = standing(runs)
+    found = standing(
+        [
+            runs_of("A", "p", 1.0, 2.0, 9.0),
+            runs_of("B", "p", *[3.0] * 50),
+            runs_of("A", "q", np.inf, np.inf, 1.0),
+            runs_of("B", "q", 4.0, 4.0),
+            runs_of("A", "only A", 1.0),
+        ]
+    )
     assert (found.planners, found.problems) == (("A", "B"), ("p", "q"))
     assert found.left_out == ("only A",)
     assert found.lengths.tolist() == [[2.0, 3.0], [np.inf, 4.0]]
@@ -152,12 +137,12 @@ def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
 
 
 def test_a_planner_of_few_problems_is_not_ranked_and_costs_no_problem() -> None:
-    runs = [runs_of(name, problem, [1.0]) for problem in "pqrs" for name in "AB"]
-    few = [runs_of("few", "p", [1.0]), *(runs_of("few", f"own {k}", [1.0]) for k in range(9))]
+    runs = [runs_of(name, problem, 1.0) for problem in "pqrs" for name in "AB"]
+    few = [runs_of("few", "p", 1.0), *(runs_of("few", f"own {k}", 1.0) for k in range(9))]
     found = standing([*runs, *few])
     assert (found.planners, found.outsiders) == (("A", "B"), ("few",))
     assert (found.problems, len(found.left_out)) == (tuple("pqrs"), 9)
-    half = standing([*runs, runs_of("half", "p", [1.0]), runs_of("half", "q", [1.0])])
+    half = standing([*runs, runs_of("half", "p", 1.0), runs_of("half", "q", 1.0)])
     assert (half.planners, half.problems) == (("A", "B", "half"), ("p", "q"))
     assert half.left_out == ("r", "s") and not half.outsiders
 
@@ -167,7 +152,7 @@ RANKED = ("performance_profiles", "critical_difference")
 
 def test_the_page_says_why_there_is_no_test_or_no_ranking(settings: ReportSettings) -> None:
     def page_parts(problems: str, planners: str) -> tuple[str, str, list[str]]:
-        runs = [runs_of(a, p, [float(k + 1)]) for p in problems for k, a in enumerate(planners)]
+        runs = [runs_of(a, p, float(k + 1)) for p in problems for k, a in enumerate(planners)]
         page = comparison.page(Results("", "", ()), settings, runs)
         notes = {table.heading: table.note for table in page.tables}
         stems = [drawing.stem for drawing in page.drawings if drawing.stem in RANKED]

@@ -1,47 +1,76 @@
-"""Random walks over grids against walks written plainly.
+"""Random walks over grids against walks written plainly, which take the same random numbers."""
 
-Which take the same numbers in the same order.
-"""
+from typing import Any
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
-from evoexp.paths.grid_walks import erase_loops, measure_path, walk, weigh_all
-from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of, without_loops
+from evoexp.paths.grid_walks import LANES, WORDS, walk, walk_all, weigh_all
+from evoexp.paths.grids import UNREACHED, Moves, front, grid
+from matrix import num_cases
+from references.chen_python import without_loops
+
+SEEDS = st.integers(0, 2**32)
+SHAPES = st.sampled_from([(1, 2), (3, 3), (6, 5), (9, 9), (3, 3, 3)])
+SHARES = st.floats(0.0, 0.5)
 
 
-@settings(max_examples=40, deadline=None)
-@given(SHAPES, st.floats(0.0, 0.5), POTENTIALS, st.booleans(), SEEDS)
-def test_a_single_walk_is_that_of_a_single_walker(
-    shape: tuple[int, ...], share: float, potentials: tuple[float, float], erase: bool, seed: int
-) -> None:
-    world = World(shape, share, seed, potentials)
-    uniforms, taken = np.random.default_rng(seed).random(20_000), np.array([7])
-    path, place = (
-        np.zeros(world.grid.num_nodes + 1, dtype=np.int32),
-        np.zeros(world.grid.num_nodes, dtype=np.int32),
-    )
-    walk(Block(uniforms, taken), world.moves, world.sums[None][:0], world.ends, erase, path, place)
-    trail = world.trail(iter(uniforms[7:].tolist()))
-    assert taken[0] == 7 + len(trail) - 1
-    assert nodes_of(path) == as_path(trail, erase, world.grid.num_nodes)
+class World:
+    """A grid whose last node can be reached from its first one, with moves toward it."""
+
+    def __init__(self, shape: tuple[int, ...], share: float, seed: int, step: float) -> None:
+        height = np.random.default_rng(seed).random(shape)
+        height.flat[[0, -1]] = 1.0
+        first, last = (0,) * len(shape), tuple(size - 1 for size in shape)
+        while True:
+            self.grid = grid(height < share)
+            self.ends = self.grid.index_of(first), self.grid.index_of(last)
+            steps = front(self.grid, np.array([self.ends[1]]), 1)
+            if steps[self.ends[0]] != UNREACHED:
+                break
+            share *= 0.8
+        nodes = range(self.grid.num_nodes)
+        self.potentials = np.array([0.0, *(1.0 + step * k for k in nodes)])
+        self.moves = Moves(self.grid.neighbours, self.potentials, steps)
+        self.sums = weigh_all(self.moves).astype(np.uint16)
+
+    def step(self, node: int, uniform: float) -> int:
+        """Draw a move by its weight (Chen & Zalzala 1995, section 2.3)."""
+        others = [int(other) for other in self.grid.neighbours[node] if other >= 0]
+        potentials = [float(self.potentials[self.moves.steps[other]]) for other in others]
+        weights = [max(potentials) - potential + 1.0 for potential in potentials]
+        left = uniform * sum(weights)
+        for other, weight in zip(others, weights, strict=True):
+            left -= weight
+            if left < 0.0:
+                return other
+        return others[-1]
+
+    def rows(self, count: int) -> np.ndarray:
+        return np.zeros((count, self.grid.num_nodes + 1), dtype=np.int32)
+
+    def as_path(self, trail: list[int], erase: bool) -> list[int]:
+        """A walk without loops, or without those that it had whenever it became too long."""
+        if erase:
+            return without_loops(trail)
+        path: list[int] = []
+        for node in trail:
+            path = [*(without_loops(path) if len(path) == self.grid.num_nodes else path), node]
+        return path
+
+
+def random_words(seed: int) -> np.ndarray:
+    return np.asarray(np.random.PCG64(seed).random_raw(40_000))
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    st.tuples(*[st.integers(2, 7)] * 2),
-    st.floats(0.0, 0.5),
-    st.tuples(st.integers(1, 3), st.integers(1, 3)),
-    st.booleans(),
-    SEEDS,
-)
+@given(st.tuples(*[st.integers(2, 7)] * 2), SHARES, st.integers(1, 3), st.booleans(), SEEDS)
 def test_a_table_of_weights_leads_to_the_same_nodes(
-    shape: tuple[int, ...], share: float, steps: tuple[int, int], erase: bool, seed: int
+    shape: tuple[int, ...], share: float, step: int, erase: bool, seed: int
 ) -> None:
-    world, rng = World(shape, share, seed, (steps[0], sum(steps))), np.random.default_rng(seed)
-    nodes = world.grid.num_nodes
+    world, rng = World(shape, share, seed, step), np.random.default_rng(seed)
     # numbers at the ends of the interval, at parts of a total and close below them, too
     parts = [k / total for total in range(2, 60) for k in range(total)]
     below = np.nextafter(parts[1:], 0.0)
@@ -49,58 +78,64 @@ def test_a_table_of_weights_leads_to_the_same_nodes(
     uniforms = np.where(rng.random(5000) < 0.5, rng.choice(special, 5000), rng.random(5000))
     walks = []
     for sums in (world.sums[None], world.sums[None][:0]):
-        path, place = np.zeros(nodes + 1, dtype=np.int32), np.zeros(nodes, dtype=np.int32)
-        draws = Block(uniforms, np.array([3]))
+        (path, place), draws = world.rows(2), Block(uniforms, np.array([3]))
         walk(draws, world.moves, sums, world.ends, erase, path, place)
         walks.append((draws.taken[0], path[: path[0] + 1].tolist()))
     assert walks[0] == walks[1]
 
 
-@settings(deadline=None)
-@given(SHAPES, st.floats(0.0, 0.5), POTENTIALS, SEEDS)
-def test_sums_rise_by_what_permitted_moves_weigh(
-    shape: tuple[int, ...], share: float, potentials: tuple[float, float], seed: int
-) -> None:
-    world = World(shape, share, seed, potentials)
-    for node, sums in enumerate(weigh_all(world.moves)):
-        weights, expected = world.weights(node), np.zeros(len(sums))
-        for move, other in enumerate(world.grid.neighbours[node]):
-            expected[move] = weights.get(int(other), 0.0)
-        np.testing.assert_array_equal(sums, np.cumsum(expected))
-
-
 def test_numbers_that_do_not_suffice_are_said() -> None:
-    world = World((9, 9), 0.0, 0, (1.0, 3.0))
-    path, place = (
-        np.zeros(world.grid.num_nodes + 1, dtype=np.int32),
-        np.zeros(world.grid.num_nodes, dtype=np.int32),
-    )
-    for taken in (np.array([0]), np.array([5])):
-        draws = Block(np.full(5, 0.5), taken)
+    world = World((9, 9), 0.0, 0, 2.0)
+    for taken in (0, 5):
+        (path, place), draws = world.rows(2), Block(np.full(5, 0.5), np.array([taken]))
         walk(draws, world.moves, world.sums[None][:0], world.ends, True, path, place)
         assert used_up(draws)
 
 
-@given(st.lists(st.integers(0, 9), min_size=1, max_size=40), st.booleans())
-def test_loops_are_erased_in_the_order_in_which_they_close(
-    nodes: list[int], in_place: bool
+def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list[int]], int]:
+    """Every walker takes half a word in turn; whoever arrives begins the next walk, if any."""
+    halves = iter(half / 2**32 for word in words.tolist() for half in (word % 2**32, word // 2**32))
+    trails: list[list[int]] = [[world.ends[0]] for _ in range(max(count, LANES))]
+    own, begun, taken = list(range(LANES)), LANES, 0
+    while any(trail[-1] != world.ends[1] for trail in trails[:count]) or begun < count:
+        taken += WORDS
+        for k in range(LANES):
+            trails[own[k]].append(world.step(trails[own[k]][-1], next(halves)))
+        for k in range(LANES):
+            if trails[own[k]][-1] == world.ends[1]:
+                own[k], begun = begun, begun + 1
+                if own[k] >= len(trails):
+                    trails.append([])
+                trails[own[k]] = [world.ends[0]]
+    return trails[:count], taken
+
+
+@settings(max_examples=num_cases(10, 60), deadline=None)
+@given(SHAPES, SHARES, st.sampled_from([1, 2]), st.booleans(), st.integers(1, 3 * LANES), SEEDS)
+def test_many_walks_are_those_of_walkers_that_take_turns(
+    shape: tuple[int, ...], share: float, step: int, erase: bool, count: int, seed: int
 ) -> None:
-    trail = np.array([len(nodes), *nodes], dtype=np.int32)
-    path = trail if in_place else np.zeros(len(nodes) + 1, dtype=np.int32)
-    erase_loops(trail, len(nodes), path, np.full(10, 99, dtype=np.int32))
-    assert nodes_of(path) == without_loops(nodes)
+    world, words = World(shape, share, seed, step), random_words(seed)
+    paths = world.rows(count)
+    own = world.grid.neighbours, world.sums, world.ends, erase
+    taken = walk_all(words, WORDS, WORDS, *own, paths)
+    trails, expected = plain_trails(world, words, count)
+    assert taken == expected
+    for path, trail in zip(paths.tolist(), trails, strict=True):
+        assert path[1 : path[0] + 1] == world.as_path(trail, erase)
 
 
 @settings(max_examples=40, deadline=None)
-@given(SHAPES, st.floats(0.0, 0.5), SEEDS)
-def test_a_path_is_as_long_and_unsafe_as_its_moves_and_nodes(
-    shape: tuple[int, ...], share: float, seed: int
+@given(SHAPES, st.booleans(), st.integers(1, 40), st.integers(1, 40), SEEDS)
+def test_words_are_drawn_in_whole_portions_as_far_as_there_are_as_many(
+    shape: tuple[int, ...], erase: bool, first: int, more: int, seed: int
 ) -> None:
-    world, rng = World(shape, share, seed, (1.0, 3.0)), np.random.default_rng(seed)
-    unsafeness = 10.0 * rng.random(world.grid.num_nodes)
-    trail = world.trail(iter(rng.random(20_000).tolist()))
-    steps = np.diff(world.grid.coordinates[trail].astype(np.float64), axis=0)
-    path = np.array([len(trail), *trail], dtype=np.int32)
-    distance, mean = measure_path(path, world.grid.kinds, unsafeness)
-    np.testing.assert_allclose(distance, np.sqrt((steps**2).sum(axis=1)).sum(), rtol=1e-12)
-    np.testing.assert_allclose(mean, unsafeness[trail].mean(), rtol=1e-12)
+    world, words = World(shape, 0.3, seed, 2.0), random_words(seed)
+    own: Any = world.grid.neighbours, world.sums, world.ends, erase
+    one_by_one, portioned = world.rows(2 * LANES + 1), world.rows(2 * LANES + 1)
+    taken = walk_all(words, WORDS, WORDS, *own, one_by_one)
+    counts = WORDS * first, WORDS * more
+    drawn = walk_all(words, *counts, *own, portioned)
+    assert np.array_equal(one_by_one, portioned)
+    assert drawn == counts[0] + counts[1] * max(0, -(-(taken - counts[0]) // counts[1]))
+    assert walk_all(words[: drawn - 1], *counts, *own, portioned) == -1

@@ -1,41 +1,135 @@
-"""Search that accepts proven motions only: every answer is one, and nothing else changes."""
+"""Search that accepts proven motions only: every answer is one, and nothing else changes.
 
+`./scripts/test --exhaustive tests/planners/test_certified_search.py` judges thousands of motions.
+"""
+
+import importlib.util
 import itertools
 import math
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from composed import composed
 from evoexp.batch.replicate import run_replicate
+from evoexp.collision.scene import Part
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.planners.proofs import Proofs, judge_motion
+from evoexp.evolution.best_team import best_team
+from evoexp.paths.motion import Motion
+from evoexp.planners.coevolution.proven_teams import ProvenTeams
+from evoexp.planners.proofs import Proofs
 from evoexp.planners.via_point_ga.search import settle
-from evoexp.records import generations
 from evoexp.store.log_reader import read_log
+from matrix import counts
+from planners.runs import ran, verdict
+
+HAS_OMPL = importlib.util.find_spec("ompl") is not None
+SAMPLES = 40  # per segment
+COARSE = "collision.collision_substeps=1 planner.range=60"  # an edge is tested at its end alone
+CONTROL = "rana_planar ga.num_generations=300 control="
+FEW = "ga.population_size=30 ga.num_generations=20"
+OMPL = f"rrt_connect planner=ompl ga=ompl {COARSE} ga.num_generations=20"
+OMPL += " ga.queries_per_generation=100 planner.algorithm="
+REACHING = "planner=rrt_reaching ga=rrt_connect objective=null collision=lavoie"
+ALWAYS_SOLVED = (  # by one of the seeds at least
+    "curkovic_motion",
+    "curkovic_three",
+    "curkovic_safety",
+    "lavoie_7dof",
+    "lavoie_10dof",
+    "corsepius_shelf",
+    "corsepius_pick_and_place planner.scope=0.05",
+    f"rrt_connect {COARSE}",
+    *(f"lavoie_{arm} {REACHING}" for arm in ("7dof", "10dof")),
+    "rana_planar",
+    "rana_obstacles",
+    "rana_three_arms",
+    "rana_puma",
+    *(f"{CONTROL}{name}" for name in ("cma_es", "random_search", "multi_start")),
+    *(f"chen_{name} robot.body_radius=0.8" for name in ("path", "mission")),
+    "chen_path robot.body_radius=0.8 control=path_climbing",
+)
+MAYBE_SOLVED = (
+    *(f"{CONTROL}{name}" for name in ("stomp", "nsga2")),
+    *(f"{name} control=random_search {FEW}" for name in ("curkovic_motion", "lavoie_7dof")),
+    "corsepius_shelf control=random_search ga.num_generations=20",
+    "motionbenchmaker ga.num_generations=4 ga.population_size=40 planner.num_new_trajectories=8",
+)
+WITH_OMPL = [
+    pytest.param(
+        f"{OMPL}{name} planner.num_shortcuts={num}",
+        id=f"ompl {name}",
+        marks=pytest.mark.skipif(not HAS_OMPL, reason="an extra"),
+    )
+    for name, num in (("RRTConnect", 200), ("BITstar", 0), ("PRMstar", 0))
+]
 
 
-def condition(*words: str, experiment: str = "rana_planar") -> Condition:
-    return composed(f"experiment={experiment}", *words)
+def condition(words: str, acceptance: str = "certified") -> Condition:
+    return composed(*f"experiment={words} planner.acceptance={acceptance}".split())
 
 
-def evolved(chosen: Condition, seed: int) -> list[Any]:
-    planner, problem = chosen.prepare()
-    return list(generations(planner.evolve(problem, np.random.default_rng(seed))))
+def least_distance(part: Part, motion: Motion) -> float:
+    """Return the least distance of coal over all pairs that must not touch and many instants."""
+    scene = part.scene
+    data, geometry_data = scene.model.createData(), pin.GeometryData(scene.geometry)
+    pairs = [frozenset((p.first, p.second)) for p in scene.geometry.collisionPairs]
+    watched = {frozenset(pair) for pair in scene.pairs.tolist()}
+    assert watched <= set(pairs)
+    least = np.inf
+    for t in np.linspace(part.first, part.last, SAMPLES * (part.last - part.first) + 1):
+        pin.computeDistances(scene.model, data, scene.geometry, geometry_data, motion.at(float(t)))
+        for pair, result in zip(pairs, geometry_data.distanceResults, strict=True):
+            least = min(least, result.min_distance if pair in watched else np.inf)
+    return float(least)
 
 
-def is_proven(chosen: Condition, solution: Any) -> bool:
-    planner, problem = chosen.prepare()
-    return judge_motion(planner, problem, planner.motion(problem, solution)).certified is True
+@pytest.mark.parametrize("words", [*ALWAYS_SOLVED, *MAYBE_SOLVED, *WITH_OMPL])
+def test_every_answer_is_proven_and_none_touches(words: str) -> None:
+    """By the certifier and, without it, by many exact distances."""
+    num_solved = 0
+    for seed in range(counts(2, 25)):
+        planner, problem, records = ran(condition(words), seed)
+        bests = [math.inf, *(record.best_cost for record in records)]
+        assert all(later <= earlier for earlier, later in itertools.pairwise(bests))
+        answers = {r.best.tobytes(): r.best for r in records if r.solved and r.best_cost < math.inf}
+        for solution in answers.values():
+            assert verdict(planner, problem, solution).certified is True
+        for solution in list(answers.values())[-counts(1, 1000) :]:
+            motion = planner.motion(problem, solution)
+            assert min(least_distance(p, motion) for p in planner.parts(problem, motion)) > 0.0
+        num_solved += bool(answers)
+    assert num_solved > 0 or words in MAYBE_SOLVED
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "curkovic_motion",
+        "lavoie_7dof",
+        "corsepius_shelf",
+        f"{CONTROL}cma_es",
+        f"rrt_connect {COARSE}",
+        "chen_mission robot.body_radius=0.8 budget=smoke",
+        "chen_path robot.body_radius=0.8",
+        "chen_path robot.body_radius=0.8 control=path_climbing",
+        *WITH_OMPL[:2],
+    ],
+)
+def test_the_models_own_search_accepts_what_is_refuted(words: str) -> None:
+    """And so the search by proofs is another one: on some seed the two differ."""
+    trusting = condition(words, "model")
+    assert b"acceptance" not in trusting.to_json()
+    assert any(run.verdict().certified is False for run in (ran(trusting, s) for s in range(12)))
 
 
 def test_the_cheapest_free_strings_are_judged_until_one_is_proven(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    planner, problem = condition("planner.acceptance=certified").prepare()
-    proofs, asked = Proofs(planner, problem), []
+    proofs, asked = Proofs(*condition("rana_planar").prepare()), list[int]()
 
     def proven(solution: Any) -> bool:
         asked.append(int(solution[0]))
@@ -51,80 +145,64 @@ def test_the_cheapest_free_strings_are_judged_until_one_is_proven(
     assert hits.tolist() == [1.0, 0.0, 2.0, 1.0, 1.0, 0.0]
     assert settle(proofs, strings, costs, hits, below=9.0) is None
     assert asked == [3, 0, 1]
+    asked.clear()
+    costs = np.array([3.0, np.inf, 4.0, 9.0, 2.0, 5.0])  # without collisions to be counted
+    assert proofs.settle(costs, lambda k: np.array([float(k)])) == 5
+    assert asked == [4, 0, 2, 5]
+    assert costs.tolist() == [np.inf, np.inf, np.inf, 9.0, np.inf, 5.0]
 
 
 def test_a_verdict_is_asked_for_once() -> None:
-    planner, problem = condition("planner.acceptance=certified").prepare()
+    planner, problem = condition("rana_planar").prepare()
     solution = planner.solution(problem, planner.sample(problem, np.random.default_rng(0), 1), 0)
     proofs = Proofs(planner, problem)
     assert proofs.is_proven(solution) == proofs.is_proven(solution.copy())
     assert proofs.num_certificates == 1
 
 
-@pytest.mark.parametrize(
-    "control", ["null", "cma_es", "stomp", "random_search", "multi_start", "nsga2"]
-)
-def test_every_answer_is_proven(control: str) -> None:
-    words = f"control={control}", "planner.acceptance=certified", "ga.num_generations=300"
-    chosen = condition(*words)
-    records = evolved(chosen, 1)
-    for before, record in itertools.pairwise(records):
-        assert record.best_cost <= before.best_cost
-        assert record.solved == math.isfinite(record.best_cost)
-        if record.solved and record.best is not before.best:
-            assert is_proven(chosen, record.best)
-    assert records[-1].solved or control in ("stomp", "nsga2")
-
-
-def test_what_the_papers_model_lets_through_is_no_answer() -> None:
-    """CMA-ES finds motions that are free at all via-points, and touch between them."""
-    words = "control=cma_es", "ga.num_generations=300"
-    trusting, proving = (
-        condition(*words, f"planner.acceptance={each}") for each in ("model", "certified")
+def test_a_refuted_team_counts_as_colliding_once_more() -> None:
+    planner, problem = condition("curkovic_three").prepare()
+    populations = planner.sample(problem, np.random.default_rng(1), 40)
+    found, untouched = (planner.evaluated(problem, populations) for _ in range(2))
+    teams = ProvenTeams(planner, problem)
+    best, first = (
+        teams.settle(populations, found),
+        best_team(untouched.collisions, untouched.teamable),
     )
-    last = evolved(trusting, 0)[-1]
-    assert last.solved
-    assert not is_proven(trusting, last.best)
-    proven = evolved(proving, 0)[-1]
-    assert not proven.solved or is_proven(proving, proven.best)
-    assert proven.best_cost > last.best_cost
+    more = found.collisions.astype(int) - untouched.collisions
+    counted = found.criteria[:, 0] - untouched.criteria[:, 0]
+    assert first.found and more.min() == 0
+    assert counted.sum() == 2 * more.sum()
+    weight = planner.objective.collision_weight
+    assert found.costs - untouched.costs == pytest.approx(weight * counted)
+    assert teams.num_certificates >= 1
+    if best.found:
+        solution = planner.team_solution(problem, populations, best.individuals)
+        assert verdict(planner, problem, solution).certified is True
+        assert best.cost >= first.cost
 
 
 def test_margins_can_be_asked_for() -> None:
-    chosen = condition("planner.acceptance=margin", "scenario.security_margin=0.02")
-    last = evolved(chosen, 0)[-1]
-    planner, problem = chosen.prepare()
-    found = judge_motion(planner, problem, planner.motion(problem, last.best))
-    assert last.solved
-    assert found.certified_margin
-
-
-def test_covered_bodies_are_proven_too() -> None:
-    words = "ga.num_generations=4", "planner.acceptance=certified", "ga.population_size=40"
-    chosen = condition(*words, "planner.num_new_trajectories=8", experiment="motionbenchmaker")
-    for record in evolved(chosen, 0):
-        assert not record.solved or is_proven(chosen, record.best)
+    run = ran(condition("rana_planar scenario.security_margin=0.02", "margin"))
+    assert run.last.solved
+    assert run.verdict().certified_margin
 
 
 @pytest.mark.parametrize("experiment", ["rana_planar", "rrt_connect", "chen_path"])
 def test_the_default_is_the_model_and_no_part_of_the_identity(experiment: str) -> None:
-    plain, named, proving = (
-        condition(*words, experiment=experiment)
-        for words in ((), ("planner.acceptance=model",), ("planner.acceptance=certified",))
-    )
-    assert plain.id == named.id != proving.id
+    plain = composed(f"experiment={experiment}")
+    assert plain.id == condition(experiment, "model").id != condition(experiment).id
     assert b"acceptance" not in plain.to_json()
 
 
-def test_the_log_of_a_proven_search_counts_its_certificates(tmp_path: Any) -> None:
-    path = tmp_path / "0000.mcap"
-    proving = condition("planner.acceptance=certified", "ga.num_generations=400")
-    path.write_bytes(run_replicate(proving, 0).content)
-    log = read_log(path)
+def test_the_log_of_a_proven_search_counts_its_certificates() -> None:
+    log = read_log(run_replicate(condition("rana_planar ga.num_generations=400"), 0).content)
     assert log.summary.certified
     assert log.generations[-1].terms["certificates"] >= 1.0
 
 
-def test_other_words_are_refused() -> None:
+def test_other_words_and_answers_that_are_no_motion_are_refused() -> None:
     with pytest.raises(SettingError, match=r"planner\.acceptance: must be"):
-        condition("planner.acceptance=proven")
+        condition("rana_planar", "proven")
+    with pytest.raises(SettingError, match=r"planner\.acceptance: must be 'model': the answer is"):
+        condition("chen_placement")

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 
 from composed import composed
+from evoexp.collision.potential_fields import PotentialFields
 from evoexp.planners.grid_path_ga import planner as grid_planner
+from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.records import generations
-from planners.grid_samples import planner, robot, scenario, solvable
+from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
 from references import chen_python
 
 ROUNDING = 1e-12  # relative, of costs
+BROKEN = PotentialFields(**(FIELDS | {"goal_potentials": (0.5, 1.75)}))  # no whole numbers
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +48,7 @@ def same_paths(own: Any, problem: Any, seed: int) -> bool:
     return True
 
 
-@pytest.mark.examples(3)
+@pytest.mark.examples(12)
 @pytest.mark.parametrize(
     ("shape", "share", "changes"),
     [
@@ -55,6 +58,8 @@ def same_paths(own: Any, problem: Any, seed: int) -> bool:
         ((4, 4, 4), 0.3, {"num_elites": 0, "population_size": 15}),
         ((16, 16), 0.35, {"crossover_reach": 0, "num_elites": 3, "scaling_multiple": 1.3}),
         ((16, 9), 0.2, {"weights": (1.0, 0.02), "population_size": 1, "num_elites": 0}),
+        ((9, 9), 0.3, {"collision": BROKEN, "mutation_rate": 1.0}),  # longer ways of walking
+        ((50, 50), 0.0, {"population_size": 6, "mutation_rate": 1.0, "num_generations": 2}),
     ],
     ids=str,
 )
@@ -63,7 +68,22 @@ def test_generations_of_paths_are_the_same(
     shape: tuple[int, ...], share: float, changes: dict[str, Any], seed: int
 ) -> None:
     own = planner(**({"population_size": 20, "num_generations": 30} | changes))
-    assert same_paths(own, solvable(shape, share, seed, own), seed)
+    problem = solvable(shape, share, seed, own)
+    is_tabled = shape != (50, 50) and "collision" not in changes
+    assert (len(problem.world.sums) > 0) is is_tabled
+    assert same_paths(own, problem, seed)
+
+
+@pytest.mark.parametrize(
+    ("block", "stretch"), [(1, 8), (300, 8), (2000, 8), (16384, 1), (16384, 3), (400, 5)]
+)
+def test_paths_do_not_depend_on_how_numbers_and_generations_are_made_in_blocks(
+    block: int, stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(grid_planner, "BLOCK", block)
+    monkeypatch.setattr(grid_planner, "PER_CALL", stretch)
+    own = planner(mutation_rate=1.0, num_elites=2)
+    assert same_paths(own, solvable((9, 9), 0.3, 4, own), 6)
 
 
 def test_paths_that_are_near_but_do_not_meet_are_crossed_the_same() -> None:
@@ -99,7 +119,6 @@ def same_postures(planner: Any, problem: Any, seed: int) -> bool:
     return True
 
 
-@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("words", "changes"),
     [
@@ -108,6 +127,7 @@ def same_postures(planner: Any, problem: Any, seed: int) -> bool:
         (("scenario=chen_docking_link", "objective=chen_obstacle_link"), {"population_size": 31}),
         (("planner.coding=gray",), {"crossover_rate": 1.0, "mutation_rate": 0.0}),
         (("planner.bits_per_gene=5",), {"mutation_rate": 1.0, "scaling_multiple": 1.5}),
+        (("planner.bits_per_gene=52", "planner.coding=gray"), {"mutation_rate": 0.05}),
     ],
     ids=str,
 )
@@ -118,3 +138,14 @@ def test_generations_of_postures_are_the_same(
     planner, problem = prepared(*words)
     ga = planner.ga.model_copy(update={"num_generations": 30} | changes)
     assert same_postures(planner.model_copy(update={"ga": ga}), problem, seed)
+
+
+@pytest.mark.parametrize(("block", "stretch"), [(1, 16), (500, 16), (8192, 1), (700, 3)])
+def test_postures_do_not_depend_on_how_numbers_and_generations_are_made_in_blocks(
+    block: int, stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(placement_planner, "BLOCK", block)
+    monkeypatch.setattr(placement_planner, "PER_CALL", stretch)
+    planner, problem = prepared()
+    ga = planner.ga.model_copy(update={"num_generations": 20, "num_elites": 2})
+    assert same_postures(planner.model_copy(update={"ga": ga}), problem, 3)

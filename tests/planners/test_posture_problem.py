@@ -1,196 +1,241 @@
-"""What a posture search refuses, each in one line that names the field."""
+"""Goals of posture searches, scenes without obstacles, and what is refused in one line."""
 
-import re
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
-from posture_samples import condition, prepared, random_postures
 
 from composed import composed
-from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
+from evoexp.objectives.posture_cost import AXIAL, COLLISION, DISTANCE, HEADING
+from evoexp.planners.posture_es.kernels import COST
 from evoexp.planners.posture_es.problem import reach
-from evoexp.records import generations
-from evoexp.robots.poses import frame_poses
+from evoexp.records import FloatArray
+from planners.runs import ran
 
-BALL, PICK = "experiment=corsepius_ball", "experiment=corsepius_pick_and_place"
-POINT = "[{name: a, goal: {kind: point, point: [0.4, 0.2, 0.7]}}]"
-
-
-def phases(text: str) -> str:
-    return f"scenario.phases={text}"
+BALL, BOTTLE, WALL = "corsepius_ball", "corsepius_bottle", "corsepius_wall"
+PICK, WIDE = "corsepius_pick_and_place", "corsepius_gate_wide"
+POINT = "kind: point, point: [0.4,0.2,0.7]"
+FAR = "kind: point, point: [2,0,0.6]"
 
 
-@pytest.mark.examples(6)
-@pytest.mark.parametrize(
-    ("overrides", "message"),
-    [
-        (["planner.scope=0"], "planner.scope: must be greater than 0.0, was 0"),
-        (
-            ["planner.scope=[0.1,0.1]"],
-            "planner.scope: must be one number, or one per joint (6), was [0.1, 0.1]",
-        ),
-        (["planner.scope=[0.1,0.1,0.1,0.1,0.1,0]"], "planner.scope"),
-        (["scenario.q_start=[0,0]"], "scenario.q_start: must be one value per joint (6), was 2"),
-        (
-            ["scenario.q_start=[0,90,0,0,0,0]"],
-            "scenario.q_start[1]: must be within the joint's limits, -200 to 20, was 90.0",
-        ),
-        (
-            ["scenario.obstacles.0.center=[0.3,0.1,0.88]"],
-            "scenario.q_start: must be free of collision (finger_right and ball overlap by 0.019",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")],
-            "scenario.phases[0].goal.point: must be within reach, 0.8936 m from (0, 0, 0.6) "
-            "(check_reach=false",
-        ),
-        (
-            ["scenario.obstacles.0.center=[3,0,0]"],
-            "scenario.phases[0].goal.object: must be within reach, 0.8936 m from",
-        ),
-        (["scenario.subgoals=[[0,0,3]]"], "scenario.subgoals[0]: must be within reach"),
-        (
-            [phases("[{name: a, goal: {kind: surface, object: bal}}]")],
-            "scenario.phases[0].goal.object: must be the name of an obstacle (ball), was 'bal'; "
-            "did you mean 'ball'?",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: pose, point: [0.4,0.2,0.7], rotation: [0,0,0]}}]")],
-            "scenario.phases[0].goal: must be a point, since no goal_angle rates its "
-            "orientation, was 'pose'",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: places}}]")],
-            "scenario.phases[0].goal: must be one of 'point', 'pose', 'surf",
-        ),
-        (
-            ["objective=corsepius_pose"],
-            "scenario.phases[0].goal: must be a pose, since goal_angle rates its orientation",
-        ),
-        (
-            ["objective=corsepius_grasp"],
-            "scenario.phases[0].goal.object: must be a cylinder or capsule, since axial_approach "
-            "rates its axis",
-        ),
-        (
-            ["objective=corsepius_grasp", phases(POINT)],
-            "scenario.phases[0].goal: must be the surface of an object, since axial_approach "
-            "rates the way to it",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, terms: [upright]}]")],
-            "scenario.phases[0].terms[0]: must be a term that the objective gives a weight",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, terms: [uprigth]}]")],
-            "scenario.phases[0].terms[0]: must be a cost term",
-        ),
-        (
-            [
-                phases(
-                    "[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, contacts: [[hand, "
-                    "bal]]}]"
-                ),
-                "scenario.allowed_penetration=0.001",
-            ],
-            "scenario.phases[0].contacts[0]: must be names of bodies or obstacles (column, "
-            "shoulder",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, then: detach}]")],
-            "scenario.phases[0].then: must be attach in a phase before, was 'detach'",
-        ),
-        (
-            [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, then: attach}]")],
-            "scenario.phases[0].object: must be given with then: attach, and only then, was None",
-        ),
-        (["+scenario.up=[0,0,0]"], "scenario.up: must be a direction, not (0, 0, 0)"),
-        (
-            ["+objective.goal_anglee.weight=1"],
-            "objective.goal_anglee: unknown setting; did you mean 'goal_angle'?",
-        ),
-        (
-            ["objective.goal_distance.weight=0"],
-            "objective.goal_distance.weight: must be greater than 0.0, was 0",
-        ),
-        (
-            ["+objective.goal_distance.unit=rad"],
-            "objective.goal_distance.unit: must be one of 'length', was 'rad'",
-        ),
-        (
-            ["~objective.goal_distance"],
-            "objective.goal_distance: must be given: every goal is a place, was None",
-        ),
-        (
-            ["ga.num_parents=101"],
-            "ga.num_parents: must be at most num_offspring (100) with comma selection, was 101",
-        ),
-        (
-            ["robot.joints.0.limits=[10,-10]"],
-            "robot.joints[0].limits: must be [least, greatest] with least < greatest",
-        ),
-        (["robot=two_planar_2r"], "robot: must be one arm, was '2 arms'"),
-        (
-            ["scenario=lavoie_7dof"],
-            "scenario: must be one that posture_es takes (PostureTask or MoveitTask), was "
-            "'pick_and_place'",
-        ),
-        (["collision=rana_planar"], "collision"),
-    ],
-)
-def test_refusals(overrides: list[str], message: str) -> None:
-    with pytest.raises(EvoexpError, match=re.escape(message)) as found:
-        composed(BALL, *overrides).prepare()
-    assert "\n" not in str(found.value)
+def phases(goal: str, rest: str = "") -> str:
+    """Return a task of one phase."""
+    return f"scenario.phases=[{{name: a, goal: {{{goal}}}{rest}}}]"
+
+
+def prepared(name: str, *overrides: str) -> Any:
+    return composed(f"experiment={name}", *overrides).prepare().problem
+
+
+def random_postures(problem: Any, count: int) -> FloatArray:
+    """Return postures within the limits, (nq, count)."""
+    low, high = problem.limits.T
+    return np.random.default_rng(0).uniform(low, high, (count, len(low))).T.copy()
+
+
+def judged(problem: Any, q: FloatArray) -> FloatArray:
+    """Return the terms of postures in the first phase."""
+    rows: FloatArray = problem.begin(0, problem.start, problem.first_situation).judge(q).rows
+    return rows
+
+
+def tools(problem: Any, q: FloatArray) -> FloatArray:
+    """Return the tool's places by Pinocchio, (postures, 3)."""
+    model, tool = problem.assembly.model, problem.assembly.tools[0]
+    data, places = model.createData(), []
+    for one in q.T:
+        pin.forwardKinematics(model, data, one.copy())
+        places.append(data.oMi[tool.joint].act(np.asarray(tool.position)))
+    return np.array(places)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+def test_a_ball_around_a_point_is_met_at_its_surface(radius: float) -> None:
+    problem = prepared(WIDE, f"scenario.phases.0.goal.radius={radius}")
+    q = random_postures(problem, 300)
+    away = np.linalg.norm(tools(problem, q) - [1.35, 0.15, 0.8], axis=1)
+    assert judged(problem, q)[DISTANCE] == pytest.approx(away - radius, abs=1e-12)
+
+
+def test_a_place_is_a_disc() -> None:
+    problem = prepared(BALL, phases("kind: place, point: [0.4, 0.2, 0.7], radius: 0.06"))
+    q = random_postures(problem, 300)
+    away = tools(problem, q) - [0.4, 0.2, 0.7]
+    beside = np.maximum(np.hypot(away[:, 0], away[:, 1]) - 0.06, 0.0)
+    expected = np.hypot(beside, away[:, 2])
+    assert np.abs(judged(problem, q)[DISTANCE]) == pytest.approx(expected, abs=1e-9)
+
+
+def test_of_two_grasping_angles_the_larger_one_alone_may_count() -> None:
+    both, larger = prepared(BOTTLE), prepared(BOTTLE, "objective.grasp_angles=larger")
+    q = random_postures(both, 200)
+    one, two = judged(both, q), judged(larger, q)
+    free = one[COLLISION] == 0.0
+    assert one[:COST] == pytest.approx(two[:COST])
+    less = 0.15 * np.minimum(one[AXIAL], one[HEADING])
+    assert (one[COST] - two[COST])[free] == pytest.approx(less[free])
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        (
-            "hand",
-            "scenario.obstacles[1].name: must be a name that no body of the robot has, was 'hand'",
-        ),
-        ("ground", "obstacles[1].name: must be a name that no other obstacle has, was 'ground'"),
-    ],
+    ("name", "objects"),
+    [(BOTTLE, ("bottle",)), (WIDE, ()), (WALL, ()), (PICK, ("bottle",)), (BALL, ("ball",))],
 )
-def test_names_are_told_apart(name: str, message: str) -> None:
-    overrides = ["experiment=corsepius_bottle", f"scenario.obstacles.1.name={name}"]
-    with pytest.raises(EvoexpError, match=re.escape(message)):
-        composed(*overrides).prepare()
+def test_an_empty_scene_keeps_only_objects_that_a_goal_or_a_grasp_names(
+    name: str, objects: tuple[str, ...]
+) -> None:
+    full, empty = prepared(name), prepared(name, "scenario.empty_scene=true")
+    assert empty.task.names == objects
+    assert len(empty.obstacles.kind) == len(objects)
+    one, two = (p.begin(0, p.start, p.first_situation) for p in (full, empty))
+    assert set(empty.scene_of(two).names) == {*empty.bodies.names, *objects}
+    assert all(map(np.array_equal, one.judging.aim, two.judging.aim))
 
 
-def test_one_thing_is_held_at_a_time() -> None:
-    text = (
-        "[{name: a, goal: {kind: surface, object: bottle}, then: attach, object: bottle},"
-        "{name: b, goal: {kind: surface, object: table}, then: attach, object: table}]"
+def test_an_empty_scene_is_another_condition_with_the_same_random_numbers() -> None:
+    first, second = (
+        composed(f"experiment={BOTTLE}", *more) for more in ((), ("scenario.empty_scene=true",))
     )
-    with pytest.raises(
-        EvoexpError,
-        match=re.escape("scenario.phases[1].then: must be detach before anything else is"),
-    ):
-        compose.expand([PICK, phases(text)])
+    assert first.rng(3).random() == second.rng(3).random()
+    assert first.id != second.id
 
 
 def test_goals_out_of_reach_are_searched_on_request() -> None:
-    far = phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")
-    planner, problem = prepared(
-        "corsepius_ball", far, "scenario.check_reach=false", "ga.num_generations=30"
-    )
-    last = list(generations(planner.evolve(problem, condition("corsepius_ball").rng(0))))[-1]
+    words = phases(FAR), "scenario.check_reach=false", "ga.num_generations=30"
+    last = ran(composed(f"experiment={BALL}", *words)).last
     assert not last.solved
     assert last.terms["goal_distance"] > 1.0
 
 
-@pytest.mark.examples(1)
-@pytest.mark.parametrize("name", ["corsepius_ball", "corsepius_shelf", "corsepius_gate_wide"])
+@pytest.mark.parametrize("name", [BALL, "corsepius_shelf", WIDE])
 def test_nothing_is_farther_than_the_reach(name: str) -> None:
-    _, problem = prepared(name)
+    problem = prepared(name)
     center, far = reach(problem.assembly, problem.limits)
-    q = random_postures(problem, 20000)
-    poses = np.empty((12, q.shape[1]))
-    frame_poses(problem.assembly.table.chain, *problem.tool, q, poses)
-    away = np.linalg.norm(poses[9:].T - center, axis=1)
-    assert away.max() <= far + 1e-12
-    assert away.max() > 0.5 * far
+    away = np.linalg.norm(tools(problem, random_postures(problem, 5000)) - center, axis=1)
+    assert 0.5 * far < away.max() <= far + 1e-12
+
+
+GOAL, PHASE = "scenario.phases[0].goal", "scenario.phases[0]"
+GRASP = "objective=corsepius_grasp"
+HELD = ", then: attach, object: bottle}, {name: b, goal: {kind: surface, object: table}"
+HELD = phases("kind: surface, object: bottle", f"{HELD}, then: attach, object: table")
+REFUSALS = [
+    (BALL, ["planner.scope=0"], "planner.scope: must be greater than 0.0, was 0"),
+    (BALL, ["planner.scope=[0.1,0.1]"], "planner.scope: must be one number, or one per joint (6)"),
+    (BALL, ["planner.scope=[0.1,0.1,0.1,0.1,0.1,0]"], "planner.scope"),
+    (BALL, ["scenario.q_start=[0,0]"], "scenario.q_start: must be one value per joint (6), was 2"),
+    (BALL, ["scenario.q_start=[0,90,0,0,0,0]"], "scenario.q_start[1]: must be within the joint's"),
+    (
+        BALL,
+        ["scenario.obstacles.0.center=[0.3,0.1,0.88]"],
+        "(finger_right and ball overlap by 0.019",
+    ),
+    (
+        BALL,
+        [phases(FAR)],
+        f"{GOAL}.point: must be within reach, 0.8936 m from (0, 0, 0.6) (check_r",
+    ),
+    (BALL, ["scenario.obstacles.0.center=[3,0,0]"], f"{GOAL}.object: must be within reach, 0.8936"),
+    (BALL, ["scenario.subgoals=[[0,0,3]]"], "scenario.subgoals[0]: must be within reach"),
+    (
+        BALL,
+        [phases("kind: surface, object: bal")],
+        f"{GOAL}.object: must be the name of an obstacle",
+    ),
+    (BALL, [phases("kind: surface, object: bal")], "(ball), was 'bal'; did you mean 'ball'?"),
+    (
+        BALL,
+        [phases("kind: pose, point: [0.4,0.2,0.7], rotation: [0,0,0]")],
+        "must be a point, since",
+    ),
+    (BALL, [phases("kind: places")], f"{GOAL}: must be one of 'point', 'pose', 'surf"),
+    (
+        BALL,
+        ["objective=corsepius_pose"],
+        f"{GOAL}: must be a pose, since goal_angle rates its orien",
+    ),
+    (BALL, [GRASP], f"{GOAL}.object: must be a cylinder or capsule, since axial_approach rates"),
+    (
+        BALL,
+        [GRASP, phases(POINT)],
+        f"{GOAL}: must be the surface of an object, since axial_approach",
+    ),
+    (
+        BALL,
+        [phases(POINT, ", terms: [upright]")],
+        f"{PHASE}.terms[0]: must be a term that the object",
+    ),
+    (BALL, [phases(POINT, ", terms: [uprigth]")], f"{PHASE}.terms[0]: must be a cost term"),
+    (
+        BALL,
+        [phases(POINT, ", contacts: [[hand, bal]]"), "scenario.allowed_penetration=0.001"],
+        f"{PHASE}.contacts[0]: must be names of bodies or obstacles (column, shoulder",
+    ),
+    (BALL, [phases(POINT, ", then: detach")], f"{PHASE}.then: must be attach in a phase before"),
+    (
+        BALL,
+        [phases(POINT, ", then: attach")],
+        f"{PHASE}.object: must be given with then: attach, and",
+    ),
+    (BALL, ["+scenario.up=[0,0,0]"], "scenario.up: must be a direction, not (0, 0, 0)"),
+    (BALL, ["+objective.goal_anglee.weight=1"], "unknown setting; did you mean 'goal_angle'?"),
+    (BALL, ["objective.goal_distance.weight=0"], "goal_distance.weight: must be greater than 0.0"),
+    (BALL, ["+objective.goal_distance.unit=rad"], "unit: must be one of 'length', was 'rad'"),
+    (
+        BALL,
+        ["~objective.goal_distance"],
+        "objective.goal_distance: must be given: every goal is a pl",
+    ),
+    (
+        BALL,
+        ["ga.num_parents=101"],
+        "ga.num_parents: must be at most num_offspring (100) with comma",
+    ),
+    (BALL, ["robot.joints.0.limits=[10,-10]"], "robot.joints[0].limits: must be [least, greatest]"),
+    (BALL, ["robot=two_planar_2r"], "robot: must be one arm, was '2 arms'"),
+    (
+        BALL,
+        ["scenario=lavoie_7dof"],
+        "scenario: must be one that posture_es takes (PostureTask or Mo",
+    ),
+    (BALL, ["collision=rana_planar"], "collision"),
+    (
+        BOTTLE,
+        ["scenario.obstacles.1.name=hand"],
+        "must be a name that no body of the robot has, was",
+    ),
+    (
+        BOTTLE,
+        ["scenario.obstacles.1.name=ground"],
+        "must be a name that no other obstacle has, was",
+    ),
+    (PICK, [HELD], "scenario.phases[1].then: must be detach before anything else is"),
+    (PICK, ["~scenario.allowed_penetration"], "must be given: phases[1].contacts allows contacts"),
+    (
+        PICK,
+        ["scenario.allowed_penetration=0"],
+        "allowed_penetration: must be greater than 0.0, was",
+    ),
+    (
+        PICK,
+        ["scenario.phases.4.scope_share=2"],
+        "phases[4].scope_share: must be at most 1.0, was 2",
+    ),
+    (
+        WALL,
+        ["+scenario.phases.0.upright_tolerance=1"],
+        f"{PHASE}.upright_tolerance: must be left out in a phase whose terms do not count upright",
+    ),
+]
+
+
+@pytest.mark.examples(8)
+@pytest.mark.parametrize(("name", "overrides", "message"), REFUSALS)
+def test_what_cannot_be_is_refused_in_one_line(
+    name: str, overrides: list[str], message: str
+) -> None:
+    with pytest.raises(EvoexpError) as refusal:
+        prepared(name, *overrides)
+    assert message in str(refusal.value)
+    assert "\n" not in str(refusal.value)

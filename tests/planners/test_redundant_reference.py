@@ -66,11 +66,10 @@ def largest_difference(given: Any, seed: int) -> tuple[float, set[int]]:
             best,
         ]:
             largest = max(largest, float(np.abs(np.subtract(one, two)).max(initial=0.0)))
-    assert count > 25
+    assert count > 2
     return largest, searched
 
 
-@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "changes",
     [
@@ -81,6 +80,9 @@ def largest_difference(given: Any, seed: int) -> tuple[float, set[int]]:
         {"mutation": "uniform_reset", "mutation_scope": "individual", "population_size": 31},
         {"mutation_scope": "individual", "collision": {"swept": "none", "num_positions": 4}},
         {"success": "finite", "num_attempts": 3},
+        {"num_generations": 0, "num_attempts": 3},
+        {"crossover_rate": 1.0, "mutation_rate": 1.0},
+        {"crossover_rate": 0.0, "mutation_rate": 0.0, "num_elites": 0},
     ],
     ids=str,
 )

@@ -13,14 +13,15 @@ import pytest
 
 from composed import composed
 from evoexp.condition import Condition
+from evoexp.planners.coevolution import generations as team_generations
 from evoexp.records import generations
 from references import curkovic_numpy
 
 ROUNDING = 1e-12  # relative, of costs; measured: 5e-15
-METHODS = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII")
+METHODS, THREE = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII"), "curkovic_three"
 DISC = {"shape": "sphere", "center": [0.2, 0.45], "radius": 0.05}
 DISCS = [DISC, {"shape": "sphere", "center": [0.6, 0.25], "radius": 0.04}]
-SMALL = {"ga.population_size": 16, "ga.num_generations": 25, "ga.hall_depth": 0.25}
+SMALL: dict[str, Any] = {"ga.population_size": 16, "ga.num_generations": 25, "ga.hall_depth": 0.25}
 
 
 def condition(
@@ -67,7 +68,7 @@ def compare(given: Condition, seed: int) -> dict[str, int]:
     return events
 
 
-@pytest.mark.examples(2)
+@pytest.mark.examples(4)
 @pytest.mark.parametrize("method", METHODS)
 def test_the_papers_methods_agree(method: str) -> None:
     events = compare(condition({"ga.num_generations": 15}, label=method), 0)
@@ -75,7 +76,6 @@ def test_the_papers_methods_agree(method: str) -> None:
     assert events["feasible"] > 0
 
 
-@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "changes",
     [
@@ -90,32 +90,38 @@ def test_the_papers_methods_agree(method: str) -> None:
         {"collision.collision_substeps": 3},
         {"chromosome_length": 2},
         {"ga.population_size": 13, "ga.crossover_rate": 1.0},
-        {
-            "objective.collision_weight": 0.5,
-            "objective.path_weight": 2.0,
-            "objective.rotation_weight": 0.3,
-            "objective.evenness_weight": 4.0,
-        },
+        {"ga.population_size": 13, "ga.num_elites": 9},
+        {"ga.num_generations": 0},
+        {"objective.collision_weight": 0.5, "objective.path_weight": 2.0},
+        {"objective.rotation_weight": 0.3, "objective.evenness_weight": 4.0},
         {"scenario.obstacles": DISCS},
     ],
     ids=lambda changes: " ".join(changes),
 )
 def test_variants_agree(changes: dict[str, Any]) -> None:
-    for seed in range(3):
+    for seed in range(2):
         events = compare(condition(SMALL | changes), seed)
         assert events["collisions"] > 0
         assert (events["contacts"] > 0) is ("scenario.obstacles" in changes)
 
 
-@pytest.mark.examples(1)
+@pytest.mark.parametrize("length", [1, 3, 100])
+def test_the_number_of_generations_per_call_changes_nothing(
+    length: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(team_generations, "per_call", lambda robots, count: length)
+    compare(condition(SMALL), 2)
+
+
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("discs", [[], [DISC]], ids=["free", "beside a disc"])
-def test_three_robots_agree(discs: list[Any]) -> None:
+@pytest.mark.parametrize("label", ["configurations only", "5 substeps"])
+def test_three_robots_agree(label: str, discs: list[Any]) -> None:
     changes = SMALL | {"ga.num_elites": 1, "scenario.obstacles": discs}
-    for label in ("configurations only", "5 substeps"):
-        events = compare(condition(changes, "curkovic_three", label), 3)
-        assert events["collisions"] > 0
-        assert events["feasible"] > 0
-        assert (events["contacts"] > 0) is bool(discs)
+    events = compare(condition(changes, THREE, label), 3)
+    assert events["collisions"] > 0
+    assert events["feasible"] > 0
+    assert (events["contacts"] > 0) is bool(discs)
 
 
 @pytest.mark.parametrize("distinct", ["genome", "index"])
@@ -127,5 +133,5 @@ def test_a_robot_that_stands_still_agrees(distinct: str) -> None:
 def test_restarts_agree() -> None:
     """Two individuals rarely make a team: fresh populations are drawn, the hall is emptied."""
     changes = {"ga.population_size": 2, "ga.hall_depth": 0.5, "ga.restart_after": 2}
-    three = condition(changes | {"ga.num_generations": 40}, "curkovic_three", "5 substeps")
+    three = condition(changes | {"ga.num_generations": 40}, THREE, "5 substeps")
     assert sum(compare(three, seed)["restarts"] for seed in range(3)) > 3

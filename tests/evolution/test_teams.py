@@ -1,0 +1,95 @@
+"""Best teams and teams around members of a front, beside the slow co-evolution's."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoexp.evolution.best_team import best_team
+from evoexp.evolution.hall_of_fame import Hall, gather_teams
+from references.curkovic_numpy import Judged, formed
+
+NOTHING: Any = None
+
+
+def world(seed: int, num: int, size: int, free: float, ties: bool) -> Judged:
+    """Draw a generation; `ties` makes many costs and sums of costs equal."""
+    rng = np.random.default_rng(seed)
+    hits = {
+        pair: rng.integers(1, 5, (size, size)) * (rng.random((size, size)) > free)
+        for pair in itertools.combinations(range(num), 2)
+    }
+    own = rng.integers(1, 5, (num, size)).astype(float) if ties else rng.uniform(1, 5, (num, size))
+    return Judged(NOTHING, NOTHING, own, hits, NOTHING)
+
+
+def collisions_of(judged: Judged) -> np.ndarray:
+    return np.array(list(judged.hits.values())).astype(np.int16)
+
+
+@given(st.integers(0, 10_000), st.sampled_from([2, 3, 4]), st.integers(1, 7), st.booleans())
+@settings(deadline=None)
+def test_teams_are_formed_as_defined(seed: int, num: int, size: int, ties: bool) -> None:
+    judged = world(seed, num, size, 0.4, ties)
+    front = np.random.default_rng(seed).random((num, size)) < 0.4
+    teams = Hall.room(int(front.sum()), num)
+    assert gather_teams(collisions_of(judged), judged.own, front, teams) == len(teams.teams)
+    expected = [formed(judged, r, i) for r, i in np.argwhere(front).tolist()]
+    assert [tuple(team) for team in teams.teams] == expected
+    keys = [judged.key(team) for team in expected]
+    assert list(zip(teams.collisions, teams.costs, strict=True)) == keys
+
+
+@given(st.integers(0, 10_000), st.sampled_from([2, 3, 4]), st.integers(1, 5), st.booleans())
+@settings(deadline=None)
+def test_best_team_is_the_best_of_all(seed: int, num: int, size: int, ties: bool) -> None:
+    judged = world(seed, num, size, (0.0, 0.1, 0.5, 1.0)[seed % 4], ties)
+    keys = {team: judged.key(team) for team in itertools.product(range(size), repeat=num)}
+    costs = [(cost, team) for team, (hits, cost) in keys.items() if hits == 0]
+    cost, team = min(costs, default=(np.inf, (-1,) * num))
+    found = best_team(collisions_of(judged), judged.own)
+    assert (tuple(found.individuals), found.cost) == (team, cost)
+    assert found.found == (cost < np.inf)
+
+
+@pytest.mark.parametrize("size", [37, 100])
+@pytest.mark.parametrize("free", [0.002, 0.05, 0.6])
+@pytest.mark.parametrize("ties", [False, True])
+def test_best_pair_of_large_populations(size: int, free: float, ties: bool) -> None:
+    judged = world(size, 2, size, free, ties)
+    sums = np.where(judged.hits[0, 1] == 0, judged.own[0][:, None] + judged.own[1], np.inf)
+    i, j = np.unravel_index(np.argmin(sums), sums.shape)  # the first in lexicographic order
+    found = best_team(collisions_of(judged), judged.own)
+    assert (found.individuals.tolist(), found.cost) == ([i, j], sums[i, j])
+
+
+SMALL = 2.0**-53  # 1 + SMALL == 1
+
+
+@pytest.mark.parametrize(
+    ("own", "team"),
+    [
+        ([[SMALL, 0.0, 1.0], [1.0, 3.0, 3.0]], [0, 0]),  # sums that only rounding makes equal
+        ([[SMALL, 0.0], [0.0, SMALL], [1.0, 1.0]], [0, 0, 0]),
+        ([[np.inf, 2.0], [1.0, np.inf]], [1, 0]),
+        ([[np.inf, np.inf], [1.0, 2.0], [1.0, 2.0]], [-1, -1, -1]),
+    ],
+)
+def test_edges_of_costs(own: list[list[float]], team: list[int]) -> None:
+    costs = np.array(own)
+    num, size = costs.shape
+    free = np.zeros((num * (num - 1) // 2, size, size), dtype=np.int16)
+    assert best_team(free, costs).individuals.tolist() == team
+
+
+@pytest.mark.parametrize(
+    ("collisions", "own"), [((1, 4, 5), (2, 5)), ((1, 5, 5), (3, 5)), ((0, 5, 5), (1, 5))]
+)
+def test_arrays_that_do_not_match_are_errors(
+    collisions: tuple[int, ...], own: tuple[int, ...]
+) -> None:
+    with pytest.raises(ValueError, match="do not match"):
+        best_team(np.zeros(collisions, dtype=np.int16), np.ones(own))

@@ -1,0 +1,170 @@
+"""Kernels on strings of via-points: redistribution, relaxation, lengths, configurations between."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoexp.paths.interpolation import interpolate_linear
+from evoexp.paths.lengths import measure_paths
+from evoexp.paths.workspace import prepare_redistribution
+from evoexp.records import FloatArray
+from paths.string_operators import redistribute, relax
+
+ENDS = ["natural", "clamped"]
+SEEDS = st.integers(0, 2**32 - 1)
+ARMS = np.array([[0, 2], [2, 5], [5, 6], [6, 12]])
+DENSE = 512  # sub-intervals per segment, with Gauss's four points on each
+
+
+def strings(seed: int, nq: int, num: int, lanes: int, scale: float = 100.0) -> FloatArray:
+    """Random strings: the hardest paths there are, with cusps and loops at every point."""
+    return np.random.default_rng(seed).uniform(0.0, scale, (nq, num + 1, lanes))
+
+
+def redistributed(path: FloatArray, end: Any) -> FloatArray:
+    """Return the points (N + 1, joints) at equal arc length along scipy's spline through `path`."""
+    num = len(path) - 1
+    spline = scipy.interpolate.CubicSpline(np.arange(num + 1), path, bc_type=end)
+    edges = np.arange(num * DENSE + 1) / DENSE
+    pieces = np.zeros(num * DENSE)
+    for node, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True):
+        at = edges[:-1] + (node + 1) / 2 / DENSE
+        pieces += weight / 2 / DENSE * np.linalg.norm(spline(at, 1), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(pieces)])
+    inner = np.interp(np.arange(1, num) * length[-1] / num, length, edges)
+    return np.vstack([path[0], spline(inner), path[-1]])
+
+
+def moved(
+    given: FloatArray, arms: Any, lanes: int, end: Any = "natural", samples: int = 8
+) -> FloatArray:
+    """Return the strings of the first lanes redistributed, arm by arm."""
+    out, slices = given.copy(), np.array(arms, dtype=np.int64)
+    joints = int(np.diff(slices).max())
+    workspace = prepare_redistribution(given.shape[1] - 1, joints, end, samples)
+    redistribute(out, slices, lanes, workspace)
+    return out
+
+
+# Root mean square and largest error, twice the worst measured over N and end condition. The points
+# are random, so that every path turns sharply everywhere; with one joint it stops dead wherever it
+# turns, and the rule is of second order.
+BOUNDS = {
+    ("several", 8): (7e-3, 4e-2), ("several", 16): (1.2e-3, 7e-3), ("several", 128): (8e-6, 1e-4),
+    ("one", 8): (3.5e-2, 1.1e-1), ("one", 16): (9e-3, 3e-2), ("one", 128): (1.4e-4, 5e-4),
+}  # fmt: skip
+
+
+@pytest.mark.examples(12)
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize(("joints", "samples"), BOUNDS)
+@pytest.mark.parametrize("num", [2, 3, 20, 40])
+def test_points_are_those_of_scipys_spline_at_equal_arc_length(
+    num: int, joints: str, samples: int, end: str
+) -> None:
+    given = strings(num, 12, num, 16)
+    given[:, :, 3] = np.cumsum(given[:, :, 3] - 40.0, axis=1)  # a path that hardly turns
+    found = moved(given, ARMS, 16, end, samples)
+    errors = []  # in units of the mean spacing
+    for first, stop in ARMS:
+        if (stop - first > 1) == (joints == "several"):
+            for lane in range(16):
+                truth = redistributed(given[first:stop, :, lane].T, end)
+                spacing = np.linalg.norm(np.diff(truth, axis=0), axis=1).mean()
+                away = np.linalg.norm(found[first:stop, :, lane].T - truth, axis=1)
+                errors.append(away / spacing)
+    mean, largest = BOUNDS[joints, samples]
+    assert np.sqrt(np.mean(np.square(errors))) < mean
+    assert np.max(errors) < largest
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    num=st.integers(1, 45), joints=st.lists(st.integers(1, 6), min_size=1, max_size=3), seed=SEEDS,
+    scale=st.sampled_from([1e-9, 1e-3, 1.0, 1e6]), end=st.sampled_from(ENDS),
+    samples=st.sampled_from([8, 16, 32]),
+)  # fmt: skip
+def test_ends_keep_their_bits_points_stay_finite_and_other_joints_alone(
+    num: int, joints: list[int], seed: int, scale: float, end: str, samples: int
+) -> None:
+    stops = np.cumsum(joints)
+    given = strings(seed, int(stops[-1]) + 1, num, 16, scale)
+    found = moved(given, np.stack([stops - joints, stops], axis=1), 16, end, samples)
+    assert np.array_equal(found[:, [0, -1]], given[:, [0, -1]])
+    assert np.array_equal(found[-1], given[-1])  # a joint of no arm
+    assert np.isfinite(found).all()
+    assert np.array_equal(found, given) == (num == 1)
+
+
+@pytest.mark.parametrize("garbage", [0.0, 1e155, -1e300, 1e308, np.inf, np.nan])
+@pytest.mark.parametrize("num_lanes", [1, 9, 50])
+def test_a_lane_depends_neither_on_its_place_nor_on_padding(num_lanes: int, garbage: float) -> None:
+    given, arms = strings(7, 5, 20, 56), [[0, 2], [2, 5]]
+    dirty, order = given.copy(), np.random.default_rng(0).permutation(56)
+    dirty[:, ::2, num_lanes:] = garbage
+    clean, found = moved(given, arms, 56), moved(dirty, arms, num_lanes)
+    assert np.array_equal(found[:, :, :num_lanes], clean[:, :, :num_lanes])
+    assert np.isfinite(found).all() or not np.isfinite(garbage)
+    rest = -(-num_lanes // 8) * 8
+    assert np.array_equal(found[:, :, rest:], dirty[:, :, rest:], equal_nan=True)
+    permuted = np.ascontiguousarray(given[:, :, order])
+    assert np.array_equal(moved(permuted, arms, 56), clean[:, :, order])
+
+
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("value", [0.0, -0.0, 0.1, 315.0])
+def test_a_path_without_length_stays_bit_for_bit(value: float, end: str) -> None:
+    given = strings(3, 3, 20, 8)
+    given[:, :, 5] = value
+    found = moved(given, [[0, 2], [2, 3]], 8, end)
+    assert np.array_equal(found[:, :, 5].view(np.int64), given[:, :, 5].view(np.int64))
+    assert not np.array_equal(found[:, :, 4], given[:, :, 4])
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=SEEDS, delta=st.floats(0.0, 1.0), num=st.integers(1, 30))
+def test_relaxation_is_the_papers_loop_bit_for_bit(seed: int, delta: float, num: int) -> None:
+    expected = strings(seed, 3, num, 24)
+    found = expected.copy()
+    found[:, :, 20:] = np.nan  # padding
+    relax(found, delta, 20)
+    for i in range(1, num):
+        before = (expected[:, i - 1] + expected[:, i + 1]) / 2  # Eqs. 8 and 9
+        expected[:, i] = expected[:, i] + delta * (before - expected[:, i])
+    assert np.array_equal(found[:, :, :20], expected[:, :, :20])
+
+
+@pytest.mark.parametrize("num", [1, 2, 20])
+def test_lengths_and_unevenness_are_the_sums_of_the_paper(num: int) -> None:
+    via_points = strings(num, 12, num, 16)
+    via_points[:, :, 3] = 7.0  # a path without length
+    lengths, unevenness = np.full((2, len(ARMS), 16), np.nan)
+    measure_paths(via_points, ARMS, lengths, unevenness)
+    for arm, (first, stop) in enumerate(ARMS):
+        for lane in range(16):
+            path = via_points[first:stop, :, lane].T
+            steps = [math.dist(path[i], path[i - 1]) for i in range(1, num + 1)]
+            uneven = sum(abs(step - sum(steps) / num) for step in steps)
+            assert lengths[arm, lane] == pytest.approx(sum(steps), rel=1e-13)
+            assert unevenness[arm, lane] == pytest.approx(uneven, rel=1e-12, abs=1e-10)
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 3, 10])
+@pytest.mark.parametrize("num", [1, 20])
+def test_configurations_are_at_the_fractions_of_each_segment(num: int, substeps: int) -> None:
+    via_points = strings(num, 4, num, 16, 300.0)
+    found = interpolate_linear(via_points, substeps)
+    at = np.arange(1, num * substeps + 1) / substeps
+    expected = np.apply_along_axis(lambda row: np.interp(at, range(num + 1), row), 1, via_points)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)  # 20 roundings at 600
+    assert np.array_equal(found[:, substeps - 1 :: substeps], via_points[:, 1:])
+
+
+def test_fewer_than_one_substep_is_refused() -> None:
+    with pytest.raises(ValueError, match="substeps"):
+        interpolate_linear(np.zeros((2, 3, 8)), 0)

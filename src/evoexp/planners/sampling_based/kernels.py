@@ -236,29 +236,27 @@ def place_on_path(
 
 
 @kernel
-def shortcut(
-    num_free: Any,
-    tables: Any,
-    path: FloatArray,
-    lengths: FloatArray,
-    ends: FloatArray,
-    resolution: float,
-) -> tuple[FloatArray, FloatArray, int, int]:
-    """Try straight lines between places of a path, until one makes it shorter.
+def shortcuts(
+    num_free: Any, tables: Any, path: FloatArray, ends: FloatArray, resolution: float
+) -> tuple[FloatArray, IntArray, FloatArray, int]:
+    """Try straight lines between places of a path, one after the other.
 
     A line begins and ends at the tested configurations next to its places.
 
     Args:
         path: (nodes, nq) [deg].
-        lengths: (nodes,) of `lengths_along`.
-        ends: (lines, 2) the places, as shares of the length.
+        ends: (lines, 2) the places, as shares of the length of the path in hand.
 
     Returns:
-        The path and its lengths, new ones where it became shorter; how many lines were tried;
-        configurations asked for.
+        All nodes of the shorter paths that were found, path by path; how many nodes each has; the
+        length after each line, (lines,); configurations asked for.
     """
-    asked = 0
+    most = len(path) + 2 * len(ends)  # nodes: a line adds two
+    found, count, asked = np.empty((most * len(ends), path.shape[1])), 0, 0
+    sizes, paths, after = np.empty(len(ends), dtype=np.int64), 0, np.empty(len(ends))
+    lengths = lengths_along(path)
     for line in range(len(ends)):
+        after[line] = lengths[-1]
         places = np.sort(ends[line] * lengths[-1])
         first, one = place_on_path(path, lengths, places[0], resolution)
         last, two = place_on_path(path, lengths, places[1], resolution)
@@ -270,8 +268,10 @@ def shortcut(
             is_free, more = edge_is_free(num_free, tables, one, two, resolution)
             asked += more
             if is_free:
-                return new, shorter, line + 1, asked
-    return path, lengths, len(ends), asked
+                path, lengths, after[line] = new, shorter, shorter[-1]
+                found[count : count + len(new)] = new
+                count, sizes[paths], paths = count + len(new), len(new), paths + 1
+    return found[:count].copy(), sizes[:paths].copy(), after, asked
 
 
 @kernel

@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from evoexp.planners.sampling_based.kernels import lengths_along, shortcut
+from evoexp.planners.sampling_based.kernels import lengths_along, shortcuts
 from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray
@@ -58,18 +58,15 @@ class ShortenedPath:
 
         Return its length after each [deg].
         """
-        lengths, done, edges = np.empty(len(uniforms)), 0, self._edges
-        while done < len(uniforms):
-            nodes, along, tried, asked = shortcut(
-                *edges.test, self.nodes, self.lengths, uniforms[done:], edges.resolution
-            )
-            edges.queries += asked
-            lengths[done : done + tried - 1] = self.length
-            self._take(nodes, along)
-            done += tried
-            lengths[done - 1] = self.length
+        edges = self._edges
+        nodes, sizes, after, asked = shortcuts(*edges.test, self.nodes, uniforms, edges.resolution)
+        edges.queries += asked
+        for path in np.split(nodes, np.cumsum(sizes)[:-1]) if len(sizes) else []:
+            self._before.append(self.nodes)
+            self.nodes = path
+        self.lengths = lengths_along(self.nodes)
         self.num_attempts += len(uniforms)
-        return lengths
+        return after
 
     def cut_corners(self) -> None:
         """Cut every corner whose cut is free, if all that is left of the segments is free, too."""
@@ -86,10 +83,5 @@ class ShortenedPath:
         left = [(a, b) for a, b in edges if a.tobytes() + b.tobytes() not in tested]
         lengths = lengths_along(found)
         if lengths[-1] < self.length and all(self._edges.is_free(a, b) for a, b in left):
-            self._take(found, lengths)
-
-    def _take(self, nodes: FloatArray, lengths: FloatArray) -> None:
-        """Go on with a shorter path, if it is one."""
-        if lengths[-1] < self.length:
             self._before.append(self.nodes)
-            self.nodes, self.lengths = nodes, lengths
+            self.nodes, self.lengths = found, lengths

@@ -25,7 +25,8 @@ def alone(*words: str, label: str | int = "") -> Experiment:
     if group != "experiment":
         return compose.expand(words)[0]
     settings = yaml.safe_load(Path(find("experiment", name).path).read_text())
-    if labels := settings.get("conditions"):  # else the experiment is one condition
+    if entries := settings.get("conditions"):  # else the experiment is one condition
+        labels = dict(pair for own in entries.items() for pair in compose.readings(*own))
         chosen = list(labels)[label] if isinstance(label, int) else label or next(iter(labels))
         settings["conditions"] = {chosen: labels[chosen]}
     with tempfile.TemporaryDirectory() as folder:

@@ -71,11 +71,7 @@ def read(path: Any, folders: Sequence[Path], field: str) -> str:
 
 
 def file_content(path: Any, field: str, limit: int = MAX_INPUT) -> bytes:
-    """Read a file of at most `limit` bytes, which may be one that evoexp ships.
-
-    Raises:
-        SettingError: Of the field, if it cannot be read.
-    """
+    """Read a file of at most `limit` bytes, which may be one that evoexp ships."""
     try:
         return read_bounded(located(str(path)), limit)
     except OSError as error:

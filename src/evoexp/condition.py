@@ -78,10 +78,7 @@ def _with_contents(value: Any, folders: Sequence[Path], field: str) -> Any:
 
 
 def stored_config(text: bytes) -> dict[str, Any]:
-    """Return the plain data of the canonical form that a run or a log stores.
-
-    Whether its components are installed here, in the revision that they had, is not looked at.
-    """
+    """Return the plain data of the canonical form that a run or a log stores, of any revision."""
     try:
         config = json.loads(text)
     except (ValueError, RecursionError):
@@ -117,12 +114,7 @@ class Condition(NamedTuple):
 
     @classmethod
     def from_config(cls, config: Any) -> "Condition":
-        """Build a condition from plain data with `KEYS`, the last of which may be left out.
-
-        Raises:
-            SettingError: For any value that cannot be.
-            UnknownSetting: For any key that does not exist.
-        """
+        """Build a condition from plain data with `KEYS`, the last of which may be left out."""
         if unknown := set(config) - {*KEYS}:
             raise UnknownSetting(min(unknown), KEYS)
         parts = [build(config.get(part), component_class, part, _LARGEST[part]) for part in PARTS]
@@ -196,13 +188,9 @@ class Condition(NamedTuple):
         return 1 if self.is_reference else asked
 
     def rng(self, replicate: int) -> np.random.Generator:
-        """Return the replicate's generator.
-
-        Equal seeds give equal streams to all conditions (common seeds).
-        """
-        return np.random.Generator(
-            np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(replicate,)))
-        )
+        """Return the replicate's generator: equal seeds give equal streams to all conditions."""
+        seeds = np.random.SeedSequence(self.seed, spawn_key=(replicate,))
+        return np.random.Generator(np.random.PCG64(seeds))
 
     @functools.lru_cache(maxsize=64)  # noqa: B019  # conditions are values
     def prepare(self) -> Prepared:

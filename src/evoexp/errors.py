@@ -52,19 +52,13 @@ def listed_names(known: Sequence[str], name: str) -> str:
 class SettingError(EvoexpError):
     """A setting that is refused: the field, the values it may have, the value given, a near name.
 
-    Attributes:
-        field: Dotted path of the setting, as one would type it (`ga.population_size`).
-        must: The values that the setting may have, to be read after "must be".
-        was: The value given.
-        hint: A question after a name that was perhaps meant, or empty.
+    The field is a dotted path, as one would type it (`ga.population_size`); `must` is read after
+    "must be".
     """
 
     def __init__(self, field: str, must: str, was: object, hint: str = "") -> None:
         super().__init__(f"{field}: must be {brief(must)}, was {brief(repr(was), _SHOWN)}{hint}")
-        self.field = field
-        self.must = must
-        self.was = was
-        self.hint = hint
+        self.field, self.must, self.was, self.hint = field, must, was, hint
 
 
 class UnknownSetting(EvoexpError):

@@ -37,8 +37,7 @@ _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 def read_bounded(path: str | Path, limit: int = MAX_INPUT) -> bytes:
     """Return the content of a regular file of at most `limit` bytes.
 
-    Raises:
-        OSError: If it cannot be read, is larger, or a device or pipe, which might never end.
+    OSError is also raised for a larger file, and a device or pipe, which might never end.
     """
     name = str(path)
     if "\0" in name:
@@ -133,12 +132,9 @@ def _with_points(rows: list[TableRow]) -> list[TableRow]:
 
 
 def read_npy(content: bytes) -> NDArray[Any]:
-    """Return the array of numbers that the bytes of a `.npy` file hold.
+    """Return the array of numbers that the bytes of a `.npy` file hold, or raise ValueError.
 
     Nothing is allocated before the header's shape is found to be that of the bytes behind it.
-
-    Raises:
-        ValueError: If the bytes are no such file, in one line.
     """
     if not content.startswith(npy_format.MAGIC_PREFIX):
         raise ValueError("it does not begin as one")

@@ -40,9 +40,6 @@ def mesh_content(name: str, file: Path, packages: Mapping[str, Path], field: str
     `package://NAME/REST` lies in the folder that `packages` tells for NAME; else in a directory
     above the file, with or without NAME; else in a package below `ROS_PACKAGE_PATH`. Any other
     name is a path, from the directory of the file.
-
-    Raises:
-        SettingError: If it is not there, lists the places that were tried; or if it cannot be read.
     """
     tried: list[Path] = []
     for place in _places(name, file, packages, field):

@@ -133,12 +133,7 @@ def registered(group: str, name: str) -> Registration | None:
 
 
 def component_class(name: str, field: str = TARGET) -> type[Component]:
-    """Return the class registered under a name.
-
-    Raises:
-        SettingError: If the name is not registered; a configuration cannot name other code.
-        RegistrationError: If its package registered it wrongly.
-    """
+    """Return the class registered under a name; a configuration cannot name other code."""
     registration = registered(COMPONENTS, name)
     if registration is None:
         must = "a registered component"

@@ -70,14 +70,8 @@ def rows_of(condition_id: str) -> list[Shipped]:
 
 
 def find(prefix: str) -> list[Shipped]:
-    """Return the shipped conditions whose hash begins with a prefix.
-
-    Each hash occurs once, in the smallest experiment that has it.
-    """
+    """Return the shipped conditions whose hash begins with a prefix, each in one experiment."""
     sizes = Counter((row.experiment, row.budget) for row in shipped())
-    rows = sorted(shipped(), key=lambda row: -sizes[row.experiment, row.budget])
-    return list(
-        {
-            row.condition_id: row for row in rows if row.condition_id.startswith(prefix.lower())
-        }.values()
-    )
+    rows = sorted(shipped(), key=lambda row: -sizes[row.experiment, row.budget])  # smallest last
+    named = [row for row in rows if row.condition_id.startswith(prefix.lower())]
+    return list({row.condition_id: row for row in named}.values())

@@ -91,10 +91,6 @@ def build(
         lookup: Gives the class of a registered name, whose field its error names.
         field: Dotted path of `data`, for errors.
         largest: No number may be larger than that, of either sign.
-
-    Raises:
-        SettingError: If a setting is missing, of a wrong type, out of range or contradicts another.
-        UnknownSetting: If a component has no such setting.
     """
     if isinstance(data, Mapping):
         children = {
@@ -114,10 +110,7 @@ def build(
 
 
 def _number(value: float, field: str, largest: float) -> float:
-    """Return a number (or true, or false) that kernels and libraries can reckon with.
-
-    NaN and the infinities are left to the field, which may want something else than a number.
-    """
+    """Return a number, true or false to reckon with; NaN and infinities are left to the field."""
     if isinstance(value, float):
         if largest < abs(value) < math.inf:
             raise SettingError(field, f"between -{largest:g} and {largest:g}", value)

@@ -22,7 +22,7 @@ FOREIGN = [  # the assumptions of Corsépius may be those of any planner
     page.name
     for page in registrations(REGISTERED)
     if page.module.startswith("evoexp.papers.") and "papers.rana" not in page.module
-    if page.name != "corsepius_assumptions"
+    if page.name != "corsepius_claims"
 ]
 
 

@@ -159,8 +159,8 @@ def test_a_goal_for_a_joint_that_is_none_is_refused(tmp_path: Path) -> None:
         changed(tmp_path, misspell, *VIA_POINTS).prepare()
 
 
-def test_pairs_that_the_certifier_alone_judges_are_named(shipped: dict[str, Condition]) -> None:
+def test_pairs_whose_covers_always_touch_are_named(shipped: dict[str, Condition]) -> None:
     planner, problem = shipped["box_ur5"].prepare()
     (line,) = (line for line in planner.notes(problem) if "in every posture sampled" in line)
-    assert "judged by the certifier only" in line
+    assert "tested by maps of exact distances" in line
     assert "forearm_link with wrist_2_link" in line

@@ -11,7 +11,7 @@ from planners.grid_samples import planner, solvable
 from references.test_grid_frontier import SETTINGS, all_simple_paths, path_cost
 from shipped_conditions import expanded
 
-EXPERIMENTS = ("chen_path", "chen_lingering", "chen_assumptions")
+EXPERIMENTS = ("chen_path", "chen_lingering", "chen_claims")
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +19,8 @@ def script() -> Any:
     return composed.script("update-grid-truths")
 
 
-def reference(label: str, experiment: str = "chen_path") -> Any:
-    return dict(expanded(experiment, "paper").conditions)[f"{label}, exact"].prepare()
+def reference(label: str) -> Any:
+    return dict(expanded("chen_path", "paper").conditions)[f"{label}, exact"].prepare()
 
 
 def test_the_best_path_of_a_shipped_map_is_a_path_and_no_bound_is_above_it() -> None:
@@ -63,7 +63,8 @@ def test_every_shipped_map_is_known_and_nothing_else(script: Any) -> None:
 
 @pytest.mark.matrix
 def test_the_script_finds_what_is_stored(script: Any) -> None:
-    own, problem = reference("every other obstacle", "chen_assumptions")  # the fastest map
+    label = "(c), exact, every other obstacle"  # the fastest map
+    own, problem = dict(expanded("chen_claims", "paper").conditions)[label].prepare()
     stored, found = known_maps()[own.key(problem)], script.searched(own, problem)
     assert (found.paths, found.improved) == (stored.paths, stored.improved)
     np.testing.assert_allclose(found.bounds, stored.bounds, rtol=1e-12)

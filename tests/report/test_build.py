@@ -58,7 +58,7 @@ def page(stored: Path) -> Path:
 
 def test_a_report_is_seven_figures_with_data_and_sidecars(page: Path) -> None:
     tables = [name for name in contents(page) if name.endswith(".tex")]
-    assert "table_1_conditions.tex" in tables and len(tables) == 7
+    assert "table_1_claims.tex" in tables and len(tables) == 7
     (motion,) = (name for name in contents(page) if name.startswith("motion_"))
     files = [f"{stem}.{kind}" for stem in FIGURES for kind in ("csv", "json", "png", "svg")]
     assert sorted(contents(page)) == sorted([*files, "index.html", "index.md", motion, *tables])

@@ -59,9 +59,8 @@ def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray)
     assert (expected == 0.0).any()
     links = motion_geometry.link_distance(prepared.problem.assembly)
     np.testing.assert_allclose(links(np.radians(q)), expected, atol=1e-9)
-    nearest = links.nearest(np.radians(q[:, 0]))
-    between = np.linalg.norm(nearest.points[0] - nearest.points[1])
-    assert (nearest.distance, between) == pytest.approx([expected[0]] * 2, abs=1e-9)
+    least, (a, b) = links.nearest(np.radians(q[:, 0]))
+    assert (least, np.linalg.norm(a - b)) == pytest.approx([expected[0]] * 2, abs=1e-9)
     # the robot's own geometry stays as it is
     assert len(prepared.problem.assembly.geometry.collisionPairs) == 0
 

@@ -257,12 +257,39 @@ def test_a_claim_carries_its_rule_and_is_judged_by_its_kind_alone(
     rules = rules_of(tmp_path, kind, OWN if kind == "own" else "")
     on = judging.Judge("", page_settings("", "rana"), rules).on("told", who="", metric="cycles")
     claim = judge(on, kind, REPRODUCING[kind])
-    assert (claim.verdict, claim.name) == ("reproduced", "told")
-    assert claim.rule.startswith("reproduced if ") and "{" not in claim.rule
+    # 20 runs that agree are no proof that two shares are the same
+    verdict, rule = ("undecided", "practically") if kind == "same share" else ("reproduced",) * 2
+    assert (claim.verdict, claim.name) == (verdict, "told")
+    assert claim.rule.startswith(rule) and "{" not in claim.rule
     assert any(number in claim.n for number in ("20", "12"))
     for other in KINDS.keys() - {kind}:
         with pytest.raises(ValueError, match=f"its rule is '{kind}'"):
             judge(on, other, REPRODUCING[other])
+
+
+def test_differences_that_do_not_matter_are_practically_equal(tmp_path: Path) -> None:
+    """However significant they are: every A12 in 0.4 to 0.6, every share within 3 points."""
+    rng = np.random.default_rng(0)
+    one, two = rng.random(5000), rng.random(5000) + 0.03
+    row = compare("cost", one, two, True, 0.95)
+    assert row.says(0.05) == 1
+
+    def on(kind: str) -> judging.Hearing:
+        (tmp_path / kind).mkdir(exist_ok=True)
+        rules = rules_of(tmp_path / kind, kind)
+        return judging.Judge("", page_settings("", "rana"), rules).on("told", who="", metric="")
+
+    claim = on("better").better(row, "lower")
+    assert claim.verdict == "practically equal"
+    assert claim.size is not None
+    assert 0.4 < claim.size.low < claim.size.value < claim.size.high < 0.6
+    few, many = Proportion(19, 20), Proportion(950, 1000)
+    for own, p_value, verdict in (
+        (many, 1.0, "practically equal"),
+        (few, 1.0, "undecided"),
+        (Proportion(800, 1000), 1e-9, "contradicted"),
+    ):
+        assert on("same share").same_share("", own, many, p_value).verdict == verdict
 
 
 def test_an_unjudged_claim_names_the_reason_and_keeps_its_numbers(tmp_path: Path) -> None:

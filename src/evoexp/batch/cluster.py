@@ -38,9 +38,6 @@ def cluster_fan_out(
 
     Replicates are run again as in `fan_out`. A scheduler blames whatever waits on a worker that
     dies: the last time, a replicate runs beside no other.
-
-    Raises:
-        ClusterError: If there is no such cluster, or a worker has another version of evoexp.
     """
     try:
         import distributed

@@ -46,7 +46,6 @@ class Replicates:
     """
 
     def __init__(self, jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits) -> None:
-        """Let all of them wait."""
         self._limits, self._num_workers, self._waiting = limits, num_workers, deque(jobs)
         self._seconds, self._count = 0.0, 0.0  # of the replicates that ended of late
         self._suspects: deque[Job] = deque()  # of tasks whose workers died; one per task now
@@ -71,7 +70,11 @@ class Replicates:
             if len(jobs) > 1:
                 self._suspects += jobs
                 return []
-            end = [self._death(jobs[0], end.seconds)]
+            reason, timeout_s = DIED_TWICE, self._limits.timeout_s
+            if timeout_s is not None and end.seconds >= timeout_s:
+                reason = f"{self._limits.reason}, in compiled code: its process was ended"
+            trace = f"The worker process was terminated {end.seconds:.1f} s after it began."
+            end = [Outcome(*jobs[0].key, reason, trace, b"", end.seconds, may_pass=True)]
         # jobs that the task did not begin wait again; earlier times count half from now on, so
         # that slow first jobs are soon forgotten
         self._waiting.extendleft(reversed(jobs[len(end) :]))
@@ -85,11 +88,3 @@ class Replicates:
             else:
                 final.append(outcome)
         return final
-
-    def _death(self, job: Job, seconds: float) -> Outcome:
-        """Return the outcome of a job whose worker died of it alone."""
-        reason, timeout_s = DIED_TWICE, self._limits.timeout_s
-        if timeout_s is not None and seconds >= timeout_s:
-            reason = f"{self._limits.reason}, in compiled code: its process was ended"
-        trace = f"The worker process was terminated {seconds:.1f} s after it began."
-        return Outcome(job.condition_id, job.replicate, reason, trace, b"", seconds, may_pass=True)

@@ -54,12 +54,8 @@ def run_jobs(
 ) -> list[Outcome]:
     """Run replicates in this process, one after the other; a failure is an outcome.
 
-    Args:
-        in_worker: Whether this process is a worker.
-        curves: Folder for their convergence while they run; None: it is not told.
-
-    Returns:
-        Their outcomes, one at least; no further one begins after `LONGEST_TASK_S`.
+    One at least is run; no further one begins after `LONGEST_TASK_S`. Convergence is told in the
+    folder `curves`, if there is one.
     """
     from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
 

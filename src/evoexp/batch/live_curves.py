@@ -30,7 +30,6 @@ class CurveFile:
     """Hears the generations of one replicate, and leaves their convergence for others to see."""
 
     def __init__(self, folder: Path, condition_id: str, replicate: int) -> None:
-        """Begin with no generation."""
         self._folder, self._of = folder, (condition_id, replicate)
         self._costs: list[float] = []
 

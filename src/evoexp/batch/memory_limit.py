@@ -40,10 +40,7 @@ def replicate_memory(condition: Condition) -> int:
 
 
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
-    """Refuse a condition whose replicates would take more than is allowed [B], or too long a log.
-
-    One that contradicts itself is refused, too, by a SettingError.
-    """
+    """Refuse a condition whose replicates take more than is allowed [B], or too long a log."""
     planner, _ = condition.prepare()
     num_records = planner.num_generations + 1
     if num_records * LEAST_RECORD > MAX_LOG:

@@ -39,12 +39,7 @@ class ReplicateLimits(NamedTuple):
 
 @contextlib.contextmanager
 def limited(limits: ReplicateLimits, *, in_worker: bool) -> Iterator[None]:
-    """Keep the body within limits; that of memory holds in workers, where one can be set.
-
-    Raises:
-        TookTooLong: The body took too long.
-        MemoryError: It took too much memory.
-    """
+    """Keep the body within limits, by `TookTooLong` and, in workers, by MemoryError."""
     with _in_time(limits, in_worker):
         used, (soft, hard) = used_addresses(), resource.getrlimit(resource.RLIMIT_AS)
         may_limit = in_worker and used and allowed_addresses() is None

@@ -138,10 +138,8 @@ def reproduce_stored(path: Path, condition_id: str, replicate: int) -> Compariso
 def reproduce_log(path: Path, place: tuple[str, int] | None = None) -> Comparison:
     """Run a log's replicate again, from the configuration attached to the log alone.
 
-    Args:
-        place: Condition and replicate that it must be of; None: any.
-
-    CorruptLog is raised where the log cannot be trusted; see `stored_condition`, too.
+    CorruptLog is raised where the log cannot be trusted, or is of another condition and replicate
+    than its place; see `stored_condition`, too.
     """
     stored = read_log(path)
     if place is not None:
@@ -158,9 +156,7 @@ def reproduce_log(path: Path, place: tuple[str, int] | None = None) -> Compariso
 def stored_condition(path: Path, log: LogContents) -> Condition:
     """Return the condition of a log, built from the log alone.
 
-    Raises:
-        RevisionMismatch: If a component has another revision in this installation.
-        MissingDistribution: If the package of a component is not installed.
+    RevisionMismatch or MissingDistribution is raised where its components are not those here.
     """
     if packages := missing(log.environment.get("components", {})):
         raise MissingDistribution(str(path), packages)
@@ -266,8 +262,7 @@ def farthest(fields: Iterable[FieldDifference]) -> tuple[str, float]:
 def difference(one: Any, two: Any) -> float:
     """Return the largest difference of two numbers or arrays, in units of their size, at least 1.
 
-    Two infinities of one sign, and two NaN, do not differ. A number that is not finite in one array
-    only differs by inf, and so do arrays of different shapes.
+    Equal infinities, and NaN, do not differ; other infinities and shapes differ by inf.
     """
     a, b = np.asarray(one, dtype=np.float64), np.asarray(two, dtype=np.float64)
     if a.shape != b.shape:
@@ -282,10 +277,7 @@ def difference(one: Any, two: Any) -> float:
 
 
 def fingerprint(condition: Condition, summary: ReplicateSummary) -> str:
-    """Return the entry of the shipped table for a first replicate: its digest, or its cost.
-
-    The cost stands for planners that are not reproducible bit by bit in every environment.
-    """
+    """Return the entry of the shipped table: a digest; a cost where bits are not reproducible."""
     is_digest = condition.reproducibility == "bits"
     return summary.digest if is_digest else f"{_COST}{summary.best_cost!r}"
 

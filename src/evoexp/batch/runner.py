@@ -30,13 +30,7 @@ LEAST_MEMORY = 1.0 * GIGABYTE  # [B] that a replicate may take where nothing is 
 
 
 class Batch:
-    """All replicates that are asked for, of any number of conditions.
-
-    Attributes:
-        runs: One run directory per distinct condition.
-        jobs: The missing replicates, condition by condition; those whose log is damaged are, too.
-        is_damaged: Whether stored files of a run are damaged, which `run` mends.
-    """
+    """All replicates that are asked for, of any number of conditions."""
 
     def __init__(
         self,
@@ -52,8 +46,6 @@ class Batch:
         Args:
             conditions: (condition, number of replicates, notes for the manifest of a new run); one
                 may occur twice.
-            settings: Number of workers, and where they run.
-            outputs: Root of all outputs.
             retry_failed: Whether replicates that failed before run again.
             curves: Folder for the convergence of running replicates; None: it is not told.
         """
@@ -63,11 +55,12 @@ class Batch:
         for condition, count, notes in conditions:
             _, before, first_notes = self._wanted.get(condition.id, (condition, 0, notes))
             self._wanted[condition.id] = (condition, max(count, before), first_notes)
-        self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
+        self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}  # by condition
         for run in self.runs.values():
             whole_logs(run, thorough=True)  # what is damaged is known from here on
+        # the missing replicates, condition by condition; those whose log is damaged are, too
         self.jobs = self._missing({key: lost_replicates(run) for key, run in self.runs.items()})
-        self.is_damaged = any(
+        self.is_damaged = any(  # of a run, which `run` mends
             run.damaged_files(self._wanted[key][0].to_json()) or damaged_logs(run)
             for key, run in self.runs.items()
         )
@@ -96,7 +89,16 @@ class Batch:
             self.jobs = self._missing(lost)
             try:
                 with self._workers() as workers:  # they end first of all, however the body ends
-                    self._create_runs()
+                    for key, run in self.runs.items():
+                        condition, _, notes = self._wanted[key]
+                        config_json = condition.to_json()
+                        # of a run that has lost its manifest, a log knows something of it
+                        is_lost = run.completed() and not (run.path / MANIFEST).exists()
+                        known = restored_manifest(run.path, key) if is_lost else {}
+                        known = known or manifest(key, guests(config_json))
+                        run.create(config_json, known | notes, condition.files())
+                    for key in dict.fromkeys(job.condition_id for job in self.jobs):
+                        self.runs[key].note_plan(self._wanted[key][1])
                     for outcomes in self._outcomes(workers):
                         yield from self._store(outcomes)
             except OSError:  # a full disk: the table can be built from the logs at any time
@@ -114,19 +116,6 @@ class Batch:
         from evoexp.batch.workers import Workers
 
         return Workers(self.num_workers)
-
-    def _create_runs(self) -> None:
-        """Write the directories of new runs, and the number of replicates that is planned."""
-        for key, run in self.runs.items():
-            condition, _, notes = self._wanted[key]
-            config_json = condition.to_json()
-            # of a run that has lost its manifest, a log knows something of it
-            is_lost = run.completed() and not (run.path / MANIFEST).exists()
-            known = restored_manifest(run.path, key) if is_lost else {}
-            known = known or manifest(key, guests(config_json))
-            run.create(config_json, known | notes, condition.files())
-        for key in dict.fromkeys(job.condition_id for job in self.jobs):
-            self.runs[key].note_plan(self._wanted[key][1])
 
     def _outcomes(self, workers: "Workers | None") -> Iterator[list[Outcome]]:
         """Load the kernels, then run the jobs where the settings say."""

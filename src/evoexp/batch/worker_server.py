@@ -1,7 +1,6 @@
 """The process that workers are forked from, and the loop of a worker.
 
-The server loads all libraries once, and the kernels of a batch, and has no threads. Each worker has
-a pipe of its own: whatever it holds when it dies, nobody waits for it.
+The server loads all libraries once, and the kernels of a batch, and has no threads; see `workers`.
 """
 
 import importlib
@@ -63,7 +62,11 @@ def _work(own: Connection) -> None:
     threading.Thread(target=_receive, args=(own, tasks), daemon=True).start()
     own.send(os.getpid())
     while True:
-        answer = _answer(tasks.get())
+        try:
+            function, arguments = pickle.loads(tasks.get())
+            answer = pickle.dumps(Answer(function(*arguments)), pickle.HIGHEST_PROTOCOL)
+        except Exception as error:
+            answer = pickle.dumps(Answer(None, _sendable(error)))
         sys.stdout.flush()
         own.send_bytes(answer)
 
@@ -74,15 +77,6 @@ def _receive(own: Connection, tasks: "SimpleQueue[bytes]") -> None:
         while True:
             tasks.put(own.recv_bytes())
     os._exit(0)
-
-
-def _answer(task: bytes) -> bytes:
-    """Call the function of a task with its arguments; return its pickled `Answer`."""
-    try:
-        function, arguments = pickle.loads(task)
-        return pickle.dumps(Answer(function(*arguments)), pickle.HIGHEST_PROTOCOL)
-    except Exception as error:
-        return pickle.dumps(Answer(None, _sendable(error)))
 
 
 def _sendable(error: Exception) -> Exception:

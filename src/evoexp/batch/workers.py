@@ -1,8 +1,7 @@
 """Worker processes, each with a pipe of its own.
 
 They are forked from a server that has loaded all libraries (see `worker_server`), which a script
-that uses evoexp is no part of. A worker that dies closes its pipe: half a message of it keeps
-nobody waiting.
+that uses evoexp is no part of. A worker that dies closes its pipe: nobody waits for it.
 """
 
 import contextlib
@@ -95,12 +94,9 @@ class Workers:
     ) -> Iterator[Any]:
         """Do tasks as workers become free; yield results as they come, until none is left.
 
-        An error that the function raised is raised here, too.
-
-        Args:
-            function: Called in a worker with the arguments that are a task.
-            next_task: Returns the next task by the number of running ones, or None.
-            end_task: Takes in the result of a task; returns one for the caller, or None.
+        A function is called in a worker with the arguments that are a task; its error is raised
+        here. `next_task` gets the number of running tasks; `end_task` takes in a result and returns
+        one for the caller, or None.
         """
         self._fill()
         finished: list[Any] = []

@@ -9,11 +9,7 @@ MOTION_ENDINGS = (".json", ".npy", ".csv", ".yaml", ".yml")
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
-    """Add the arguments that choose conditions: overrides, `-m`, `--only`, `--config-dir`.
-
-    Returns:
-        The overrides, for commands that take other words among them.
-    """
+    """Add the arguments that choose conditions; return that of the overrides."""
     add_config_dir_argument(parser)
     words = parser.add_argument(
         "overrides",
@@ -22,12 +18,8 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> argparse.Action
         help="experiment=NAME, budget=paper|quick|smoke, num_replicates=N, and any setting: "
         "ga.population_size=20",
     )
-    parser.add_argument(
-        "-m",
-        "--multirun",
-        action="store_true",
-        help="sweep over values with commas: ga.num_elites=0,2",
-    )
+    swept = "sweep over values with commas: ga.num_elites=0,2"
+    parser.add_argument("-m", "--multirun", action="store_true", help=swept)
     parser.add_argument(
         "--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions"
     )

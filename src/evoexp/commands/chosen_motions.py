@@ -4,7 +4,7 @@ import argparse
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,13 +14,7 @@ from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of
 from evoexp.commands.stored_runs import finished_replicate, stored_run
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.errors import (
-    MotionFileError,
-    NothingStored,
-    RevisionMismatch,
-    SettingError,
-    printable,
-)
+from evoexp.errors import MotionFileError, NothingStored, RevisionMismatch, SettingError, printable
 from evoexp.paths.motion import Motion
 from evoexp.playback.recording import Heading, Recording, joints_of, record, record_motion
 from evoexp.playback.timing import SpeedLimits
@@ -71,13 +65,8 @@ def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
     which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
     texts = ("of least cost (the default)", "of greatest cost", "first refuted one")
     for name, text in zip(CHOICES, texts, strict=True):
-        which.add_argument(
-            f"--{name}",
-            dest="choice",
-            action="store_const",
-            const=name,
-            help=f"the replicate: {text}",
-        )
+        settings: Any = {"dest": "choice", "action": "store_const", "const": name}
+        which.add_argument(f"--{name}", help=f"the replicate: {text}", **settings)
     parser.add_argument(
         "--only", default="", metavar="LABEL", help="of an experiment's conditions, this one"
     )
@@ -206,11 +195,7 @@ def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
 def fitting_motions(
     words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
 ) -> tuple[Path, list[FittingMotion]]:
-    """Fit the motion file among words into the conditions that the others choose.
-
-    Returns:
-        The file, and the conditions whose shape the motion has.
-    """
+    """Return the motion file among words, and the conditions of the others whose shape it has."""
     files = [word for word in words if is_motion(word) or Path(word).exists()]
     overrides = [word for word in words if word not in files]
     if len(files) != 1:

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Iterator
 from typing import Any
 
-from rich.table import Column, Table
+from rich.table import Column
 
 from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, say
@@ -12,11 +12,13 @@ from evoexp.commands.report_requests import request_of
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.registry import CLAIMS, names, registered
+from evoexp.report.pages.html_page import verdict_counts
 from evoexp.report.pages.page_builder import page_of
 from evoexp.report.statistics.claim_rules import Rules, registered_rules
 from evoexp.store.run_directory import outputs_root
 
-_OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "n", "verdict")
+_OF_CLAIM = ("name", "claim", "source", "rule", "evidence", "size", "n", "verdict")
+OURS = "our question"  # the source of what no paper claims
 KEYS = ("paper", *_OF_CLAIM, "experiment", "command")
 
 
@@ -42,41 +44,55 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(found)
         return 0
-    for row in found:
-        say(_block(row))
+    for row in found:  # what is claimed, by which rule, from which numbers
+        title = f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}"
+        table = new_table(title, Column(no_wrap=True), "")
+        table.show_header = False
+        for key in ("claim", "source", "verdict", "size", "evidence", "n", "rule", "command"):
+            name = {"evidence": "numbers", "size": "decides"}.get(key, key)
+            table.add_row(name, row[key] or "–")
+        say(table)
         say("")
-    verdicts = [row["verdict"].split(" (")[0] for row in found]
-    counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts)]
-    say(f"{len(found)} claim{'s' * (len(found) != 1)}: {', '.join(counts)}")
+    ours = [row for row in found if row["source"].startswith(OURS)]
+    for name, rows in (("claims", [r for r in found if r not in ours]), ("our questions", ours)):
+        counts = verdict_counts(row["verdict"] for row in rows)
+        words = ", ".join(f"{count} {verdict}" for verdict, count in counts)
+        if rows:
+            say(f"{name} ({len(rows)}): {words}")
     return 0
 
 
 def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
     """Yield the claims of a paper, experiment by experiment, with `KEYS`.
 
-    A claim of an experiment of which nothing is stored says so, and names the command that runs it.
+    A claim that is judged under every reading, by the experiment `<paper>_claims`, is yielded from
+    there alone. Where nothing is stored, it names the command that runs its experiment.
     """
     experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
-    for experiment in experiments:
+    of_readings = f"{paper}_claims"
+    for experiment in sorted(experiments, key=lambda name: name != of_readings):
+        own = [
+            rule.name
+            for rule in rules.values()
+            if experiment == of_readings or of_readings not in rule.experiments
+        ]
         try:
             (expanded,) = compose.expand([f"experiment={experiment}"])
             request, settings, num_replicates = request_of(expanded, [])
             claims = page_of(request.results(outputs_root(), num_replicates), settings).claims
-            rows = [(c.name, c.text, c.source, c.rule, c.evidence, c.n, c.verdict) for c in claims]
+            rows = [
+                (c.name, c.text, c.source, c.rule, c.evidence, str(c.size or "–"), c.n, c.verdict)
+                for c in claims
+                if c.name in own or c.name not in rules
+            ]
             command = f"evoexp report {experiment}"
         except NothingStored:
             waiting = [r.unjudged() for r in rules.values() if experiment in r.experiments]
-            rows = [(r.name, r.claim, r.source, r.text, "–", "0", "not run") for r in waiting]
+            rows = [
+                (r.name, r.claim, r.source, r.text, "–", "–", "0", "not run")
+                for r in waiting
+                if r.name in own
+            ]
             command = f"evoexp run experiment={experiment}"
         for row in rows:
             yield dict(zip(KEYS, (paper, *row, experiment, command), strict=True))
-
-
-def _block(row: dict[str, Any]) -> Table:
-    """Return one claim as a small table: what is claimed, by which rule, from which numbers."""
-    title = f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}"
-    table = new_table(title, Column(no_wrap=True), "")
-    table.show_header = False
-    for key in ("claim", "source", "rule", "evidence", "n", "verdict", "command"):
-        table.add_row({"evidence": "numbers"}.get(key, key), row[key] or "–")
-    return table

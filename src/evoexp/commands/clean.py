@@ -85,16 +85,13 @@ def waste(outputs: Path) -> Iterator[Waste]:
                 continue
         for folder in (path, path / REPLICATES):
             for each in sorted(folder.iterdir()) if folder.is_dir() else ():
-                if kind := _kind(each):
+                kinds = {
+                    "temporary": is_temporary(each.name),
+                    "damaged": is_set_aside(each.name),
+                    "failed": each.name.endswith(".failed.json"),
+                }
+                if kind := next((kind for kind, is_own in kinds.items() if is_own), ""):
                     yield Waste(kind, each, _size(each))
-
-
-def _kind(path: Path) -> str:
-    if is_temporary(path.name):
-        return "temporary"
-    if is_set_aside(path.name):
-        return "damaged"
-    return "failed" if path.name.endswith(".failed.json") else ""
 
 
 def _size(path: Path) -> int:

@@ -3,10 +3,7 @@
 import argparse
 import hashlib
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
-
-from rich.table import Table
 
 from evoexp.commands.arguments import add_experiment_arguments, add_json_argument, folder_words
 from evoexp.commands.console import new_table, print_json, right, say
@@ -63,23 +60,24 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.csv:
         write_file(Path(arguments.csv), comparison.as_csv(rows))
     if arguments.latex:
-        (table,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
-        write_file(Path(arguments.latex), table)
+        (latex,) = (text for name, text in files.files.items() if name.endswith("_answers.tex"))
+        write_file(Path(arguments.latex), latex)
     if arguments.ioh:
         written = {folder / name: content for name, content in ioh_files(runs).items()}
         for path in written:
             path.parent.mkdir(parents=True, exist_ok=True)
         write_files(written)
     if arguments.json:
-        print_json(
-            [
-                row._asdict()
-                | {"interval": row.interval._asdict(), "lengths": row.lengths._asdict()}
-                for row in rows
-            ]
-        )
+        inner = ("interval", "lengths")
+        print_json([row._asdict() | {k: getattr(row, k)._asdict() for k in inner} for row in rows])
         return 0
-    say(_table(rows, request.report_name))
+    numbers = right("proven", "queries\neach", "best\nlength", "refuted")
+    table = new_table(request.report_name, "condition", *numbers)
+    for row in rows:
+        refuted = f"{row.refuted} of {row.judged}" if row.judged else "–"
+        values = markdown.number(row.queries), markdown.number(row.lengths.median), refuted
+        table.add_row(row.condition, f"{row.proven} of {row.runs}", *values)
+    say(table)
     for line in strange:
         say(line)
     for kind in ("csv", "latex", "ioh"):
@@ -92,12 +90,7 @@ def main(arguments: argparse.Namespace) -> int:
 def drawn(
     arguments: argparse.Namespace,
 ) -> tuple[build.ReportFiles, build.Request, ReportSettings, list[PlannerRuns], list[str]]:
-    """Draw the page that is asked for; nothing is written.
-
-    Returns:
-        Files, request, settings, the runs of all planners, and lines on problems that only the
-        given data know.
-    """
+    """Draw the page that is asked for; return lines on problems that only given data know, too."""
     given = read_given(arguments.data) if arguments.data else None
     known = shipped_best_known()
     if arguments.best_known:
@@ -115,20 +108,6 @@ def drawn(
         runs += of_given(given, runs)
     page = comparison.page(found, settings, runs, given)
     return build.page_files(request, page, found, settings), request, settings, runs, strange
-
-
-def _table(rows: Sequence[comparison.Rated], title: str) -> Table:
-    numbers = right("proven", "queries\neach", "best\nlength", "refuted")
-    table = new_table(title, "condition", *numbers)
-    for row in rows:
-        table.add_row(
-            row.condition,
-            f"{row.proven} of {row.runs}",
-            markdown.number(row.queries),
-            markdown.number(row.lengths.median),
-            f"{row.refuted} of {row.judged}" if row.judged else "–",
-        )
-    return table
 
 
 def _asked(arguments: argparse.Namespace) -> ReportRequest:

@@ -18,13 +18,9 @@ PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it o
 
 
 class _Console(Console):
-    """A console that goes on in silence when the reader of a pipe has left.
-
-    The command does the rest of its work, and its exit code is the same.
-    """
+    """A console that goes on in silence when the reader of a pipe has left."""
 
     def render_str(self, text: str, **look: Any) -> Text:
-        """Render a text as it is, its control characters made visible."""
         return super().render_str(printable(text), **look)
 
     def print(self, *objects: Any, soft_wrap: bool | None = None, **look: Any) -> None:

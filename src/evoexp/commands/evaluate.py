@@ -88,7 +88,12 @@ def main(arguments: argparse.Namespace) -> int:
                 row["rows"] = [dict(zip(names, values, strict=True)) for values in cells]
         print_json(rows if len(rows) > 1 else rows[0])
         return 0
-    groups = _alike(list(zip(rows, listings, strict=True)))
+    # conditions of one group say the same of the motion
+    alike: dict[str, list[_Judged]] = {}
+    for row, listing in zip(rows, listings, strict=True):
+        said = {name: value for name, value in row.items() if name not in HEAD[:2]}
+        alike.setdefault(repr((said, listing)), []).append((row, listing))
+    groups = list(alike.values())
     for group in groups:
         if (listing := group[0][1]) is not None:  # a row per configuration of the motion
             table = new_table(_labels(group), *right(*listing.names))
@@ -109,24 +114,13 @@ def _labels(group: Sequence[_Judged]) -> str:
     return ", ".join(row["label"] for row, _ in group)
 
 
-def _alike(judged: Sequence[_Judged]) -> list[list[_Judged]]:
-    """Return conditions in groups: those of one group say the same of the motion."""
-    groups: dict[str, list[_Judged]] = {}
-    for row, listing in judged:
-        said = {name: value for name, value in row.items() if name not in HEAD[:2]}
-        groups.setdefault(repr((said, listing)), []).append((row, listing))
-    return list(groups.values())
-
-
 def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
     """Return the motion that the words name, in every condition that it fits."""
     words: list[str] = arguments.overrides
     if arguments.write is not None and arguments.write.suffix != ".json":
         raise MotionFileError(f"--write: must be a file that ends in .json, was {arguments.write}")
-    if all(
-        word.endswith(".mcap") or (HEX.fullmatch(word) and not Path(word).exists())
-        for word in words
-    ):
+    hashes = [word for word in words if HEX.fullmatch(word) and not Path(word).exists()]
+    if all(word.endswith(".mcap") or word in hashes for word in words):
         return [stored_motion(named_log(word, arguments.replicate)[0]) for word in words]
     if arguments.replicate is not None:
         raise MotionFileError("--replicate: must go with a hash, was given with an experiment")

@@ -12,15 +12,14 @@ from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, printable
 from evoexp.store.files import listed
-from evoexp.store.run_context import origin_of
+from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_rows
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
 FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
-ORIGIN_KEYS = ("experiment", "label", "budget")
 COUNT_KEYS = ("done", "failed", "solved")
-RUN_KEYS = ("hash", *ORIGIN_KEYS, "changed", *COUNT_KEYS, "median_best_cost", "damage")
+RUN_KEYS = ("hash", *ORIGIN, "changed", *COUNT_KEYS, "median_best_cost", "damage")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +40,11 @@ def main(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print_json(failures)
         elif failures:
-            say(_failure_table(failures))
+            table = new_table("", hash_column(), "condition", *right("#"), "reason")
+            for each in failures:
+                label, reason = coloured(each["label"]), coloured(each["reason"])
+                table.add_row(each["hash"], label, str(each["replicate"]), reason)
+            say(table)
         else:
             say(f"no failed replicates in {outputs_root()}")
         return 0
@@ -77,14 +80,6 @@ def _failures() -> list[dict[str, Any]]:
     return rows
 
 
-def _failure_table(failures: list[dict[str, Any]]) -> Table:
-    table = new_table("", hash_column(), "condition", *right("#"), "reason")
-    for each in failures:
-        label, reason = coloured(each["label"]), coloured(each["reason"])
-        table.add_row(each["hash"], label, str(each["replicate"]), reason)
-    return table
-
-
 def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     """Return the entry of a stored run; of a damaged run little but the damage."""
     row: dict[str, Any] = dict.fromkeys(RUN_KEYS) | {"hash": name, "changed": False}
@@ -116,8 +111,8 @@ def _run_table(runs: list[dict[str, Any]]) -> Table:
         if run["done"] is None:
             table.add_row(run["hash"][:12], coloured(run["damage"], "red"), "–", "–", "–", "–")
             continue
-        names = [run[name] or "?" for name in ORIGIN_KEYS]
-        known = any(run[name] for name in ORIGIN_KEYS)
+        names = [run[name] or "?" for name in ORIGIN]
+        known = any(run[name] for name in ORIGIN)
         text = ", ".join(names) + (" (changed)" if run["changed"] else "")
         condition = coloured(text if known else "(no manifest)")
         if run["damage"]:

@@ -29,16 +29,10 @@ class PackageExists(EvoexpError):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("kind", choices=tuple(COMMANDS), help="of the component")
-    parser.add_argument(
-        "name", metavar="NAME", help="of the package: lower-case letters, digits and _"
-    )
-    parser.add_argument(
-        "--directory",
-        type=Path,
-        default=Path(),
-        metavar="DIR",
-        help="where to write the folder NAME; by default here",
-    )
+    told = "of the package: lower-case letters, digits and _"
+    parser.add_argument("name", metavar="NAME", help=told)
+    told = "where to write the folder NAME; by default here"
+    parser.add_argument("--directory", type=Path, default=Path(), metavar="DIR", help=told)
 
 
 def main(arguments: argparse.Namespace) -> int:

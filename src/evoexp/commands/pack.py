@@ -25,13 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "hashes", nargs="+", metavar="HASH", help="any unique prefixes of runs' hashes"
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar=f"FILE{ENDING}",
-        help="by default named by the hashes, in the current directory",
-    )
+    told = "by default named by the hashes, in the current directory"
+    parser.add_argument("-o", "--output", type=Path, metavar=f"FILE{ENDING}", help=told)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from rich.table import Table
 
 from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
 from evoexp.batch.workers import num_cores
@@ -73,19 +72,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print the plan."""
-    experiments = compose.expand(
-        arguments.overrides, multirun=arguments.multirun, only=arguments.only
-    )
+    words, only = arguments.overrides, arguments.only
+    experiments = compose.expand(words, multirun=arguments.multirun, only=only)
     stored = StoredTimes(outputs_root())
     rows: dict[str, PlannedCondition] = {}
     for experiment in experiments:
         for label, condition in experiment.conditions:
             if condition.id in rows:
                 continue
-            run, settings = (
-                RunDirectory(outputs_root(), condition.id),
-                json.loads(condition.to_json()),
-            )
+            run = RunDirectory(outputs_root(), condition.id)
+            settings = json.loads(condition.to_json())
             count, done = condition.num_replicates(experiment.num_replicates), run.completed()
             asked = set(range(count))
             damaged = {int(Path(name).stem) for name in damaged_logs(run)} if done else set()
@@ -108,16 +104,10 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json([row._asdict() for row in planned])
         return 0
-    say(_table(planned))
-    say(_total(planned, experiments[0].runner.num_workers or num_cores()))
-    return 0
-
-
-def _table(rows: Sequence[PlannedCondition]) -> Table:
     counts = right("planned", "there", "to run", "failed\nbefore", "damaged")
     costs = right("CPU s\neach", "GB\neach")
     table = new_table("", "condition", hash_column(), *counts, "other revision", *costs)
-    for row in rows:
+    for row in planned:
         table.add_row(
             row.label,
             row.hash[:12],
@@ -126,7 +116,9 @@ def _table(rows: Sequence[PlannedCondition]) -> Table:
             _seconds(row.cpu_s_each, row.cpu_s_least, row.cpu_s_most),
             f"{row.memory_gb_each:.3g}",
         )
-    return table
+    say(table)
+    say(_total(planned, experiments[0].runner.num_workers or num_cores()))
+    return 0
 
 
 def _seconds(mean: float | None, least: float | None, most: float | None) -> str:

@@ -56,10 +56,8 @@ class BatchProgress:
         """Prepare; shown inside `shown`.
 
         Args:
-            console: Shows it.
             wanted: Condition's id → its label, and its replicates to run.
             curves: Folder in which workers leave the convergence of what they run; None: not shown.
-            clock: Tells the time [s].
         """
         texts = ["{task.fields[failed]} failed", "{task.fields[best]}"]
         texts += ["{task.fields[curve]}"] if curves is not None else []

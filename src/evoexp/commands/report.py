@@ -26,7 +26,7 @@ from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 PlannedReport = tuple[str, Callable[[], build.ReportFiles]]  # a folder, and who draws it
-ASSUMPTIONS = "assumptions"  # stands for the experiments of that name, one per paper
+CLAIMS = "claims"  # stands for the experiments `<paper>_claims`
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "*"
     words.help = (
         "an experiment and overrides as for run, or prefixes of the hashes of stored runs; "
-        f"`{ASSUMPTIONS}`: every paper's page of assumed numbers"
+        f"`{CLAIMS}`: every paper's page of claims under every reading"
     )
     parser.add_argument(
         "--all",
@@ -58,8 +58,8 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         raise SettingError("experiment", "named, or --all given", "none")
     arguments.overrides = unpacked(arguments.overrides)
-    if ASSUMPTIONS in arguments.overrides:
-        arguments.overrides = _with_assumptions(arguments.overrides)
+    if CLAIMS in arguments.overrides:
+        arguments.overrides = _with_claims(arguments.overrides)
     found = requests(arguments)
     if arguments.check:
         return _check(request.files() for request in found)
@@ -108,18 +108,14 @@ def _check(reports: Iterable[build.ReportFiles]) -> int:
         num_files += len(report.files)
         num_wrong += len(wrong)
     checked = f"check: {num_files} files of {num_reports} report{'s' * (num_reports != 1)}"
-    say(
-        f"{checked}: {num_wrong or 'all'} {'not ' * bool(num_wrong)}as they follow from the outputs"
-    )
+    answer = f"{num_wrong or 'all'} {'not ' * bool(num_wrong)}as they follow from the outputs"
+    say(f"{checked}: {answer}")
     return 1 if num_wrong else 0
 
 
-def _with_assumptions(words: Sequence[str]) -> list[str]:
-    """Return the words with `assumptions` replaced by the papers' experiments of that name.
-
-    An experiment that nothing is stored of is named instead, with the command that runs it.
-    """
-    every = [name for name in options("experiment") if name.endswith(f"_{ASSUMPTIONS}")]
+def _with_claims(words: Sequence[str]) -> list[str]:
+    """Return the words with `claims` replaced by the papers' experiments that are stored."""
+    every = [name for name in options("experiment") if name.endswith(f"_{CLAIMS}")]
     table, outputs = shipped(), outputs_root()
     ids = {name: {r.condition_id for r in table if r.experiment == name} for name in every}
     stored = [
@@ -127,10 +123,10 @@ def _with_assumptions(words: Sequence[str]) -> list[str]:
     ]
     missing = " ".join(f"evoexp run experiment={name};" for name in every if name not in stored)
     if not stored:
-        raise NothingStored(f"{ASSUMPTIONS}: nothing stored in {outputs}; try: {missing[:-1]}")
+        raise NothingStored(f"{CLAIMS}: nothing stored in {outputs}; try: {missing[:-1]}")
     if missing:
         say(f"nothing stored yet: {missing[:-1]}")
-    return [name for word in words for name in (stored if word == ASSUMPTIONS else [word])]
+    return [name for word in words for name in (stored if word == CLAIMS else [word])]
 
 
 # all reports
@@ -171,10 +167,9 @@ def _of_experiment(words: Sequence[str]) -> build.ReportFiles:
 
 
 def _budgets(outputs: Path, name: str) -> Iterator[str]:
-    """Yield the budgets at which an experiment was run.
+    """Yield the budgets at which an experiment was run: it began one of its runs, or all are there.
 
-    It began one of its runs, or all of them are there: experiments share conditions, so one of
-    them alone does not mean that all were asked for.
+    Experiments share conditions: one of them alone does not mean that all were asked for.
     """
     rows = [row for row in shipped() if row.experiment == name]
     for budget in ("paper", "smoke"):

@@ -43,11 +43,9 @@ class ReportRequest(NamedTuple):
 def chosen(
     arguments: argparse.Namespace,
 ) -> tuple[dict[str, Condition], list[Experiment], list[str], ReportSettings]:
-    """Return the experiments or the stored runs that the words of a command choose.
+    """Return the stored runs, or experiments and overrides, that a command chooses, and settings.
 
-    Returns:
-        Runs by the first digits of their hashes, or experiments and the overrides that apply to all
-        of them; the settings of the first experiment, of runs those of the paper's report.
+    Settings are those of the first experiment, of runs those of the paper's report.
     """
     multirun, only, known = arguments.multirun, arguments.only, options("experiment")
     overrides = [word for word in arguments.overrides if is_override(word)]

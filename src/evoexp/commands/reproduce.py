@@ -44,10 +44,8 @@ def main(arguments: argparse.Namespace) -> int:
         with looked_into(*packed) as runs:
             rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
         code = _report(rows)
-        say(
-            f"{printable(str(packed[0]))}: its logs were compared where they are; nothing was "
-            f"taken into {outputs_root()}"
-        )
+        told = f"{printable(str(packed[0]))}: its logs were compared where they are; nothing was"
+        say(f"{told} taken into {outputs_root()}")
         return code
     if path.suffix == ".mcap" or path.is_file():
         return _report([reproduce_log(path)])
@@ -69,11 +67,9 @@ def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison | Damag
             raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
         return _compare_all(run, sorted(run.completed()))
     except RevisionMismatch as error:
-        text = (
-            f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is "
-            f"installed: {run.command}"
-        )
-        raise RevisionMismatch(text) from None
+        text = f"run {run.hash12}: {error}; its results cannot be compared."
+        remedy = f"Run it anew with what is installed: {run.command}"
+        raise RevisionMismatch(f"{text} {remedy}") from None
 
 
 def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison | DamagedLog]:

@@ -58,15 +58,13 @@ def main(arguments: argparse.Namespace) -> int:
     if not arguments.overrides:
         print(USAGE.format(number=len(options("experiment"))), file=sys.stderr)
         return 2
-    experiments = compose.expand(
-        arguments.overrides, multirun=arguments.multirun, only=arguments.only
-    )
+    multirun, only = arguments.multirun, arguments.only
+    experiments = compose.expand(arguments.overrides, multirun=multirun, only=only)
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
-    swept = ["-m"] if arguments.multirun else []
-    only = ["--only", ",".join(arguments.only)] if arguments.only else []
-    words = [*swept, *arguments.overrides, *only, *folder_words(arguments.config_dir)]
-    command = shlex.join(["evoexp", "run", *words])
+    words = [*(["-m"] if multirun else []), *arguments.overrides]
+    words += ["--only", ",".join(only)] if only else []
+    command = shlex.join(["evoexp", "run", *words, *folder_words(arguments.config_dir)])
     wanted = [
         (
             labelled.condition,

@@ -54,11 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--all", action="store_true", help="all settings, replicates and the whole manifest, too"
     )
     keys = "; ".join(f"{key}: {value}" for key, value in KEYS.items())
-    parser.add_argument(
-        "--json",
-        action="store_true",
-        help=f"print JSON, one object or a list of them. Keys: {keys}",
-    )
+    content = f"print JSON, one object or a list of them. Keys: {keys}"
+    parser.add_argument("--json", action="store_true", help=content)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -82,7 +79,7 @@ def main(arguments: argparse.Namespace) -> int:
                 say(_condition_table(experiment, found))
             say("one condition on a screen: --only LABEL")
         else:
-            _print_screens(arguments, found, [None] * len(found))
+            _print_screens(arguments, found)
     elif packed := in_archive(" ".join(words)):
         path, prefix = packed
         with looked_into(path, prefix) as runs:
@@ -90,28 +87,33 @@ def main(arguments: argparse.Namespace) -> int:
             for facts in found:
                 facts["origin"]["directory"] = str(path)
             if len(found) > 1 and as_table:
-                say(_archive_table(found))
+                counted = right("done", "solved")
+                table = new_table("", hash_column(), "experiment", "condition", *counted)
+                for facts in found:
+                    origin, result = facts["origin"], facts["result"] or {"done": 0, "solved": 0}
+                    names = (str(origin.get(name) or "–") for name in ("experiment", "label"))
+                    counts = (str(result[name]) for name in ("done", "solved"))
+                    table.add_row(facts["condition"][:12], *names, *counts)
+                say(table)
                 say(f"one run on a screen: evoexp show {printable(str(path))}:{runs[0].hash12}")
             else:
                 _print_screens(arguments, found, runs)
     elif len(words) > 1:
         raise SettingError("show", "given one hash or log", " ".join(words))
     elif (path := Path(words[0])).suffix == ".mcap" or path.is_file():
-        _print_screens(arguments, [log_facts(path)], [None])
+        _print_screens(arguments, [log_facts(path)])
     else:
         run = stored_or_shipped(words[0])
         if isinstance(run, RunDirectory):
             _print_screens(arguments, [stored_facts(run)], [run])
         else:
             facts = composed_facts(shipped_experiment(run), run.label, run.command)
-            _print_screens(arguments, [facts], [None])
+            _print_screens(arguments, [facts])
     return 0
 
 
 def _print_screens(
-    arguments: argparse.Namespace,
-    found: Sequence[dict[str, Any]],
-    runs: Sequence[RunDirectory | None],
+    arguments: argparse.Namespace, found: Sequence[Any], runs: Sequence[RunDirectory] = ()
 ) -> None:
     if arguments.json:
         print_json(found if len(found) > 1 else found[0])
@@ -119,7 +121,7 @@ def _print_screens(
     as_yaml = functools.partial(
         yaml.safe_dump, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
     )
-    for facts, run in zip(found, runs, strict=True):
+    for facts, run in itertools.zip_longest(found, runs):
         for line in screen(facts, plain_console().width):
             say(line)
         if arguments.all:
@@ -130,17 +132,6 @@ def _print_screens(
                 say(as_yaml({"manifest": manifest}))
 
 
-def _archive_table(found: Sequence[dict[str, Any]]) -> Table:
-    """Return a table of the runs of an archive."""
-    table = new_table("", hash_column(), "experiment", "condition", *right("done", "solved"))
-    for facts in found:
-        origin, result = facts["origin"], facts["result"] or {"done": 0, "solved": 0}
-        names = (str(origin.get(name) or "–") for name in ("experiment", "label"))
-        counts = (str(result[name]) for name in ("done", "solved"))
-        table.add_row(facts["condition"][:12], *names, *counts)
-    return table
-
-
 def _condition_table(experiment: Experiment, found: list[dict[str, Any]]) -> Table:
     """Return a table of an experiment's conditions and the settings in which they differ."""
     by_id = {facts["condition"]: facts for facts in found}
@@ -148,13 +139,9 @@ def _condition_table(experiment: Experiment, found: list[dict[str, Any]]) -> Tab
     settings = [dict(_leaves(typed_parts(facts["settings"]))) for _, facts in rows]
     names = list(dict.fromkeys(itertools.chain.from_iterable(settings)))
     differing = [name for name in names if len({str(each.get(name)) for each in settings}) > 1]
-    table = new_table(
-        experiment.report_name,
-        "condition",
-        hash_column(),
-        *right("done"),
-        "settings in which they differ",
-    )
+    heads = hash_column(), *right("done")
+    name, last = experiment.report_name, "settings in which they differ"
+    table = new_table(name, "condition", *heads, last)
     for (label, facts), values in zip(rows, settings, strict=True):
         given = [f"{name}={compact(values[name])}" for name in differing if name in values]
         more = [f"… {len(given) - MAX_CHANGES} more"] if len(given) > MAX_CHANGES else []

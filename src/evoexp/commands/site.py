@@ -14,7 +14,7 @@ from evoexp.report.pages.home_page import Paper, StoredRun, home_page, summaries
 from evoexp.report.pages.html_page import HTML
 from evoexp.report.statistics.claim_rules import registered_rules
 from evoexp.store.files import write_file
-from evoexp.store.run_context import origin_of
+from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 
 MAX_NAMED = 4  # runs that are named as being written
@@ -66,9 +66,7 @@ def home_files() -> ReportFiles:
             runs.append(StoredRun(name, "", "", "", 0, 0, 0, str(run)))
             continue
         origin = origin_of(run)
-        experiment, label, budget = (
-            str(origin[key] or "") for key in ("experiment", "label", "budget")
-        )
+        experiment, label, budget = (str(origin[key] or "") for key in ORIGIN)
         counts = len(run.completed()), run.num_planned(), len(run.failed())
         runs.append(StoredRun(name, experiment, label, budget, *counts))
     if not found and not runs:

@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rich.table import Table
-
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
 from evoexp.commands.arguments import add_json_argument
@@ -57,15 +55,21 @@ def main(arguments: argparse.Namespace) -> int:
         own = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
         names += own if len(own) == 1 else [stored_run(prefix).hash12]
     names = names or run_names(outputs)
-    runs = [check_run(outputs, name) for name in dict.fromkeys(names)]
+    checks = [check_run(outputs, name) for name in dict.fromkeys(names)]
     with plain_console().status("checking logs"):
-        found = [_checked(run, logs) for run, logs in zip(runs, _all_logs(runs), strict=True)]
+        found = [_checked(each, logs) for each, logs in zip(checks, _all_logs(checks), strict=True)]
     damaged = [run for run in found if run.problems]
     if arguments.json:
         print_json([run._asdict() for run in found])
         return 1 if damaged else 0
     if damaged:
-        say(_table(damaged))
+        title = f"damaged runs in {outputs}"
+        table = new_table(title, hash_column("run"), *right("logs"), "damaged files")
+        for run in damaged:
+            lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
+            rest = [f"… {len(lines) - SHOWN} more"] if lines[SHOWN:] else []
+            table.add_row(run.hash[:HASH_LENGTH], str(run.logs), "\n".join(lines[:SHOWN] + rest))
+        say(table)
         for mend in dict.fromkeys(run.mend for run in damaged if run.mend):
             say(f"mend: {mend}")
     for run in found:
@@ -77,8 +81,7 @@ def main(arguments: argparse.Namespace) -> int:
             say(f"run {run.hash}: its solutions were not evaluated: {run.unevaluated}")
     logs, problems = sum(r.logs for r in found), sum(len(r.problems) for r in found)
     found_in = f"{problems} damaged file{'s' * (problems > 1)} in {len(damaged)} of them"
-    said = found_in if damaged else "all is well"
-    say(f"{len(found)} runs, {logs} logs: {said}")
+    say(f"{len(found)} runs, {logs} logs: {found_in if damaged else 'all is well'}")
     return 1 if damaged else 0
 
 
@@ -123,13 +126,3 @@ def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
         mend = rows[0].command if rows else known
     unevaluated = next((log.unevaluated for log in logs if log.unevaluated), "")
     return Checked(found.name, len(logs), problems, found.leftovers, mend, unevaluated)
-
-
-def _table(runs: Sequence[Checked]) -> Table:
-    title = f"damaged runs in {outputs_root()}"
-    table = new_table(title, hash_column("run"), *right("logs"), "damaged files")
-    for run in runs:
-        lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
-        more = [f"… {len(lines) - SHOWN} more"] if lines[SHOWN:] else []
-        table.add_row(run.hash[:HASH_LENGTH], str(run.logs), "\n".join(lines[:SHOWN] + more))
-    return table

@@ -34,8 +34,19 @@ def assigned(config: dict[str, Any], overrides: Choice) -> dict[str, Any]:
     settings = [override for key, override in overrides.items() if key not in groups()]
     by_path = sorted(settings, key=lambda override: _parts(override.key))
     for override in by_path:
-        if override.prefix != DELETE:
-            _assign(config, override)
+        if override.prefix == DELETE:
+            continue
+        node, last, present = _place(config, override)
+        value = override.values[0].data
+        if isinstance(present, dict) and isinstance(value, dict):
+            _merge(present, value)
+        elif present is not None and override.prefix == ADD:
+            must = "given without +, it is there already"
+            raise SettingError(override.key, must, override.typed)
+        elif isinstance(node, list) and last == len(node):
+            node.append(value)
+        else:
+            node[last] = value
     for override in reversed(by_path):
         if override.prefix == DELETE:
             _delete(config, override)
@@ -45,9 +56,8 @@ def assigned(config: dict[str, Any], overrides: Choice) -> dict[str, Any]:
 def known_instead(config: dict[str, Any], override: Override) -> list[str] | None:
     """Return the settings of a component that lacks an overridden one; None if it has that one.
 
-    No names are returned if no option of the override's group is chosen. A component that reads
-    files, and all that is no component, is not looked into: a setting there is checked with its
-    value.
+    No names are returned if no option of its group is chosen. In a component that reads files, and
+    in all that is no component, a setting is checked with its value.
     """
     root, *parts = override.key.split(".")
     adds = override.prefix in (ADD, FORCE)
@@ -71,19 +81,6 @@ def known_instead(config: dict[str, Any], override: Override) -> list[str] | Non
 def _parts(key: str) -> list[tuple[int, str]]:
     """Return the parts of a path in a form in which list indices are ordered as numbers."""
     return [(int(part) if part.isdigit() else -1, part) for part in key.split(".")]
-
-
-def _assign(config: dict[str, Any], override: Override) -> None:
-    node, last, present = _place(config, override)
-    value = override.values[0].data
-    if isinstance(present, dict) and isinstance(value, dict):
-        _merge(present, value)
-    elif present is not None and override.prefix == ADD:
-        raise SettingError(override.key, "given without +, it is there already", override.typed)
-    elif isinstance(node, list) and last == len(node):
-        node.append(value)
-    else:
-        node[last] = value
 
 
 def _delete(config: dict[str, Any], override: Override) -> None:

@@ -6,6 +6,7 @@ the chosen options; settings are assigned to copies of these (see `assignment`).
 """
 
 import contextlib
+import itertools
 import os
 import re
 import shutil
@@ -54,33 +55,21 @@ from evoexp.shipped import Option
 _PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 # how Hydra would run a job, which takes a fifth of the time to compose
-_NO_JOB = [
-    f"~hydra/{group}"
-    for group in (
-        "launcher",
-        "sweeper",
-        "output",
-        "help",
-        "hydra_help",
-        "hydra_logging",
-        "job_logging",
-    )
-]
+# parts of an entry of `conditions`, with what each is where it is left out
+PARTS: dict[str, Any] = {"overrides": [], "readings": {}, "beside": {}}
+_JOB = ("launcher", "sweeper", "output", "help", "hydra_help", "hydra_logging", "job_logging")
+_NO_JOB = [f"~hydra/{group}" for group in _JOB]
 _COMPOSER = (HydraException, OmegaConfBaseException, yaml.YAMLError, ValueError, TypeError, OSError)
 
 
 def expand(
     overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
 ) -> list[Experiment]:
-    """Expand overrides into experiments, one per `experiment=` swept over.
+    """Expand overrides, as typed in any order, into experiments, one per `experiment=` swept over.
 
     Args:
-        overrides: As typed, in any order: `experiment=rana_planar ga.population_size=20`.
         multirun: Whether values with commas are swept over.
         only: Labels to keep; empty keeps all.
-
-    Raises:
-        EvoexpError: For whatever cannot be run; nothing has been computed then.
     """
     given = collect(map(parse, overrides))
     refuse_sweeps(given, multirun=multirun)
@@ -131,10 +120,9 @@ class Composer:
     """
 
     def __init__(self, root: Path, file: Option | None) -> None:
-        """Begin with the shipped root configuration, in an empty folder `root`.
+        """Begin with the root configuration, in an empty folder that is searched first.
 
-        It comes first in the search path and holds, beside the root configuration, an experiment
-        that is given as a file: of a user's folders only the options count.
+        Of a user's folders only the options count.
         """
         self.root, self.file = root, file
         self._known: dict[frozenset[str], Composed] = {}  # by the words that choose options
@@ -245,7 +233,29 @@ def _entries(conditions: Any) -> Iterator[Entry]:
     """Expand the entries of `conditions`; without any, an empty one."""
     if not isinstance(conditions, dict | None):
         raise SettingError("conditions", "a mapping of labels to lists of overrides", conditions)
-    for template, entry in (conditions or {"": []}).items():
-        if not isinstance(entry, list) or not all(isinstance(text, str) for text in entry):
-            raise SettingError(f"conditions.{template}", "a list of overrides", entry)
-        yield from expand_entry(str(template), map(parse, entry))
+    for label, entry in (conditions or {"": []}).items():
+        for template, overrides in readings(str(label), entry):
+            yield from expand_entry(template, map(parse, overrides))
+
+
+def readings(label: str, entry: Any) -> Iterator[tuple[str, list[str]]]:
+    """Yield label and overrides of an entry under every reading, alone and beside the others.
+
+    An entry is a list of overrides, or a mapping with `overrides`, `readings` and `beside`; the
+    latter two are mappings of labels to lists of overrides.
+    """
+    field, must = f"conditions.{label}", "a list of overrides"
+    parts = entry if isinstance(entry, dict) else {"overrides": entry}
+    if unknown := [key for key in parts if key not in PARTS]:
+        raise SettingError(f"{field}.{unknown[0]}", f"one of {', '.join(PARTS)}", parts[unknown[0]])
+    own, readings, beside = (parts.get(part, default) for part, default in PARTS.items())
+    for part, each in (("readings", readings), ("beside", beside)):
+        if not isinstance(each, dict):
+            raise SettingError(f"{field}.{part}", f"a mapping of labels to {must}s", each)
+    for each in (own, *readings.values(), *beside.values()):
+        if not isinstance(each, list) or not all(isinstance(text, str) for text in each):
+            raise SettingError(field, must, each)
+    alone = {"": list[str]()}
+    for first, second in itertools.product({**alone, **readings}, {**alone, **beside}):
+        words = ", ".join(filter(None, (label, first, second)))
+        yield words, [*own, *readings.get(first, ()), *beside.get(second, ())]

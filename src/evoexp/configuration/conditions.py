@@ -46,18 +46,14 @@ class Builder:
         composed: Callable[[Choice], Composed],
         budget: Budget,
     ) -> None:
-        """Keep the experiment, and the function that composes the options of a choice."""
         self.name, self.budget = name, budget
         self._entries, self._composed = entries, composed
         self._known: dict[frozenset[str], Built] = {}
 
     def build_all(self, overrides: Choice, only: Sequence[str]) -> dict[str, Built]:
-        """Build all conditions, each once; return them by their labels.
+        """Build all conditions, each once; return by their labels those of `only`, or all.
 
         All are built even if some are kept: the labels of one condition make one label.
-
-        Args:
-            only: Labels to keep; empty keeps all.
         """
         rows = list(self._crossed(overrides))
         refuse_equal_labels(rows)

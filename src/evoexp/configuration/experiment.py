@@ -74,19 +74,13 @@ class Experiment(NamedTuple):
         return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
 
     def budget_of(self, label: str) -> str:
-        """Return the budget of a condition: `paper` if no cap changed it, whatever was asked for.
-
-        Fewer replicates are no other budget of a condition.
-        """
+        """Return the budget of a condition: `paper` if no cap changed it, whatever is asked for."""
         if label not in self.capped:
             return PAPER
         return f"{PAPER}, capped" if self.budget == PAPER else self.budget
 
     def origin(self, label: str, command: str) -> dict[str, Any]:
-        """Return a condition's origin for the manifest of its run; no part of its identity.
-
-        Options are recorded as group → name and origin of the option taken.
-        """
+        """Return a condition's origin for the manifest of its run; no part of its identity."""
         return {
             "experiment": self.name,
             "budget": self.budget_of(label),

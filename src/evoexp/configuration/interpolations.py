@@ -1,8 +1,7 @@
 """Interpolations: settings that are taken from others, `${ga}` or `${ga.num_generations}`.
 
 An interpolation is a whole value and names one setting. No function is called, as `${oc.env:HOME}`
-would: a condition is what is written down, and nothing of the environment, which may hold secrets,
-enters its hash and its logs.
+would: nothing of the environment, which may hold secrets, enters a condition's hash and logs.
 """
 
 import re

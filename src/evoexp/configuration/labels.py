@@ -1,9 +1,8 @@
 """Labels of conditions: every condition has one, and it is true of the condition.
 
-The file of an experiment labels its conditions by the settings in which they differ. Where the
-command line overrides one of these, the file's label may be false, and several labels may be of one
-condition. Such a condition has the label of the file's condition that it still is, or else is named
-by its planner, or by the overriding setting.
+Where the command line overrides a setting in which an experiment's conditions differ, the file's
+label may be false, and several labels may be of one condition. Such a condition has the label of
+the file's condition that it still is, or else is named by its planner, or the overriding setting.
 """
 
 from collections import Counter
@@ -11,14 +10,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Se
 from typing import NamedTuple
 
 from evoexp.configuration.experiment import Built
-from evoexp.configuration.overrides import (
-    AROUND,
-    DELETE,
-    JOIN,
-    NOT_IDENTITY,
-    Choice,
-    short_names,
-)
+from evoexp.configuration.overrides import AROUND, DELETE, JOIN, NOT_IDENTITY, Choice, short_names
 from evoexp.errors import SettingError
 
 SAME = " ≡ "  # between labels of one condition

@@ -19,7 +19,7 @@ def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
     """Yield label and overrides of every problem of a folder; without one, the overrides as given.
 
     A label is the folder's name and the number, `box_panda 0001`; problems come in the order of the
-    paths of their scenes. A folder that holds none, too many, or a scene alone is refused.
+    paths of their scenes.
     """
     if FOLDER not in choice:
         yield "", choice
@@ -41,8 +41,7 @@ def problem_choices(choice: Choice) -> Iterator[tuple[str, Choice]]:
         request = scene.with_name(f"request{number}.yaml")
         if not request.is_file():
             raise SettingError(FOLDER, f"a folder with {request.name} beside every scene", folder)
-        paths = ((SCENE, str(scene)), (REQUEST, str(request)))
-        files = {
-            k: Override("", k, (Value(path, path),), False, f"{k}={path}") for k, path in paths
-        }
+        files = {}
+        for key, path in ((SCENE, str(scene)), (REQUEST, str(request))):
+            files[key] = Override("", key, (Value(path, path),), False, f"{key}={path}")
         yield f"{scene.resolve().parent.name} {number}".strip(), rest | files

@@ -90,10 +90,7 @@ def _miswritten(file: Option) -> EvoexpError | None:
 
 
 def check_file(path: Path) -> None:
-    """Refuse an option file that is too large, or that unfolds to too many values.
-
-    Whether it can be composed otherwise is not looked at.
-    """
+    """Refuse an option file that is too large, or that unfolds to too many values."""
     try:
         content = read_bounded(path, MAX_FILE)
         unfolded = _num_values(yaml.parse(content, yaml.CSafeLoader))

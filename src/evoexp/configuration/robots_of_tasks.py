@@ -60,11 +60,7 @@ def with_planning_group(plain: dict[str, Any]) -> dict[str, Any]:
 
 
 def _standing(state: dict[str, float], settings: dict[str, Any]) -> dict[str, float]:
-    """Return the start state of joints that stand still [deg, m].
-
-    A state also names joints without a value of their own, which a URDF may have fixed: those are
-    left out, as are joints that follow others.
-    """
+    """Return the start state of joints that stand still, but fixed and mimicking ones [deg, m]."""
     robot: Urdf = build(settings, component_class, PARTS[0])
     moving, found = joint_roles(robot).moving, {}
     for name, value in state.items():

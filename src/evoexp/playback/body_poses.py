@@ -33,10 +33,8 @@ class Poses(NamedTuple):
 def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
     """Return the instants at which a motion is shown, (ticks,), its first and last among them.
 
-    Args:
-        motion: The motion; every instant is shown, unless there are more than `MAX_TICKS`.
-        prismatic: (nq,) true for coordinates that are lengths.
-        size: Size of the scene [length unit].
+    Every instant is shown, unless there are more than `MAX_TICKS`. `prismatic` (nq,) is true for
+    coordinates that are lengths; `size` is the scene's [length unit].
     """
     segments = motion.num_segments
     if segments == 0:
@@ -77,12 +75,9 @@ def poses(
 
 
 def points(world: FloatArray, frame: int, point: FloatArray) -> FloatArray:
-    """Return the positions of a point of a frame over time, (ticks, 3), or of several points.
+    """Return the positions of a point (3,) of a frame (−1: the world) over time, (ticks, 3).
 
-    Args:
-        world: (ticks, frames, 7).
-        frame: Its index; −1: the world.
-        point: (3,) in the frame, or (points, 3): the result is then (points, ticks, 3).
+    Of points (points, 3), the positions are (points, ticks, 3). `world` is (ticks, frames, 7).
     """
     ticks = len(world)
     rows = np.broadcast_to(point[..., None, :], (*point.shape[:-1], ticks, 3))

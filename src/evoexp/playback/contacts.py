@@ -90,10 +90,7 @@ class _Watch:
 
 
 def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> list[Contact]:
-    """Return the contacts of one piece.
-
-    The certifier finds the begin of a contact; ticks and bisection find its end.
-    """
+    """Return the contacts of one piece: the certifier finds their begin, bisection their end."""
     contacts: list[Contact] = []
     t = float(part.first)
     while t < part.last or (t == part.last == part.first and not contacts):
@@ -120,10 +117,7 @@ def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> l
 
 
 def remainder(motion: Motion, t: float, last: int) -> Motion:
-    """Return the rest of a motion from t up to an instant.
-
-    If t lies inside a segment, the first segment is the rest of that one.
-    """
+    """Return the rest of a motion from t, which may lie inside a segment, up to an instant."""
     segment = min(int(t), max(motion.num_segments - 1, 0))
     u = t - segment
     q = motion.q[segment : last + 1]

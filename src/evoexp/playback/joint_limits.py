@@ -34,10 +34,9 @@ class JointLimits(NamedTuple):
 def joint_limits(
     names: tuple[str, ...], path: Path | None, speeds: FloatArray, robot: FloatArray, ramp: float
 ) -> JointLimits:
-    """Collect the limits of joints.
+    """Collect the limits of joints (nq).
 
     Args:
-        names: Names of the joints, (nq).
         path: MoveIt's `joint_limits.yaml`; None: there is none.
         speeds: (nq,) greatest |dq/dt| where nothing else limits it [rad/s or length unit/s].
         robot: (nq,) the robot's own velocity limits; inf where it has none.
@@ -80,10 +79,8 @@ def _read(path: Path, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
             if not joint.get(f"has_{kind}_limits", f"max_{kind}" in joint):
                 continue
             value = joint.get(f"max_{kind}")
-            is_number = isinstance(value, int | float) and 0.0 < value < 1e300
-            if not is_number:
-                field = f"--limits: joint_limits.{printable(name)}.max_{kind}"
-                was = printable(str(value))
-                raise LimitsFileError(f"{field} must be a number above 0, was {was}")
+            if not (isinstance(value, int | float) and 0.0 < value < 1e300):
+                must = f"joint_limits.{printable(name)}.max_{kind} must be a number above 0"
+                raise LimitsFileError(f"--limits: {must}, was {printable(str(value))}")
             limits[name][kind] = float(value)
     return limits

@@ -75,11 +75,10 @@ def playable_log(recording: Recording) -> bytes:
         while waiting and waiting[0][0] <= now:
             out.message("/log", *waiting.pop(0))
         out.message("/tf", now, _transforms(recording, k, now))
-        joints = zip(
-            recording.joints, recording.q[k].tolist(), recording.dq[k].tolist(), strict=True
-        )
+        rates = recording.q[k].tolist(), recording.dq[k].tolist()
         states: list[Any] = [
-            {"name": joint.name, "position": q, "velocity": dq} for joint, q, dq in joints
+            {"name": joint.name, "position": q, "velocity": dq}
+            for joint, q, dq in zip(recording.joints, *rates, strict=True)
         ]
         out.message("/joint_states", now, JointStates(timestamp=_stamp(now), joints=states))
         least = float(clearance.least[k])

@@ -26,11 +26,7 @@ FILES = {
 
 
 def page(recordings: Sequence[Recording]) -> bytes:
-    """Return a page that plays one motion, or several side by side on one clock.
-
-    Returns:
-        HTML; the same motions give the same bytes.
-    """
+    """Return a page of HTML that plays one motion, or several side by side on one clock."""
     assets = resources.files("evoexp") / "assets"
     text = (assets / "motion_page.html").read_text(encoding="utf-8")
     data = json.dumps(

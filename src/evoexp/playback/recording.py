@@ -92,11 +92,7 @@ class Recording(NamedTuple):
 def record(
     condition: Condition, solution: FloatArray, heading: Heading, limits: SpeedLimits | None = None
 ) -> Recording:
-    """Return the recording of a solution's motion.
-
-    Raises:
-        NoMotion: If the planner gives no motion for the solution, or no bodies.
-    """
+    """Return the recording of a solution's motion, see `record_motion`."""
     planner, problem = condition.prepare()
     return record_motion(condition, planner.motion(problem, solution), heading, limits)
 
@@ -106,8 +102,7 @@ def record_motion(
 ) -> Recording:
     """Return the recording of a motion among the bodies of a condition, timed by speed limits.
 
-    Raises:
-        NoMotion: If there is no motion, or there are no bodies.
+    NoMotion is raised where there is no motion, or there are no bodies.
     """
     planner, problem = condition.prepare()
     parts = [] if motion is None else list(planner.parts(problem, motion))

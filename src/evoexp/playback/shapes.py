@@ -56,11 +56,7 @@ class Shape(NamedTuple):
 
 
 def outline(shape: Any) -> tuple[Outline, Any]:
-    """Return the outline of a coal shape, and the `pin.SE3` of the outline's frame in the shape's.
-
-    Raises:
-        UnsupportedShape: If there is no way to draw it.
-    """
+    """Return the outline of a coal shape, and the `pin.SE3` of its frame in that of the shape."""
     here = pin.SE3.Identity()
     if isinstance(shape, coal.Box):
         return Outline("box", tuple(2.0 * float(half) for half in shape.halfSide)), here

@@ -46,11 +46,7 @@ class TimedPoints(NamedTuple):
 
 
 def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
-    """Return the least time from instant to instant within all joints' limits [s].
-
-    Args:
-        limits: (nq,) greatest |dq/dt| [rad/s or length unit/s].
-    """
+    """Return the least time from instant to instant within limits (nq,) of joints' speeds [s]."""
     if motion.num_segments == 0:
         return 1.0
     return float((top_speeds(motion) / limits).max()) or 1.0
@@ -70,14 +66,9 @@ def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
 
 
 def fastest(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> TimedPoints:
-    """Time a motion as fast as limits permit, from rest to rest.
+    """Time a motion as fast as limits of speed and acceleration (nq,) permit, from rest to rest.
 
-    Args:
-        speeds: (nq,) limits [rad/s or length unit/s].
-        accelerations: (nq,) limits [rad/s² or length unit/s²].
-
-    Raises:
-        BadTiming: If toppra is not installed.
+    BadTiming is raised where toppra is not installed.
     """
     try:
         with warnings.catch_warnings():  # Python warns of its docstrings when it compiles them
@@ -155,8 +146,7 @@ def hermite_motion(times: FloatArray, positions: FloatArray, velocities: FloatAr
 def greatest_rates(motion: Motion, widths: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the greatest speed and acceleration of every joint, each (nq,).
 
-    Args:
-        widths: (segments,) durations of the motion's segments [s].
+    The segments of the motion take widths (segments,) [s].
     """
     _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
     w = widths[:, None]

@@ -59,14 +59,8 @@ class Trajectory(NamedTuple):
 def trajectory(recording: Recording, timing: Timing, limits: JointLimits) -> Trajectory:
     """Return the points of a motion in time.
 
-    Args:
-        timing: optimal: as fast as limits of speed and acceleration permit, at rest at both ends
-            and wherever two straight lines meet | uniform: equal times from instant to instant, as
-            short as the limits of speed permit; its speed jumps.
-        limits: Limits of the joints.
-
-    Raises:
-        BadTiming: If the timing needs a package that is not installed.
+    Optimal timing rests at both ends and wherever two straight lines meet; uniform timing has equal
+    times from instant to instant, as short as the limits of speed permit.
     """
     motion, verdict = recording.motion, recording.verdict
     names = tuple(joint.name for joint in recording.joints)
@@ -89,11 +83,7 @@ def trajectory(recording: Recording, timing: Timing, limits: JointLimits) -> Tra
 
 
 def as_ros(found: Trajectory) -> bytes:
-    """Return a trajectory as a `trajectory_msgs/msg/JointTrajectory`, in JSON, which is YAML, too.
-
-    Raises:
-        BadTiming: If joints slide by another unit of length than ROS's metre.
-    """
+    """Return a trajectory as a `trajectory_msgs/msg/JointTrajectory` in JSON, a part of YAML."""
     others = sorted(set(found.units) - {"rad", "m"})
     if others:
         raise BadTiming(f"--format ros: joints that slide must do so in m, was {others[0]}")

@@ -54,11 +54,7 @@ class JointTrajectory(NamedTuple):
 
 
 def read_columns(content: bytes) -> JointTrajectory:
-    """Read a CSV file with a head.
-
-    Raises:
-        TableError: If it is no table of numbers.
-    """
+    """Read a CSV file with a head; TableError is raised where it is no table of numbers."""
     rows = read_table(content)
     head = rows[0].cells if rows else []
     for name in head:
@@ -80,11 +76,7 @@ def read_columns(content: bytes) -> JointTrajectory:
 
 
 def read_message(data: dict[str, Any]) -> JointTrajectory:
-    """Read a JointTrajectory message, or our JSON, which is one with units.
-
-    Raises:
-        ValueError: If it is none.
-    """
+    """Read a JointTrajectory message, or our JSON, which is one with units, or raise ValueError."""
     for wrapper in ("joint_trajectory", "trajectory"):  # a RobotTrajectory, a controller's goal
         data = data[wrapper] if isinstance(data.get(wrapper), dict) else data
     names, points, units = (data.get(key) for key in ("joint_names", "points", "units"))
@@ -100,10 +92,8 @@ def read_message(data: dict[str, Any]) -> JointTrajectory:
     for key in ("positions", "velocities", "accelerations"):
         rows[key] = []
         for k, point in enumerate(points):
-            row, where = (
-                point.get(key, []) if isinstance(point, dict) else None,
-                f"points[{k}].{key}",
-            )
+            row = point.get(key, []) if isinstance(point, dict) else None
+            where = f"points[{k}].{key}"
             if not isinstance(row, list):
                 raise ValueError(f"{where} must be a list of numbers")
             rows[key].append([_number(value, where) for value in row])
@@ -151,8 +141,7 @@ def fitted(
 ) -> tuple[Motion, tuple[str, ...]]:
     """Return a trajectory as a motion of a robot's joints, and remarks on how it was read.
 
-    Raises:
-        ValueError: If a joint is missing, or a unit, a time or a number cannot be.
+    ValueError says that a joint is missing, or that a unit, a time or a number cannot be.
     """
     if given.is_table:
         given = _by_joint(given, joints, length_unit)
@@ -189,9 +178,7 @@ def fitted(
 
 def _by_joint(table: JointTrajectory, joints: Sequence[Joint], length_unit: str) -> JointTrajectory:
     """Match columns with joints by their heads: `elbow`, `elbow_rad`, `elbow_rad_per_s`."""
-    positions: dict[str, Values] = {}
-    velocities: dict[str, Values] = {}
-    unread = []
+    positions, velocities, unread = dict[str, Values](), dict[str, Values](), []
     names = {joint.name for joint in joints}
     for head, column in table.positions.items():
         matches = [(head, ("", False))] if head in names else []
@@ -255,11 +242,7 @@ def _scaled(values: Values, joint: Joint, length_unit: str) -> FloatArray:
 
 
 def parse_message(text: str, is_yaml: bool) -> Any:
-    """Return the content of a JSON or YAML file.
-
-    Raises:
-        ValueError: If it is none, or holds several documents.
-    """
+    """Return the content of a JSON or YAML file of one document, or raise ValueError."""
     if not is_yaml:
         return json.loads(text)
     import yaml  # takes long to load

@@ -20,9 +20,6 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
     blocks. A PNG (two dimensions) has one pixel per node, black for a blocked one, white for a free
     one.
 
-    Args:
-        size: How many nodes there are along x, y[, z].
-
     Returns:
         (nodes along x, along y[, along z]), true for blocked nodes.
     """

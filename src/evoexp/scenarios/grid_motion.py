@@ -67,12 +67,7 @@ class GridMotion(Component):
         return " × ".join(f"0..{count - 1}" for count in self.size)
 
     def blocked(self) -> np.ndarray:
-        """Return which nodes belong to obstacles, (nodes along x, along y[, along z]).
-
-        Raises:
-            SettingError: If the map does not fit, or start or goal lies inside an obstacle.
-            MissingFile: If the content of the map is nowhere.
-        """
+        """Return which nodes belong to obstacles, (nodes along x, along y[, along z])."""
         nodes, half = np.zeros(self.size, dtype=bool), len(self.size)
         if self.map is not None:
             nodes |= read_map(self.map.content, self.size, "scenario.map")
@@ -86,10 +81,9 @@ class GridMotion(Component):
         return nodes
 
     def bodies(self) -> tuple[BoxObstacle, ...]:
-        """Return obstacles as boxes that span the centres of their nodes.
+        """Return obstacles as boxes that span the centres of their nodes, in the plane on a floor.
 
-        In two dimensions the boxes stand on the floor. They are not grown by half a cell: then they
-        would touch the moves past their corners, which are permitted.
+        Grown by half a cell, they would touch the moves past their corners, which are permitted.
         """
         half = len(self.size)
         corners = [(each[:half], each[half:]) for each in self.obstacles]

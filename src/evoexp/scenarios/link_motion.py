@@ -40,12 +40,7 @@ class Posture(Settings):
         return self
 
     def link_angles(self, field: str, base: FloatArray, lengths: FloatArray) -> FloatArray:
-        """Return the link angles (2,) [deg].
-
-        Args:
-            base: (2,) of the robot.
-            lengths: (2,) of its links.
-        """
+        """Return the link angles (2,) [deg] of a robot at a base (2,), with link lengths (2,)."""
         if self.angles is not None:
             angles = np.array(self.angles)
         else:
@@ -75,9 +70,7 @@ class LinkMotion(Component):
     def ends(self, bases: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return link angles of all robots at start and goal, each (robots, 2) [deg].
 
-        Args:
-            bases: (robots, 2).
-            lengths: (robots, 2) of the links.
+        The robots have bases and lengths of their links, (robots, 2) each.
         """
         ends = []
         for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
@@ -99,10 +92,7 @@ class LinkMotion(Component):
 def _reach(field: str, tip: FloatArray, lengths: FloatArray, side: float) -> FloatArray:
     """Return the link angles (2,) [deg] in [−180, 360) that bring the end-effector to a place.
 
-    Args:
-        tip: (2,) the place, from the robot's base.
-        lengths: (2,) of the links.
-        side: On which the elbow is, seen from the base: 1 on the left, −1 on the right.
+    The place (2,) is from the base; so seen, the elbow is on the left (side 1) or right (−1).
     """
     x, y = tip
     squared = float(x * x + y * y)

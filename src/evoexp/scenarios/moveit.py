@@ -80,11 +80,7 @@ class MoveitTask(Component):
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
-        """Return settings with the contents of files in the place of their paths.
-
-        Raises:
-            SettingError: If a file cannot be read, or is not what it should be.
-        """
+        """Return settings with the contents of files in the place of their paths."""
         settings = dict(settings)
         packages = package_folders(settings.pop("packages", None), f"{field}.packages")
         for name, message in FILES.items():
@@ -235,11 +231,8 @@ def read_link_goal(request: MessagePart, frames: Frames) -> LinkGoal:
     must = f"a goal of '{link}' without target_point_offset, or with an orientation"
     request.require(turns or not offset.any(), must, offset.tolist())
     for turn in turns:
-        must, name = (
-            f"an orientation of '{link}', whose position is the goal",
-            turn["link_name"].text,
-        )
-        turn.require(name == link, must, name)
+        must = f"an orientation of '{link}', whose position is the goal"
+        turn.require(turn["link_name"].text == link, must, turn["link_name"].text)
         turned = frames.of_header(turn.called(f"the orientation of '{link}'")).times(turn.pose)
         least = min(turn[f"absolute_{axis}_axis_tolerance"].number(0.0) for axis in "xyz")
         turn.require(least > 0.0, f"tolerances above 0 of '{link}'", least)

@@ -21,6 +21,7 @@ KINDS = ("", "box", "sphere", "cylinder", "cone", "prism")  # numbered as in Sol
 MOST_NESTED, MOST_VALUES = 30, 200_000
 MUST = "YAML as MoveIt writes it"
 ECHO = "; ros2 topic echo --once --full-length TOPIC writes it as YAML"
+IN_RVIZ = f"; load it in RViz: {ECHO[2:]}"
 # how files of other formats begin, and what to do about it
 FORMATS = (
     (rb"\s*\Z", "an empty file", ""),
@@ -30,11 +31,7 @@ FORMATS = (
     (rb"\s*<(!doctype )?html", "an HTML page", "; download the file itself"),
     (rb"\s*<[?!\w]", "XML", ""),
     (rb"\x1f\x8b|PK\x03\x04|BZh|\xfd7zXZ", "a compressed file", "; unpack it"),
-    (
-        rb"[^\n]*\n\s*(\*\s|\.\s*\Z)",
-        "MoveIt's text format (.scene)",
-        f"; load it in RViz: {ECHO[2:]}",
-    ),
+    (rb"[^\n]*\n\s*(\*\s|\.\s*\Z)", "MoveIt's text format (.scene)", IN_RVIZ),
     (rb"[^\0]*\0", "a binary file", ""),
 )
 CUT_OFF = re.compile(r"\.\.\.|<(sequence|array) type: .*>")  # as `topic echo` shortens lists
@@ -97,8 +94,7 @@ def primitive_kind(value: Any) -> str:
 class MessagePart:
     """A part of a message, with its place in the file; false if it is absent.
 
-    Whatever it is asked for, it raises a `SettingError` that names the place if it is something
-    else. An absent mapping, list or text is empty.
+    An absent mapping, list or text is empty.
     """
 
     def __init__(self, value: Any, field: str, where: str) -> None:
@@ -217,12 +213,7 @@ class _Loader(yaml.CSafeLoader):  # type: ignore[misc]  # PyYAML's C part has no
 
 @functools.lru_cache(maxsize=64)
 def read_document(content: bytes, field: str, message: str) -> MessagePart:
-    """Read the only message of a file.
-
-    Args:
-        content: Of a file.
-        message: Its type, of `moveit_messages.FIELDS`.
-    """
+    """Read the only message of a file, of a type that `moveit_messages.FIELDS` names."""
     if len(content) > MAX_SCENE:
         must = f"a file of at most {MAX_SCENE / MEGABYTE:g} MB"
         raise SettingError(field, must, f"{len(content) / MEGABYTE:.1f} MB")

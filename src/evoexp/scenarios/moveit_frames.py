@@ -44,11 +44,7 @@ def frame_name(part: MessagePart) -> str:
 
 
 def read_frames(scene: MessagePart, links: "LinkFrames | None") -> Frames:
-    """Read the fixed transforms of a scene beside the links of a robot.
-
-    Args:
-        links: Of the robot; None: they have no names.
-    """
+    """Read the fixed transforms of a scene beside the links of a robot, if these have names."""
     root, standing, moving, ground = links or ("", (), frozenset[str](), "")
     named, planning, is_certain = _fixed_transforms(scene)
     known = dict.fromkeys(filter(None, (ground, root, WORLD)))
@@ -78,11 +74,9 @@ def has_other_frames(scene: MessagePart) -> bool:
 
 
 def _fixed_transforms(scene: MessagePart) -> tuple[dict[str, Pose], str, bool]:
-    """Read the fixed transforms.
+    """Return the fixed transforms, in the planning frame; its name, if given; whether it is sure.
 
-    Returns:
-        Frames and their poses in the planning frame; its name, empty if none is given; and whether
-        it is surely the planning frame's, as MoveIt writes it: with a transform into itself.
+    It is where MoveIt wrote it: with a transform into itself.
     """
     named: dict[str, Pose] = {}
     planning, is_certain = "", False
@@ -91,9 +85,8 @@ def _fixed_transforms(scene: MessagePart) -> tuple[dict[str, Pose], str, bool]:
         name = frame_name(transform["header"]["frame_id"])
         target, pose = frame_name(transform["child_frame_id"]), transform["transform"].pose
         is_identity = pose.is_near(IDENTITY, SAME)
-        must = (
-            f"a frame other than '{target}' at {transform.where}.header.frame_id, or no transform"
-        )
+        where = f"{transform.where}.header.frame_id"
+        must = f"a frame other than '{target}' at {where}, or no transform"
         scene.require(is_identity or name not in ("", target), must, name)
         must = f"the planning frame at {transform.where}.child_frame_id"
         scene.require(target or not name, must, "")

@@ -123,12 +123,7 @@ FIELDS: dict[str, dict[str, str]] = {
 
 
 def check_fields(value: Any, message: str, field: str, where: str = "") -> None:
-    """Refuse fields that a message does not have, and those that evoexp does not know.
-
-    Args:
-        value: The message, or a list of such messages.
-        where: The value's place in the file.
-    """
+    """Refuse fields that a message, or a list of such, does not have, or evoexp does not know."""
     if isinstance(value, list):
         for k, item in enumerate(value):
             check_fields(item, message, field, f"{where}[{k}]")

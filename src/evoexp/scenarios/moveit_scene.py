@@ -180,8 +180,11 @@ def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
         return BoxObstacle(shape="box", name=name, center=center, size=size, rotation=angles)
     if kind == "sphere":
         return SphereObstacle(shape="sphere", name=name, center=center, radius=float(sizes[0]))
-    if kind == "cone":
-        return _cone_hull(float(sizes[0]), float(sizes[1]), pose, name)
+    if kind == "cone":  # a pyramid around it, its axis z, its middle half way up
+        turns = [sincos(2.0 * np.pi * k / AROUND) for k in range(AROUND)]
+        height, wide = float(sizes[0]), float(sizes[1]) / sincos(np.pi / AROUND)[1]
+        base = [[wide * cos, wide * sin, -0.5 * height] for sin, cos in turns]
+        return _hull(np.array([*base, [0.0, 0.0, 0.5 * height]]), pose, name)
     along = 0.5 * float(sizes[0]) * pose.rotation[:, 2]
     ends = _three(pose.position - along), _three(pose.position + along)
     radius = float(sizes[1])
@@ -189,10 +192,7 @@ def _primitive(primitive: MessagePart, pose: Pose, name: str) -> Obstacle:
 
 
 def _plane(plane: MessagePart, pose: Pose, name: str) -> Obstacle:
-    """Return the half-space behind a plane ax + by + cz + d = 0: its normal points to free space.
-
-    A thin plane and the half-space behind it are the same to a robot that stands before it.
-    """
+    """Return the half-space behind a plane ax + by + cz + d = 0, against its normal (a, b, c)."""
     a, b, c, d = plane["coef"].numbers(4)
     normal = np.array([a, b, c])
     size = float(a * a + b * b + c * c)
@@ -239,10 +239,7 @@ def _three(values: Any) -> tuple[float, float, float]:
 def _mesh_hulls(
     mesh: MessagePart, loaded: Mapping[str, Mesh], pose: Pose, name: str
 ) -> list[HullObstacle]:
-    """Return the convex hulls of the parts of a mesh that hang together, numbered if several.
-
-    The mesh is a `shape_msgs/Mesh`, or one of the files that the scene names.
-    """
+    """Return the convex hulls of the parts of a mesh that hang together, numbered if several."""
     if resource := mesh["resource"].text:
         has_own = mesh["vertices"].value or mesh["triangles"].value
         mesh.require(not has_own, f"a resource or triangles at {mesh.where}, not both", name)
@@ -278,14 +275,6 @@ def _own_triangles(mesh: MessagePart, name: str) -> Mesh:
     was = ", ".join(f"{k:g}" for k in wrong[0]) if len(wrong) else "none"
     mesh.require(len(triangles) and not len(wrong), must, was)
     return corners, triangles.astype(np.int64)
-
-
-def _cone_hull(height: float, radius: float, pose: Pose, name: str) -> HullObstacle:
-    """Return a pyramid around a cone, its axis z, its middle half way up."""
-    turns = [sincos(2.0 * np.pi * k / AROUND) for k in range(AROUND)]
-    wide = radius / sincos(np.pi / AROUND)[1]
-    base = [[wide * cos, wide * sin, -0.5 * height] for sin, cos in turns]
-    return _hull(np.array([*base, [0.0, 0.0, 0.5 * height]]), pose, name)
 
 
 def _hull(points: FloatArray, pose: Pose, name: str) -> HullObstacle:

@@ -73,10 +73,8 @@ class HalfSpaceObstacle(NamedObstacle):
 class EllipseObstacle(NamedObstacle):
     """An ellipse in the plane with its inside.
 
-    In space it is an ellipsoid whose third semi-axis, along z, is the second one.
-
-    The third semi-axis decides nothing for links that move in the plane of the centre: in a plane
-    of symmetry of a convex body, distances are those of its section.
+    In space it is an ellipsoid whose third semi-axis, along z, is the second one. It decides
+    nothing for links that move in the plane of the centre, a plane of symmetry.
     """
 
     shape: Literal["ellipse"]
@@ -139,11 +137,7 @@ class ObstacleTable(NamedTuple):
 
 
 def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
-    """Return obstacles as arrays.
-
-    Raises:
-        SettingError: If the ends of a capsule or cylinder coincide, or a normal is zero.
-    """
+    """Return obstacles as arrays."""
     rows = [_row(obstacle, f"scenario.obstacles[{k}]") for k, obstacle in enumerate(obstacles)]
     kinds, *columns = zip(*rows, strict=True) if rows else ((), (), (), ())
     center, rotation, size = (
@@ -183,10 +177,7 @@ def _row(obstacle: Any, field: str) -> tuple[int, FloatArray, FloatArray, Any]:
 
 
 def obstacle_hulls(obstacles: tuple[Any, ...]) -> dict[int, FloatArray]:
-    """Return row → points (points, 3), of the obstacles whose box in the table is not all.
-
-    The points are in the frame of the box.
-    """
+    """Return row → points (points, 3) in the frame of the box, of obstacles that are hulls."""
     return {
         k: np.array(obstacle.points) - obstacle.box[0]
         for k, obstacle in enumerate(obstacles)

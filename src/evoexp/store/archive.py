@@ -92,9 +92,7 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
 def take_in(path: Path, outputs: Path) -> list[TakenRun]:
     """Take the runs of an archive into a store; replicates that are there already stay.
 
-    Raises:
-        ArchiveError: If it is no archive of runs, or damaged; what came before the damage is taken.
-        Busy: If another process writes one of the runs.
+    ArchiveError says that it is none, or damaged; what came before the damage is taken.
     """
     arrivals: dict[str, _Arrival] = {}
     shown = printable(str(path))
@@ -141,7 +139,15 @@ class _Arrival:
         if name.isdecimal():
             self._add_log(int(name), content)
         elif name == MANIFEST:
-            self._beside[name] = self._foreign(content)
+            try:
+                notes: Any = json.loads(content)
+            except (ValueError, RecursionError):
+                notes = None
+            if not isinstance(notes, dict):
+                text = f"damaged: {MANIFEST} of run {self.run.hash12} is no JSON object"
+                raise ArchiveError(text)
+            marked = notes | {TAKEN: printable(self._archive.replace("\n", " "))}
+            self._beside[name] = json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
         elif name == PLANS:
             self._beside[name] = content
         elif name != PREFIX + sha256 or sha256.encode() not in self._beside[CONFIG]:
@@ -151,17 +157,6 @@ class _Arrival:
             with self.run.lock():
                 place.parent.mkdir(exist_ok=True)
                 write_file(place, content)
-
-    def _foreign(self, manifest: bytes) -> bytes:
-        """Return somebody's manifest with the name of the archive that it comes from."""
-        try:
-            notes: Any = json.loads(manifest)
-        except (ValueError, RecursionError):
-            notes = None
-        if not isinstance(notes, dict):
-            raise ArchiveError(f"damaged: {MANIFEST} of run {self.run.hash12} is no JSON object")
-        marked = notes | {TAKEN: printable(self._archive.replace("\n", " "))}
-        return json.dumps(marked, indent=2, sort_keys=True).encode() + b"\n"
 
     def _add_log(self, replicate: int, content: bytes) -> None:
         self._begin()
@@ -196,7 +191,6 @@ class _Arrival:
             self.run.check()
 
     def _write(self) -> None:
-        """Write the logs that wait."""
         if self._waiting:
             with self.run.lock():
                 self.run.write_logs(self._waiting)

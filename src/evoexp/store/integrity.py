@@ -1,11 +1,8 @@
 """The integrity of stored runs: damaged files are found, set aside, and written or run again.
 
-A log is checked against its place when it is first seen; see `summaries`. `verify` checks every
-log as a whole and in its place, and the files beside the logs; it reads only. Mending is for who
-holds the lock; no reading command renames anything.
-
-A link of a log's chain cannot be computed again from the log: `reproduce` runs the replicate again.
-Solutions can be evaluated again, by whoever knows planners: see `check_log`.
+A log is checked against its place when it is first seen; see `summaries`. Mending is for who holds
+the lock; no reading command renames anything. A link of a log's chain cannot be computed again from
+the log: `reproduce` runs the replicate again.
 """
 
 import contextlib
@@ -38,13 +35,7 @@ from evoexp.store.log_reader import (
     read_summary,
 )
 from evoexp.store.run_directory import RunDirectory, open_run
-from evoexp.store.summaries import (
-    altered,
-    damaged_logs,
-    replicate_of,
-    table_damage,
-    whole_logs,
-)
+from evoexp.store.summaries import altered, damaged_logs, replicate_of, table_damage, whole_logs
 
 _KNOWN = {CONFIG, MANIFEST, PLANS, REPLICATES, PREFIX.strip("/"), "summary.parquet", ".lock"}
 DELETE = "; delete it, then run again"
@@ -58,8 +49,7 @@ class LogCheck(NamedTuple):
     name: str  # of its file
     problem: str  # what is wrong with it, in one line; empty if nothing is
     summary: ReplicateSummary | None  # its own; None where it cannot be read
-    # why its solutions could not be evaluated; empty if they were, or if something is wrong with
-    # the log
+    # why its solutions could not be evaluated; empty if they were, or the log has a problem
     unevaluated: str = ""
 
 
@@ -96,8 +86,16 @@ def check_run(outputs: Path, name: str) -> RunCheck:
     except OSError as error:
         problem = f"{error.filename}: {error.strerror}; change its permissions"
         return RunCheck(name, None, {"cannot be read": problem}, [])
-    if (lost := _lost(run)) and not run.is_being_written():
-        problems[REPLICATES] = lost
+    # replicates that were asked for and left neither log nor failure
+    asked = run.num_asked()
+    there = {k for k in run.completed() | run.failed() if k < asked}
+    if len(there) < asked and not run.is_being_written():
+        first = list(itertools.islice((k for k in range(asked) if k not in there), MAX_NAMED))
+        others = asked - len(there) - len(first)
+        lost = ", ".join(map(str, first)) + (f" and {others} more" if others else "")
+        problems[REPLICATES] = (
+            f"missing: {lost} of {asked} replicates that were asked for (gone, or not run yet)"
+        )
     if damage := table_damage(run):
         problems["summary.parquet"] = damage
     for replicate in sorted(run.failed()):
@@ -109,26 +107,10 @@ def check_run(outputs: Path, name: str) -> RunCheck:
     return RunCheck(name, run, problems, leftovers)
 
 
-def _lost(run: RunDirectory) -> str:
-    """Tell which replicates were asked for and left neither log nor failure; empty: none."""
-    asked = run.num_asked()
-    there = {k for k in run.completed() | run.failed() if k < asked}
-    if len(there) >= asked:
-        return ""
-    first = list(itertools.islice((k for k in range(asked) if k not in there), MAX_NAMED))
-    more = f" and {asked - len(there) - len(first)} more" if asked - len(there) > len(first) else ""
-    return (
-        f"missing: {', '.join(map(str, first))}{more} of {asked} replicates that were asked for "
-        "(gone, or not run yet)"
-    )
-
-
 def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
     """Look at a log of a run as a whole; the name of its file tells its replicate.
 
-    Args:
-        condition_id: Of the run, 64 hex digits.
-        evaluate: Of the solutions of a log that is whole; raises `EvoexpError` where it cannot.
+    Solutions of a log that is whole are evaluated; `EvoexpError` says that they cannot be.
     """
     summary, problem, unevaluated = None, "", ""
     try:
@@ -190,12 +172,8 @@ def _contradictions(log: LogContents) -> Iterator[str]:
 def mend(run: RunDirectory, config_json: bytes, again: Collection[int]) -> None:
     """Set aside every damaged file of a run, and say so in a line.
 
-    The caller holds the run's lock, and writes configuration and manifest again. StoreError is
-    raised where a log is of another version of evoexp, and not damaged.
-
-    Args:
-        config_json: The canonical form of its condition.
-        again: Replicates that run again if their log is damaged.
+    The caller holds the run's lock, writes configuration and manifest, and runs replicates, again.
+    StoreError is raised where a log is of another version of evoexp, and not damaged.
     """
     _set_aside(run, run.damaged_files(config_json), "written again")
     logs = damaged_logs(run)

@@ -75,8 +75,6 @@ class Log:
         """Start a log.
 
         Args:
-            condition_id: Full hash of the condition, 64 hex digits.
-            config_json: The condition's configuration: the replicate can be run from it alone.
             rng: The replicate's generator, whose state enters the chain; never drawn from here.
             attachments: Further files that the condition needs, by name.
             environment: Versions, CPU features and what else may explain a difference.
@@ -103,12 +101,8 @@ class Log:
             enable_data_crcs=True,
         )
         self._writer.start(library=LIBRARY)
-        run = {
-            "condition": condition_id,
-            "replicate": str(replicate),
-            "schema_version": str(SCHEMA_VERSION),
-            PUBLISHED: CPU_TIME,
-        }
+        run = {"condition": condition_id, "replicate": str(replicate)}
+        run |= {"schema_version": str(SCHEMA_VERSION), PUBLISHED: CPU_TIME}
         self._writer.add_metadata(RUN, run)
         self._attach(CONFIG, config_json)
         for name, data in sorted((attachments or {}).items()):

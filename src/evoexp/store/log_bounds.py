@@ -112,10 +112,7 @@ def check_sums(content: bytes, name: str) -> int:
 
 
 def _places(content: bytes, data_end: int, log: CheckedLog) -> list[list[int]]:
-    """Check the data section; return where chunks, metadata and attachments stand.
-
-    Metadata and attachments are added to a log.
-    """
+    """Check the data section; return places of chunks, metadata and attachments, and keep these."""
     chunks, metadata, attachments = list[int](), list[int](), list[int]()
     size, start, view = 0, len(MAGIC), memoryview(content)
     while start < data_end:

@@ -10,25 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 _DISTRIBUTIONS = (
-    "evoexp",
-    "numpy",
-    "numba",
-    "llvmlite",
-    "scipy",
-    "pin",
-    "libpinocchio",
-    "coal",
-    "libcoal",
-    "hydra-core",
-    "omegaconf",
-    "pydantic",
-    "joblib",
-    "mcap",
-    "zstandard",
-    "orjson",
-    "xxhash",
-    "pandas",
-    "pyarrow",
+    *("evoexp", "numpy", "numba", "llvmlite", "scipy", "pin", "libpinocchio", "coal", "libcoal"),
+    *("hydra-core", "omegaconf", "pydantic", "joblib", "mcap", "zstandard", "orjson", "xxhash"),
+    *("pandas", "pyarrow"),
 )
 
 # Processor flags that decide which instructions a compiler may choose; others change no number.
@@ -71,7 +55,17 @@ def _environment() -> dict[str, Any]:
         "machine": platform.machine(),
         "libc": " ".join(platform.libc_ver()).strip() or None,
     }
-    return {"versions": versions, "platform": system, "cpu": _cpu()}
+    # name and vector features of the processor, from /proc/cpuinfo where there is one
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
+    except OSError:
+        text = ""
+    pairs = (line.partition(":") for line in text.splitlines())
+    entries = {name.strip().lower(): value.strip() for name, _, value in pairs}
+    flags = (entries.get("flags") or entries.get("features") or "").split()
+    features = [flag for flag in flags if flag.startswith(_VECTOR_PREFIXES) and flag[:3] != "fpu"]
+    cpu = {"name": entries.get("model name") or platform.processor() or None}
+    return {"versions": versions, "platform": system, "cpu": cpu | {"features": sorted(features)}}
 
 
 @cache
@@ -109,21 +103,6 @@ def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield from _leaves(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
-
-
-def _cpu() -> dict[str, Any]:
-    """Return name and vector features of the processor, from /proc/cpuinfo where there is one."""
-    try:
-        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
-    except OSError:
-        text = ""
-    pairs = (line.partition(":") for line in text.splitlines())
-    entries = {name.strip().lower(): value.strip() for name, _, value in pairs}
-    flags = (entries.get("flags") or entries.get("features") or "").split()
-    features = sorted(
-        flag for flag in flags if flag.startswith(_VECTOR_PREFIXES) and not flag.startswith("fpu")
-    )
-    return {"name": entries.get("model name") or platform.processor() or None, "features": features}
 
 
 def _git(root: Path, *arguments: str) -> str | None:

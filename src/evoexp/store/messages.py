@@ -1,9 +1,8 @@
 """Records as JSON and back, flat and with a fixed order of keys.
 
-The non-finite numbers, for which JSON has no word, are kept exactly.
-
-A non-finite number is written as null and named in `nonfinite`, a key that is there only when
-needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an element of an array.
+A non-finite number, for which JSON has no word, is written as null and named in `nonfinite`, a key
+that is there only when needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for
+an element of an array.
 """
 
 from collections.abc import Mapping
@@ -125,13 +124,7 @@ def decode_summary(metadata: Mapping[str, str]) -> ReplicateSummary:
 
 
 def decode(record: type[Row], row: dict[str, Any]) -> Row:
-    """Build a record from the decoded JSON of its message.
-
-    Raises:
-        KeyError: A field without a default is missing.
-        TypeError: A number is null and no flag says which one it was.
-        ValueError: A value is not of its field's type.
-    """
+    """Build a record from the decoded JSON of its message, or raise an error if it is none."""
     if NONFINITE in row:
         restore(row)
     fields: dict[str, Any] = {}

@@ -1,7 +1,7 @@
 """Columns that say of every row of a run which run it is: experiment, label, seed, settings.
 
-They are constant in a run, and make tables of many runs one table: SQL over
-`runs/*/summary.parquet` groups by `population_size` without a join. No command reads them back.
+They make tables of many runs one table: SQL over `runs/*/summary.parquet` groups by
+`population_size` without a join. No command reads them back.
 """
 
 import json

@@ -13,14 +13,7 @@ from filelock import FileLock, Timeout
 
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
-from evoexp.store.files import (
-    reason,
-    remove_stale,
-    sync_directory,
-    warn,
-    write_file,
-    write_files,
-)
+from evoexp.store.files import reason, remove_stale, sync_directory, warn, write_file, write_files
 from evoexp.store.identity import (
     CONFIG,
     MANIFEST,
@@ -51,14 +44,8 @@ _FAILED = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.failed\.json")
 class RunDirectory:
     """The directory of one condition's run, its files and its lock.
 
-    Reading needs no lock. Every writing method is for the one process that holds `lock()`.
-
-    Attributes:
-        condition_id: Full hash of the condition, 64 hex digits: the SHA-256 of `config.json`.
-        hash12: Its first twelve digits, which name the run.
-        path: The directory.
-        replicates: Directory of the logs.
-        summary_path: The table derived from the logs; see `tables`.
+    Reading needs no lock. Every writing method is for the one process that holds `lock()`. The
+    condition's id is the SHA-256 of `config.json`; its first twelve digits name the run.
     """
 
     def __init__(self, outputs: Path, condition_id: str) -> None:
@@ -84,10 +71,7 @@ class RunDirectory:
     ) -> None:
         """Create what is missing; a configuration and manifest already there stay as they are.
 
-        Args:
-            config_json: Canonical form of the condition.
-            manifest: See `manifest.manifest`.
-            files: Contents of the files that it refers to, by their names (`attachments.attached`).
+        The files are the contents that the configuration refers to, see `attachments.attached`.
         """
         if (self.path / CONFIG).exists():
             self.check()
@@ -102,10 +86,7 @@ class RunDirectory:
         sync_directory(self.path.parent)
 
     def check(self) -> None:
-        """Raise unless `config.json` is this very condition's: a `DamagedFile`, or a StoreError.
-
-        The latter where it is of a condition that shares the first twelve digits.
-        """
+        """Raise StoreError unless `config.json` is this condition's; `DamagedFile` if damaged."""
         stored = config_id(self.path)
         if stored != self.condition_id:
             raise StoreError(
@@ -158,12 +139,9 @@ class RunDirectory:
             return restored
 
     def damaged_files(self, config_json: bytes | None = None) -> dict[str, str]:
-        """Return name → what is wrong with it, of the files beside the logs.
+        """Return name → what is wrong with it, of the files beside the logs, see `check`.
 
-        StoreError is raised where it is another condition's, see `check`.
-
-        Args:
-            config_json: The canonical form of its condition; None: as it is stored.
+        Without the canonical form of its condition, the stored one tells which files it needs.
         """
         if not is_stored(self.path):
             return {}
@@ -327,12 +305,7 @@ def open_run(outputs: Path, name: str) -> RunDirectory:
 
 
 def resolve(outputs: Path, prefix: str) -> RunDirectory:
-    """Return the one stored run whose hash begins with a prefix of 1 to 64 hex digits.
-
-    Raises:
-        UnknownHash: The text is no hash, or no run here begins with it.
-        AmbiguousHash: Several do.
-    """
+    """Return the one stored run whose hash begins with a prefix, or raise UnknownHash."""
     digits = prefix.lower()
     if not re.fullmatch("[0-9a-f]{1,64}", digits):
         raise UnknownHash(f"hash: must be 1 to 64 hexadecimal digits, was '{prefix}'")

@@ -55,12 +55,9 @@ def write_summary(
 ) -> pa.Table:
     """Bring `summary.parquet` up to date with the logs and failures of a run, whose lock is held.
 
-    Args:
-        written: Summaries of logs that were just written, by replicate: they are not read again.
-
-    Returns:
-        One row per replicate, done or failed, in order; a failed one has condition, replicate,
-        status and stop_reason, everything else is null. A damaged log has no row.
+    Summaries of logs that were just written are given by replicate, and not read again. Each
+    replicate has a row, in order; a failed one has condition, replicate, status and stop_reason,
+    everything else is null. A damaged log has no row.
     """
     known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
     summary = _up_to_date(run, known)
@@ -88,12 +85,8 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
     A missing, damaged or stale `summary.parquet` is rebuilt, and written where nobody else holds
     the run. Damaged logs have no row, which is said in a line per run.
 
-    Args:
-        runs: One or several.
-        thorough: Whether the checksums of all logs are compared, not only of changed ones.
-
-    Returns:
-        Columns as `ReplicateSummary`, `terms` as `term_<name>` in alphabetical order.
+    Columns are those of `ReplicateSummary`, its terms `term_<name>` in alphabetical order.
+    `thorough` compares the checksums of all logs, not only of changed ones.
     """
     tables = [pa.schema(BASE).empty_table()]
     tables += [_current(run, thorough, tell=True).table for run in distinct(runs)]
@@ -131,10 +124,7 @@ def altered(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> str
     """Return how `summary.parquet` contradicts logs or settings of a run; empty: it does not.
 
     Rows of logs that changed since the table was written are not looked at, nor is the origin,
-    which may have changed since.
-
-    Args:
-        summaries: The logs' own, by the names of their files.
+    which may have changed since. The summaries are the logs' own, by the names of their files.
     """
     (stored, _), stamps = _stored(run), _stamps(run)
     if stored is None or stored.settings is None:
@@ -178,10 +168,7 @@ def distinct(runs: Runs) -> list[RunDirectory]:
 
 
 def _current(run: RunDirectory, thorough: bool = False, tell: bool = False) -> _Summary:
-    """Return the table of a run as its files are, written if it is new and nobody holds the run.
-
-    Where `tell` is set, damaged logs, which have no row, are named in a line.
-    """
+    """Return the table of a run as its files are, written if it is new and nobody holds the run."""
     summary = _up_to_date(run, {}, thorough)
     if summary.settings is None and summary.files:
         # another process writes the run, or it may only be read: the rows are the same
@@ -198,8 +185,7 @@ def _up_to_date(
 ) -> _Summary:
     """Return the table of a run as its files are: the stored one, or a new one without settings.
 
-    Rows of unchanged files are taken from the stored one, summaries of `written` files as they are;
-    damaged files are looked at again. `thorough` compares the checksums of unchanged logs, too.
+    Damaged files are looked at again, with `thorough` the checksums of unchanged logs, too.
     """
     (stored, _), stamps = _stored(run), _stamps(run)
     unchanged = set[str]()

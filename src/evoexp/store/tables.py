@@ -17,9 +17,8 @@ from evoexp.store.summaries import Runs, distinct, summary_table, whole_logs
 def read_summaries(runs: Runs, *, thorough: bool = False) -> pd.DataFrame:
     """Return the summaries of one or several runs, one row per replicate; see `summary_table`.
 
-    Returns:
-        Its columns. Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and
-        missing stay three things; text is pandas' own.
+    Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and missing stay
+    three things; text is pandas' own.
     """
     frame: pd.DataFrame = summary_table(runs, thorough=thorough).to_pandas(
         types_mapper=lambda kind: None if pa.types.is_string(kind) else pd.ArrowDtype(kind)

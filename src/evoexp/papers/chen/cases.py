@@ -113,6 +113,13 @@ class Case(NamedTuple):
 
 def cases(results: Results) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
+    names: dict[Any, str] = {  # weights of the terms, links that avoid obstacles → name
+        (True, False, False): "least torque norm",
+        (False, True, False): "minimax torque",
+        (True, False, False, 2): "obstacle and link 2",
+        (True, False, False, 0): "obstacle and platform",
+        (True, False, True): "manipulability and torque",
+    }
     found = []
     for own in grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner.objective)):
         roles: dict[str, ConditionResults] = {}
@@ -121,20 +128,8 @@ def cases(results: Results) -> list[Case]:
             if c.is_reference:
                 role = str(c.condition.planner.component).removeprefix("placement_")
             roles.setdefault("search" if c.is_control else role, c)
-        found.append(Case(_name(own[0]), **roles))
+        cost = own[0].planner.objective
+        weights = cost.torque_norm_weight, cost.torque_max_weight, cost.manipulability_weight
+        criterion = (*map(bool, weights), *(one.link for one in cost.avoidances))
+        found.append(Case(names.get(criterion, own[0].label), **roles))
     return found
-
-
-def _name(condition: ConditionResults) -> str:
-    """Return the name of a criterion with these weights and links that avoid obstacles."""
-    cost = condition.planner.objective
-    weights = cost.torque_norm_weight, cost.torque_max_weight, cost.manipulability_weight
-    names: dict[Any, str] = {
-        (True, False, False): "least torque norm",
-        (False, True, False): "minimax torque",
-        (True, False, False, 2): "obstacle and link 2",
-        (True, False, False, 0): "obstacle and platform",
-        (True, False, True): "manipulability and torque",
-    }
-    links = (one.link for one in cost.avoidances)
-    return names.get((*map(bool, weights), *links), condition.label)

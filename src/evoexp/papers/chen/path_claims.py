@@ -117,11 +117,6 @@ def above_known(condition: ConditionResults, cost_known: float) -> FloatArray:
     return np.asarray(np.round(100.0 * (condition.column("best_cost") / cost_known - 1.0), 9))
 
 
-def above_bound(condition: ConditionResults, bound_known: float) -> FloatArray:
-    """Return the gap of each run's cost above the bound of any path, (done,) [%]."""
-    return above_known(condition, bound_known)
-
-
 def paths(condition: ConditionResults) -> dict[int, FloatArray]:
     """Return replicate → nodes (nodes, 2) of its best path."""
     return {k: values.reshape(-1, 2) for k, values in condition.solutions.items()}

@@ -1,7 +1,8 @@
 """Rows of the tables and checks, and lines of the figures, on the grid paths of Chen & Zalzala."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -19,17 +20,6 @@ Conditions = tuple[ConditionResults, ...]
 Panels = list[tuple[str, ConditionResults, list[Line]]]
 
 
-def group_families(groups: tuple[Group, ...]) -> list[Family]:
-    """Return the first condition of each weighting against its others."""
-    return [Family.of(group.conditions) for group in groups]
-
-
-def route_counts(group: Group, route_list: Routes) -> str:
-    """Return how many runs of a weighting take each route, in words."""
-    taken = path_claims.routes_of(group.main, route_list).items()
-    return ", ".join(f"{name} {len(members)}" for name, members in taken)
-
-
 def gaps_of_runs(condition: ConditionResults, group: Group, confidence: float) -> str:
     """Describe the gaps of a condition's runs above the best path known."""
     gaps, shares = path_claims.above_known(condition, group.optimum), []
@@ -42,11 +32,10 @@ def gaps_of_runs(condition: ConditionResults, group: Group, confidence: float) -
 
 
 def same_problems(groups: tuple[Group, ...]) -> Iterator[tuple[object, ...]]:
-    """Yield each two neighbouring weightings with λ > 0: what they share.
+    """Yield each two neighbouring weightings with λ > 0 with what they share.
 
-    Returns:
-        (one, two, ratios λ/ε, nodes that the best paths share, nodes of each, how much more the
-        best path of one costs than that of two where two weighs [%]).
+    That is ratios λ/ε, common nodes of the best paths, nodes of each, and how much more the best
+    path of one costs than that of two where two weighs [%].
     """
     for one, two in pairwise(groups):
         if one.truth is not None and two.truth is not None and 0.0 not in one.weights + two.weights:
@@ -60,39 +49,6 @@ def same_problems(groups: tuple[Group, ...]) -> Iterator[tuple[object, ...]]:
             exchanged = float(cost) / two.optimum - 1.0
             nodes = len(own), len(other)
             yield one, two, ratios, len(own & other), nodes, 100.0 * exchanged
-
-
-def shown_conditions(groups: tuple[Group, ...]) -> Conditions:
-    """Return the conditions of all weightings, references included."""
-    return tuple(c for group in groups for c in group.all)
-
-
-def main_conditions(groups: tuple[Group, ...]) -> Conditions:
-    """Return the first condition of every weighting."""
-    return tuple(group.main for group in groups)
-
-
-def median_runs(main_conditions: Conditions) -> list[PlayedRun]:
-    """Return the run of median cost of every weighting."""
-    return [PlayedRun(c, path_claims.median_replicate(c)) for c in main_conditions]
-
-
-def truths_are_known(groups: tuple[Group, ...]) -> bool:
-    """Return whether every weighting has a reference."""
-    return all(group.truth is not None for group in groups)
-
-
-def path_panels(groups: tuple[Group, ...]) -> Panels:
-    """Return the paths of all runs of every weighting, faint, and those that stand out."""
-    faint = {
-        g.name: [Line(FAINT, path) for path in path_claims.paths(g.main).values()] for g in groups
-    }
-    return [(g.title, g.main, [*faint[g.name], *grid_paths.known_lines(g)]) for g in groups]
-
-
-def known_panels(groups: tuple[Group, ...]) -> Panels:
-    """Return the paths of every weighting that stand out."""
-    return [(group.name, group.main, grid_paths.known_lines(group)) for group in groups]
 
 
 def route_panels(groups: tuple[Group, ...], route_list: Routes) -> Panels:
@@ -133,6 +89,11 @@ def best_known(group: Group) -> dict[str, object]:
     return words | ({"told": "exact", "within": "exact"} if exact else {})
 
 
+def _median_run(condition: ConditionResults) -> PlayedRun:
+    """Return the run of median cost."""
+    return PlayedRun(condition, path_claims.median_replicate(condition))
+
+
 def _length(group: Group) -> float:
     return float(np.median(group.main.column("term_distance")))
 
@@ -140,3 +101,37 @@ def _length(group: Group) -> float:
 def _repeated(path: np.ndarray) -> int:
     """Count the nodes of a path that were passed before."""
     return len(path) - len(np.unique(path, axis=0))
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # how many runs of a weighting take each route, in words
+    "route_counts": lambda group, route_list: ", ".join(
+        f"{name} {len(members)}"
+        for name, members in path_claims.routes_of(group.main, route_list).items()
+    ),
+    # the paths of all runs of every weighting, faint, and those that stand out
+    "path_panels": lambda groups: [
+        (
+            g.title,
+            g.main,
+            [
+                *(Line(FAINT, path) for path in path_claims.paths(g.main).values()),
+                *grid_paths.known_lines(g),
+            ],
+        )
+        for g in groups
+    ],
+    # the first condition of each weighting against its others
+    "group_families": lambda groups: [Family.of(group.conditions) for group in groups],
+    # of all weightings, references included
+    "shown_conditions": lambda groups: tuple(c for group in groups for c in group.all),
+    "main_conditions": lambda groups: tuple(group.main for group in groups),
+    # the run of median cost of every weighting
+    "median_runs": lambda main_conditions: [*map(_median_run, main_conditions)],
+    "median_missions": lambda conditions: [*map(_median_run, conditions)],
+    "truths_are_known": lambda groups: all(group.truth is not None for group in groups),
+    # the paths of every weighting that stand out
+    "known_panels": lambda groups: [(g.name, g.main, grid_paths.known_lines(g)) for g in groups],
+    # gap of each run's cost above the bound of any path, (done,) [%]
+    "above_bound": lambda condition, bound_known: path_claims.above_known(condition, bound_known),
+}

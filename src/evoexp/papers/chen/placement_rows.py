@@ -1,6 +1,7 @@
 """Rows of the tables and checks on the docking postures of Chen & Zalzala 1995, Figs. 3–9."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -10,26 +11,6 @@ from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.inference import spread
 
 Conditions = tuple[ConditionResults, ...]
-
-
-def exact_cases(cases: list[Case]) -> list[Case]:
-    """Return the criteria whose exact optimum is known."""
-    return [case for case in cases if case.optimum is not None]
-
-
-def evolved_cases(exact_cases: list[Case]) -> list[Case]:
-    """Return the criteria that runs evolved, of those with a known optimum."""
-    return [case for case in exact_cases if case.evolved]
-
-
-def landscapes(cases: list[Case]) -> list[Case]:
-    """Return the criteria whose landscape was computed."""
-    return [case for case in cases if case.landscape is not None]
-
-
-def case_conditions(cases: list[Case]) -> Conditions:
-    """Return the conditions of all criteria."""
-    return tuple(c for case in cases for c in case.conditions)
 
 
 def landscape_row(case: Case) -> tuple[object, ...]:
@@ -107,3 +88,12 @@ def posture_checks(case: Case) -> list[tuple[str, str]]:
             for name, c in case.evolved.items()
         ]
     return rows
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # criteria whose exact optimum is known, those of them that were evolved, those with a landscape
+    "exact_cases": lambda cases: [case for case in cases if case.optimum is not None],
+    "evolved_cases": lambda exact_cases: [case for case in exact_cases if case.evolved],
+    "landscapes": lambda cases: [case for case in cases if case.landscape is not None],
+    "case_conditions": lambda cases: tuple(c for case in cases for c in case.conditions),
+}

@@ -82,9 +82,9 @@ def judge_free(judge: Judge, condition: ConditionResults) -> Claim:
         f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
         f"{judge.share(refuted)}: postures are free, motions between them are not rated"
     )
-    allowed = measures.allowed_contacts(condition)
-    if allowed:
-        told += f"; may touch, {allowed.limit:g} {allowed.unit} deep at most: {allowed.pairs}"
+    if pairs := measures.allowed_contacts(condition):
+        limit, unit = float(condition.scenario.allowed_penetration), condition.length_unit
+        told += f"; may touch, {limit:g} {unit} deep at most: {pairs}"
     hearing = judge.on("paths_avoid_obstacles", who=condition.label)
     return hearing.every(told, free, refuted.total, planned)
 
@@ -117,7 +117,7 @@ def _at_obstacles(judge: Judge, pairs: list[tuple[ConditionResults, ConditionRes
         for (c, _), (own, empty), p in zip(pairs, shares, adjusted, strict=True)
     )
     less = [
-        p < judge.significance
+        p < judge.settings.significance
         for (own, empty), p in zip(shares, adjusted, strict=True)
         if own.share < empty.share
     ]
@@ -151,16 +151,6 @@ def judge_study(
         _converges_less(judge, sizes),
         *(_reasonable(judge, metric, sizes, values) for metric, values in METRICS.items()),
     )
-
-
-def size_ratios(sizes: Tasks, settings: ReportSettings) -> dict[str, list[SizeComparison]]:
-    """Return the comparisons of all sizes with the recommended one, metric by metric."""
-    return {metric: compare_sizes(sizes, metric, settings) for metric in METRICS}
-
-
-def are_compared(size_ratios: dict[str, list[SizeComparison]]) -> bool:
-    """Return whether any size can be compared with the recommended one."""
-    return any(size_ratios.values())
 
 
 def _beside_recommended(
@@ -252,7 +242,7 @@ def _converges_less(judge: Judge, found: Tasks) -> Claim:
     pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
     shares = [(run_measures.success(own), run_measures.success(c)) for _, _, c, own in pairs]
     says = [
-        judging.greater(*pair, p, judge.significance)
+        judging.greater(*pair, p, judge.settings.significance)
         for pair, p in zip(shares, inference.fisher_family(shares), strict=True)
     ]
     texts = "; ".join(

@@ -188,37 +188,21 @@ def _pairs_but_for(conditions: Conditions, setting: str) -> list[Pair]:
     return [(one, two) for one, own in without for two, other in having if own == other]
 
 
-class AllowedContacts(NamedTuple):
-    """Pairs that may touch in the runs of a condition."""
-
-    pairs: str  # their names, separated by commas
-    limit: float  # how deep they may overlap [length unit]
-    unit: str  # length unit of the scene
-
-
-def allowed_contacts(condition: ConditionResults) -> AllowedContacts | None:
-    """Return the pairs that the exact verdict lets touch; None if there is none."""
+def allowed_contacts(condition: ConditionResults) -> str:
+    """Return the names of the pairs that the exact verdict lets touch; empty if there is none."""
     told = condition.summaries.get("allowed_contacts", pd.Series(dtype=str)).fillna("")
     pairs = dict.fromkeys(pair for text in told for pair in text.split(", ") if pair)
-    limit = condition.scenario.allowed_penetration
-    unit = condition.length_unit
-    return AllowedContacts(", ".join(pairs), float(limit), unit) if pairs and limit else None
+    return ", ".join(pairs) if condition.scenario.allowed_penetration else ""
 
 
-class Release(NamedTuple):
-    """The state of an object when it is let go of."""
+def releases(condition: ConditionResults) -> list[tuple[float, float]]:
+    """Return (gap, tilt) of the object in every run that lets go of it, by coal's distances.
 
-    replicate: int  # of the run
-    # signed distance to the nearest body that it may touch; negative: it stands in it [length
-    # unit]
-    gap: float
-    tilt: float  # between its axis and the direction up [rad]
-
-
-def releases(condition: ConditionResults) -> tuple[Release, ...]:
-    """Return the state of the object in every run that lets go of it, by coal's distances."""
+    The gap is to the nearest body that it may touch, negative where it stands in it [length unit],
+    the tilt that of its axis from the direction up [rad].
+    """
     own, found = problem(condition), []
-    for replicate, q in paths(condition).items():
+    for q in paths(condition).values():
         for span in own.spans(q):
             if span.stage.phase.then == "detach" and span.reached:
                 bodies = own.scene_of(span.stage)
@@ -226,8 +210,8 @@ def releases(condition: ConditionResults) -> tuple[Release, ...]:
                 distance = CoalDistance(bodies._replace(pairs=pairs), Motion(q), MANY_QUERIES)
                 gaps = [distance(pair, float(span.last)) for pair in range(len(pairs))]
                 tilt = float(span.judged.rows[UPRIGHT, -1])
-                found.append(Release(replicate, min(gaps, default=np.inf), tilt))
-    return tuple(found)
+                found.append((min(gaps, default=np.inf), tilt))
+    return found
 
 
 def robots(obstructed: Conditions) -> Conditions:

@@ -1,6 +1,7 @@
 """Rows of the tables, and the runs of the figures, on the pages of Corsépius 2001."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -13,26 +14,15 @@ from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Quantity, quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import inference
 from evoexp.report.statistics.comparisons import Family, Measure, by_column
-from evoexp.report.statistics.inference import Proportion
 
 SCALES = {"cycles": 1.0, "evaluations": 1.0, "CPU time": 1e3}  # [1/s] of a time
 # evaluations and cycles to the goal, and steps of the path to it, (done,); inf without it
 effort = run_measures.where_solved(measures.evaluations)
 cycles_to_goal = run_measures.where_solved(measures.cycles)
 steps_to_goal = run_measures.where_solved(measures.num_steps)
-
-
-def is_sweep(main: Conditions) -> bool:
-    """Return whether there are several conditions to compare."""
-    return len(main) > 1
-
-
-def shown_task(obstructed: Conditions) -> Conditions:
-    """Return the first of these conditions."""
-    return obstructed[:1]
 
 
 def tilts(results: Results) -> Iterator[Quantity]:
@@ -43,12 +33,6 @@ def tilts(results: Results) -> Iterator[Quantity]:
                 name = f"greatest tilt {where} postures ({term.replace('_', ' ')})"
                 values = by_column(f"term_greatest_{term}{part}_deg")
                 yield quantity(results, name, "deg", values)
-
-
-def ends(condition: ConditionResults) -> str:
-    """Return why searches ended, with the number of runs."""
-    reasons = measures.reasons(condition).items()
-    return ", ".join(f"{name} {p.having}" for name, p in reasons if p.having)
 
 
 def beside_empty(results: Results, confidence: float) -> tuple[tuple[str, ...], ...]:
@@ -70,18 +54,13 @@ def releases(obstructed: Conditions) -> Iterator[tuple[str, ...]]:
     """Yield gap and tilt of the objects that a condition lets go of: medians and the worst."""
     for condition in obstructed:
         if found := measures.releases(condition):
-            gaps, tilts = np.array([(one.gap, one.tilt) for one in found]).T
+            gaps, tilts = np.array(found).T
             deepest, highest = (
                 f"{markdown.number(float(f'{max(0.0, value):.2g}'))} {condition.length_unit}"
                 for value in (-gaps.min(), gaps.max())
             )
             median, worst = (f"{t / DEGREE:.2f}°" for t in (np.median(tilts), tilts.max()))
             yield condition.label, str(len(found)), deepest, highest, median, worst
-
-
-def phased(main: Conditions) -> tuple[ConditionResults, ...]:
-    """Return the conditions that have several phases."""
-    return tuple(c for c in measures.obstructed(main) if len(measures.phase_names(c)) > 1)
 
 
 def phase_rows(phased: Conditions, confidence: float) -> Iterator[tuple[object, ...]]:
@@ -109,47 +88,12 @@ def collision_models(main: Conditions) -> Iterator[tuple[str, str]]:
         yield f"{c.label}: the model of collisions", text
 
 
-def titled_robots(robots: Conditions) -> list[tuple[str, ConditionResults]]:
-    """Return (title, condition) of every robot."""
-    return [(c.label if len(robots) > 1 else "the robot", c) for c in robots]
-
-
-def stop_reasons(main: Conditions) -> list[tuple[str, int, str, Proportion]]:
-    """Return (quantity, position, condition, runs) of every reason for which searches end."""
-    return [
-        (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
-        for reason in measures.REASONS
-        for position, c in enumerate(main)
-    ]
-
-
-def shown_paths(obstructed: Conditions) -> list[ShownPath]:
-    """Return the run of every condition whose path is drawn."""
-    return [
-        ShownPath(f"{c.label}\nrun {k}{'' if c.solved else ', not solved'}", c, k)
-        for c in obstructed
-        for k in (measures.shown_replicate(c),)
-    ]
-
-
 def manoeuvres(results: Results, phased: Conditions) -> list[tuple[list[ShownPath], str]]:
     """Return the runs whose phases are drawn one by one, each with the end of its figure's stem."""
     several = [c for c in phased if len(c.scenario.phases) > 1]
     ends = [f"_{results.position(c.label) + 1}" if len(several) > 1 else "" for c in several]
     shown = [[ShownPath(c.label, c, measures.shown_replicate(c), True)] for c in several]
     return list(zip(shown, ends, strict=True))
-
-
-def scenes(results: Results) -> tuple[Family, ...]:
-    """Return the first condition of every task against its others."""
-    return tuple(map(Family.of, run_measures.grouped(results.with_data, measures.scene)))
-
-
-def goal_measures(main: Conditions) -> list[Measure]:
-    """Return the quantity that is compared: if no run meets its goal, the distance to it."""
-    if any(c.solved for c in main):
-        return [Measure("evaluations to the goal", effort)]
-    return [Measure("distance to the goal", measures.residuals)]
 
 
 def share_rows(results: Results, confidence: float) -> Iterator[tuple[str, ...]]:
@@ -174,16 +118,6 @@ def scopes(results: Results) -> Tasks:
     return Tasks(task for task in found if not any(c.solved for c in task.conditions))
 
 
-def parents(results: Results) -> Tasks:
-    """Return the tasks whose numbers of parents differ."""
-    return measures.tasks(results, "num_parents")
-
-
-def sizes(results: Results) -> Tasks:
-    """Return the tasks whose populations differ in size."""
-    return measures.tasks(results, "num_offspring")
-
-
 def floor_rows(main: Conditions, scopes: Tasks) -> list[tuple[str, ...]]:
     """Return the distances at which searches stagnate, if no goal can be met."""
     columns = (lambda c: 1e3 * measures.residuals(c)), measures.cycles
@@ -191,16 +125,6 @@ def floor_rows(main: Conditions, scopes: Tasks) -> list[tuple[str, ...]]:
         (c.label, *(markdown.spread(inference.spread(values(c))) for values in columns))
         for c in (main if scopes else ())
     ]
-
-
-def shares_are_shown(results: Results, parents: Tasks) -> bool:
-    """Return whether shares are drawn: some run meets its goal."""
-    return not parents and any(c.solved for c in results.with_data)
-
-
-def values_are_shown(scopes: Tasks, parents: Tasks) -> bool:
-    """Return whether efforts are drawn condition by condition."""
-    return not (scopes or parents)
 
 
 def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...]]:
@@ -221,3 +145,53 @@ def size_rows(sizes: Tasks, settings: ReportSettings) -> Iterator[tuple[str, ...
                 )
                 efforts.append(f"{expected} [{low}, {high}]")
             yield task.name, f"{value:g}", *shares, *(efforts or ["∞"] * len(SCALES))
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # why searches ended, with the number of runs
+    "ends": lambda condition: ", ".join(
+        f"{name} {p.having}" for name, p in measures.reasons(condition).items() if p.having
+    ),
+    # (quantity, position, condition, runs) of every reason for which searches end
+    "stop_reasons": lambda main: [
+        (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
+        for reason in measures.REASONS
+        for position, c in enumerate(main)
+    ],
+    # the run of every condition whose path is drawn
+    "shown_paths": lambda obstructed: [
+        ShownPath(f"{c.label}\nrun {k}{'' if c.solved else ', not solved'}", c, k)
+        for c in obstructed
+        for k in (measures.shown_replicate(c),)
+    ],
+    "is_sweep": lambda main: len(main) > 1,
+    "shown_task": lambda obstructed: obstructed[:1],
+    # the conditions that have several phases
+    "phased": lambda obstructed: tuple(c for c in obstructed if len(measures.phase_names(c)) > 1),
+    # (title, condition) of every robot
+    "titled_robots": lambda robots: [
+        (c.label if len(robots) > 1 else "the robot", c) for c in robots
+    ],
+    # the first condition of every task against its others
+    "scenes": lambda results: tuple(
+        map(Family.of, run_measures.grouped(results.with_data, measures.scene))
+    ),
+    # the quantity that is compared: if no run meets its goal, the distance to it
+    "goal_measures": lambda main: [
+        Measure("evaluations to the goal", effort)
+        if any(c.solved for c in main)
+        else Measure("distance to the goal", measures.residuals)
+    ],
+    # the tasks whose numbers of parents differ, and those whose populations differ in size
+    "parents": lambda results: measures.tasks(results, "num_parents"),
+    "sizes": lambda results: measures.tasks(results, "num_offspring"),
+    "size_ratios": lambda sizes, settings: {
+        metric: claims.compare_sizes(sizes, metric, settings) for metric in METRICS
+    },
+    "are_compared": lambda size_ratios: any(size_ratios.values()),
+    # whether some run meets its goal
+    "shares_are_shown": lambda results, parents: (
+        not parents and any(c.solved for c in results.with_data)
+    ),
+    "values_are_shown": lambda scopes, parents: not (scopes or parents),
+}

@@ -1,7 +1,7 @@
 """The claims of Curkovic et al. 2013 on methods and motions, and under assumed numbers."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -145,6 +145,26 @@ def enveloped(condition: ConditionResults) -> bool:
     """Return whether the search tests more of the robots than their lines."""
     collision = condition.planner.collision
     return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
+
+
+def judge_criteria(judge: Judge, results: Results) -> Iterator[Claim]:
+    """Judge that each criterion that the paper added is needed: what it measures suffers without.
+
+    The first condition has all criteria; its labels name what the others leave out.
+    """
+    first, *others = results.main
+    for name, values, weight in (
+        ("C3", measures.rotation, "rotation_weight"),
+        ("C4", measures.unevenness, "evenness_weight"),
+    ):
+        without = [c for c in others if getattr(c.planner.objective, weight) == 0.0]
+        rows = compared([(first, c) for c in without], values, judge.settings)
+        medians = ", ".join(
+            f"{c.label} {markdown.number(float(np.median(values(c))))}" for c in (first, *without)
+        )
+        told = "; ".join(f"{row.quantity}: {judging.evidence(row, 'smaller')}" for row in rows)
+        hearing = judge.on("criterion_needed", criterion=name)
+        yield hearing.better_than_all(f"median {name}: {medians}; {told}", rows)
 
 
 def motion_checks(results: Results) -> tuple[tuple[str, str], ...]:

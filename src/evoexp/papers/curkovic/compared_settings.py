@@ -87,6 +87,7 @@ def of_sweep(
         {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in settings
     ]
     varied = {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
+    level = judge.settings.significance
     is_rate = varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}
     for one in _converging(compared):
         if varied == {"ga.hall_depth"}:
@@ -95,7 +96,7 @@ def of_sweep(
             best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
             evidence = (
                 f"median {markdown.number(own)}; best of the others {best.label}: "
-                f"{markdown.number(median)}; {_outcomes(first, one.rows, judge.significance)}"
+                f"{markdown.number(median)}; {_outcomes(first, one.rows, level)}"
             )
             hearing = judge.on("depth", depth=first.label, measure=one.measure.name)
             yield hearing.best(evidence, one.rows, own <= min(medians))
@@ -103,7 +104,7 @@ def of_sweep(
             first = one.family.pairs[0][0]
             reading = READINGS[first.planner.ga.mutation_direction]
             words = {"who": "", "measure": one.measure.name, "reading": reading}
-            evidence = _outcomes(first, one.rows, judge.significance)
+            evidence = _outcomes(first, one.rows, level)
             yield judge.on("falling_rate", **words).better_than_all(evidence, one.rows)
 
 

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -193,21 +193,6 @@ def _shares(nothing: FloatArray, some: FloatArray, full: FloatArray) -> FloatArr
 Shares = Callable[[Corner, Gain, ConditionResults, ConditionResults], Share]
 
 
-def judged_gains(gains: tuple[Gain, ...]) -> list[Measure]:
-    """Return the quantities by which claims are judged."""
-    return [gain.judged for gain in gains if gain.judged is not None]
-
-
-def hall_shares(settings: ReportSettings) -> Shares:
-    """Return the function that gives shares, each computed once."""
-    return cache(partial(share, settings=settings))
-
-
-def corner_families(corners: Sequence[Corner]) -> list[Family]:
-    """Return the hall of distinct genomes against all else of a reading and rate."""
-    return [Family.of((c.hall, c.nothing, *c.elites, *c.halls[1:], *c.others)) for c in corners]
-
-
 def told_share(share: Share) -> str:
     """Return a share in words, with its interval if there is one."""
     if np.isnan(share.value):
@@ -272,14 +257,20 @@ def _of_corner(judge: Judge, corner: Corner, gain: Gain, shares: Shares) -> list
     return [first, beyond.better_than_all(told, over_elites), *more]
 
 
-def hall_claims(
-    judge: Judge, corners: Sequence[Corner], gains: Sequence[Gain], hall_shares: Shares
-) -> list[Claim]:
-    """Judge the claims on the hall, quantity by quantity."""
-    return [
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "hall_claims": lambda judge, corners, gains, hall_shares: [
         claim
         for gain in gains
         if gain.judged is not None
         for corner in corners
         for claim in _of_corner(judge, corner, gain, hall_shares)
-    ]
+    ],
+    # the quantities by which claims are judged
+    "judged_gains": lambda gains: [gain.judged for gain in gains if gain.judged is not None],
+    # the hall of distinct genomes against all else of a reading and rate
+    "corner_families": lambda corners: [
+        Family.of((c.hall, c.nothing, *c.elites, *c.halls[1:], *c.others)) for c in corners
+    ],
+    # the function that gives shares, each computed once
+    "hall_shares": lambda settings: cache(partial(share, settings=settings)),
+}

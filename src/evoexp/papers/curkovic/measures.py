@@ -1,16 +1,17 @@
 """Quantities that all pages on Curkovic et al. 2013 show: effort to a threshold, known defects."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import counted, search_seconds, solved
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
+from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Proportion, quantile
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
@@ -21,6 +22,12 @@ def fits(results: Results) -> bool:
     """Return whether there are results, and all of co-evolving robots."""
     problems = [c.prepared.problem for c in results.with_data]
     return bool(problems) and all(isinstance(problem, Problem) for problem in problems)
+
+
+def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:
+    """Return the expected running time to a cost at the median price of an evaluation, (1,) [s]."""
+    price = quantile(search_seconds(condition) / condition.column("evaluations"), 0.5)
+    return np.array([expected_evaluations(condition, threshold) * price])
 
 
 def lower_bound(condition: ConditionResults) -> float:
@@ -54,37 +61,6 @@ def expected_evaluations(condition: ConditionResults, threshold: float) -> float
     )
 
 
-def expected_effort(condition: ConditionResults, threshold: float) -> FloatArray:
-    """Return the expected running time to a cost in whole evaluations, (1,)."""
-    return np.rint([expected_evaluations(condition, threshold)])
-
-
-def expected_time(condition: ConditionResults, threshold: float) -> FloatArray:
-    """Return the expected running time to a cost at the median price of an evaluation, (1,) [s]."""
-    price = quantile(search_seconds(condition) / condition.column("evaluations"), 0.5)
-    return np.array([expected_evaluations(condition, threshold) * price])
-
-
-def bound(first: ConditionResults) -> float:
-    """Return the lower bound of a team's cost in the first condition's scene."""
-    return lower_bound(first)
-
-
-def threshold(bound: float, settings: ReportSettings) -> float:
-    """Return the cost that effort is measured to."""
-    return settings.threshold_ratio * bound
-
-
-def one_scene(results: Results) -> bool:
-    """Return whether all conditions share robots and scene."""
-    return len({(c.robot, c.scenario) for c in results.with_data}) == 1
-
-
-def free_at_first(condition: ConditionResults) -> int:
-    """Count the runs whose first generation holds a collision-free team."""
-    return int((condition.column("first_feasible_generation") == 0).sum())
-
-
 def refuted(condition: ConditionResults) -> FloatArray:
     """Return 1 for each run whose solved motion the exact verdict refutes, else 0, (done,).
 
@@ -92,6 +68,21 @@ def refuted(condition: ConditionResults) -> FloatArray:
     """
     found = condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=np.float64)
     return np.where(solved(condition), found, np.nan)
+
+
+def _over_robots(name: str) -> Values:
+    """Return the function that sums a term of each run's answer over the robots, (done,)."""
+
+    def total(condition: ConditionResults) -> FloatArray:
+        columns = [str(each) for each in condition.summaries if str(each).startswith(name)]
+        return np.asarray(np.sum([condition.column(each) for each in columns], axis=0))
+
+    return total
+
+
+tip_path = _over_robots("term_tip_path_robot_")  # C2 [m]
+rotation = _over_robots("term_rotation_robot_")  # C3 [rad]
+unevenness = _over_robots("term_tip_unevenness_robot_")  # C4 [m]
 
 
 def certified_cost(condition: ConditionResults) -> FloatArray:
@@ -138,3 +129,18 @@ def _first(condition: ConditionResults, threshold: float, column: str) -> FloatA
     rows = condition.generations
     first = rows[rows["best_cost"] <= threshold].groupby("replicate")[column].min()
     return first.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # expected running time to a cost in whole evaluations, (1,)
+    "expected_effort": lambda condition, threshold: np.rint(
+        [expected_evaluations(condition, threshold)]
+    ),
+    "bound": lambda first: lower_bound(first),  # in the first condition's scene
+    "threshold": lambda bound, settings: settings.threshold_ratio * bound,  # of effort
+    "one_scene": lambda results: len({(c.robot, c.scenario) for c in results.with_data}) == 1,
+    # runs whose first generation holds a collision-free team
+    "free_at_first": lambda condition: int(
+        (condition.column("first_feasible_generation") == 0).sum()
+    ),
+}

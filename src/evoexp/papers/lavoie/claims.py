@@ -9,7 +9,7 @@ import numpy as np
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Claim
+from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference, judging
@@ -36,7 +36,10 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults]) -> list[Cl
     shares = [(measures.below(c, printed.bound), printed.proportion) for c, printed in pairs]
     p_values = inference.fisher_family(shares)
     # Bonferroni: all intervals together have the level
-    level, each = judge.level, 1.0 - (1.0 - judge.level) / max(1, len(pairs))
+    level, each = (
+        judge.level,
+        1.0 - (1.0 - judge.level) / max(1, len(pairs)),
+    )
     claims = []
     for (c, printed), (own, theirs), p_adjusted in zip(pairs, shares, p_values, strict=True):
         within, their_own = own.interval(level), theirs.interval(level)
@@ -132,43 +135,50 @@ def judge_controls(judge: Judge, results: Results) -> Iterator[Claim]:
     Controls draw uniformly where the algorithm evolves: sub-path by sub-path under the same loop,
     or both sub-paths at once.
     """
-    groups = run_measures.grouped(results.with_data, lambda c: (c.robot, c.scenario, c.planner))
-    pairs = [
-        (own, best_control(controls))
-        for own in results.with_data
-        if not own.is_control
-        for group in groups
-        if own in group and (controls := [c for c in group if c.is_control])
-    ]
+    beside = []  # (algorithm, uniform draws and itself without crossover)
+    for own in results.main:
+        if not _breeds_alone(own):
+            scene = (own.robot, own.scenario, own.planner)
+            drawn = [c for c in results.with_data if (c.robot, c.scenario, c.planner) == scene]
+            bred = [c for group in groups_but_for(results, "ga") if own in group for c in group]
+            controls = [c for c in drawn if c.is_control] + [*filter(_breeds_alone, bred)]
+            beside += [(own, controls)] if controls else []
+    pairs = [(own, best_control(controls)) for own, controls in beside]
     shares = [(run_measures.success(own), run_measures.success(control)) for own, control in pairs]
-    for pair, p_adjusted in zip(pairs, inference.fisher_family(shares), strict=True):
+    p_values = inference.fisher_family(shares)
+    for (own, controls), pair, p_adjusted in zip(beside, pairs, p_values, strict=True):
         yield more_solutions(judge, *pair, p_adjusted)
         # fewer evaluations per solution
+        pair = own, min(controls, key=_expected_effort)
         first, second = run_measures.on_common_seeds(*pair, by_column("evaluations"))
         expected = [inference.expected_effort(*each) for each in (first, second)]
         low, high = inference.effort_ratio(first, second, judge.level, judge.settings.num_resamples)
         ratio = expected[0] / expected[1] if np.isfinite(expected[0]) else np.inf
         told = " against ".join(f"{value:.0f}" for value in expected).replace("inf", "∞")
-        own, control = (c.label for c in pair)
+        label, control = (c.label for c in pair)
         evidence = (
             f"expected running time {told} evaluations ({control}); ratio {ratio:.3g} "
             f"[{low:.3g}, {high:.3g}] ({100 * judge.level:g} % bootstrap interval over seeds)"
         )
-        hearing = judge.on("less_effort", who=f"{own}: ", control=f", {control}")
+        hearing = judge.on("less_effort", who=f"{label}: ", control=f", {control}")
         holds = None if low <= 1.0 <= high else high < 1.0
-        yield hearing.own(evidence, f"{len(first[0])} pairs", holds)
+        size = EffectSize("ratio of expected efforts", ratio, low, high, 1.0)
+        yield hearing.own(evidence, len(first[0]), holds, size)
+
+
+def _breeds_alone(condition: ConditionResults) -> bool:
+    """Whether a condition is the algorithm by mutation alone, a control."""
+    return float(condition.planner.ga.crossover_rate) == 0.0
+
+
+def _expected_effort(condition: ConditionResults) -> float:
+    efforts = condition.column("evaluations")
+    return inference.expected_effort(efforts, run_measures.solved(condition))
 
 
 def best_control(controls: Sequence[ConditionResults]) -> ConditionResults:
     """Return the control that solves most; of equal ones that of the least expected effort."""
-
-    def order(control: ConditionResults) -> tuple[float, float]:
-        expected = inference.expected_effort(
-            control.column("evaluations"), run_measures.solved(control)
-        )
-        return -run_measures.success(control).share, expected
-
-    return min(controls, key=order)
+    return min(controls, key=lambda c: (-run_measures.success(c).share, _expected_effort(c)))
 
 
 def more_solutions(
@@ -181,7 +191,7 @@ def more_solutions(
     evidence = (
         f"runs with a solution: {judge.share(one, 1)} against {judge.share(two, 1)} "
         f"({control.label}), adjusted p = {markdown.p_value(p_adjusted)} (Fisher, Holm over the "
-        f"arms); evolution adds {100 * (one.share - two.share):.0f} "
+        f"arms); the algorithm adds {100 * (one.share - two.share):.0f} "
         f"[{100 * low:.0f}, {100 * high:.0f}] points; within the algorithm's median effort the "
         f"control has solved {within}"
     )
@@ -259,18 +269,17 @@ def generations(judge: Judge, results: Results) -> Iterator[Claim]:
 def coding(judge: Judge, results: Results) -> Iterator[Claim]:
     """Judge real against binary coding."""
     for group in groups_but_for(results, "ga"):
-        coded = {c.planner.ga.component: c for c in group}
-        if not {"real_genetic", "binary_genetic"} <= set(coded):
-            continue
-        pair = coded["real_genetic"], coded["binary_genetic"]
-        for what, values, word in (
-            ("position error", measures.errors, "smaller"),
-            ("evaluations to a solution", measures.effort, "fewer"),
-        ):
-            row = judge.compared(*pair, values)
-            where = f", judged by {what}: {_against(*pair)}"
-            told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
-            yield judge.on("coding", where=where).better(row, word, told)
+        real = [c for c in group if c.planner.ga.component == "real_genetic"]
+        binary = [c for c in group if c.planner.ga.component == "binary_genetic"]
+        for pair in itertools.product(real, binary):
+            for what, values, word in (
+                ("position error", measures.errors, "smaller"),
+                ("evaluations to a solution", measures.effort, "fewer"),
+            ):
+                row = judge.compared(*pair, values)
+                where = f", judged by {what}: {_against(*pair)}"
+                told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
+                yield judge.on("coding", where=where).better(row, word, told)
 
 
 def blindness(judge: Judge, results: Results, refuted: Counts) -> Iterator[Claim]:

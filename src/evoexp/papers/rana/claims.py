@@ -63,7 +63,7 @@ def assumed_free(judge: Judge, condition: ConditionResults) -> Claim:
 def _free(judge: Judge, c: ConditionResults, who: str, source: str) -> Claim:
     told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
     hearing = judge.on("free_at_via_points", who=who, source=source)
-    return hearing.every(told, c.solved, c.done, c.planned)
+    return hearing.majority(told, c.solved, c.done)
 
 
 def safety(own_judge: Judge, condition: ConditionResults, who: str) -> Iterator[Claim]:
@@ -87,7 +87,7 @@ def safety(own_judge: Judge, condition: ConditionResults, who: str) -> Iterator[
             f"{markdown.number(spread(values).median)} {unit}{more}"
         )
         hearing = own_judge.on(name, who=who, source=source)
-        yield hearing.every(told, safe, c.done, c.planned)
+        yield hearing.majority(told, safe, c.done)
 
 
 def assumed_safety(judge: Judge, condition: ConditionResults) -> Claim:
@@ -100,7 +100,7 @@ def assumed_safety(judge: Judge, condition: ConditionResults) -> Claim:
         f"{markdown.number(float(np.min(c.column(AT))) / measures.margin(c))} times"
     )
     hearing = judge.on("safety_between_via_points", who="", source=ASSUMED)
-    return hearing.every(told, safe, c.done, c.planned)
+    return hearing.majority(told, safe, c.done)
 
 
 def operators(
@@ -149,13 +149,13 @@ def operator_claims(results: Results, judge: Judge, who: str = "", first: str = 
     rows = {one.measure.name: {row.quantity: row for row in one.rows} for one in found}
     parts = [other for other in others if other.label in PARTS]
     counts = {c.label: measures.refuted(c) for c in (printed, *parts)}
-    own = counts[printed.label]
+    own, level = counts[printed.label], judge.settings.significance
     p_values = fisher_family([(own, counts[part.label]) for part in parts])
     claims = []
     for part, p_value in zip(parts, p_values, strict=True):
         other = counts[part.label]
-        says = [by[part.label].says(judge.significance) for by in rows.values() if part.label in by]
-        says.append(judging.greater(other, own, p_value, judge.significance))
+        says = [by[part.label].says(level) for by in rows.values() if part.label in by]
+        says.append(judging.greater(other, own, p_value, level))
         told = (
             f"{_told(rows[COST].get(part.label), COST, '–')}; "
             f"{_told(rows[EVENNESS].get(part.label), EVENNESS, 'deg', (printed, part))}; "
@@ -219,7 +219,7 @@ def extensions(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
         ):
             text = f"{markdown.share(holds, condition.done)} {evidence}"
             hearing = judge.on(rule, extension=name)
-            yield hearing.every(text, holds, condition.done, condition.planned)
+            yield hearing.majority(text, holds, condition.done)
 
 
 def collision_weight(judge: Judge, first: ConditionResults) -> list[Claim]:

@@ -1,9 +1,9 @@
 """Quantities of single runs that several pages compare, and what evolution adds to its controls."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from evoexp.papers.rana import motions
 from evoexp.planners.via_point_ga.planner import ViaPointGa
@@ -65,11 +65,6 @@ def evolution_told(
     return "; ".join(told), [rows[control.label] for control in shown]
 
 
-def who(results: Results, condition: ConditionResults) -> str:
-    """Return the beginning of a line about a condition: nothing if there is no other one."""
-    return f"{condition.label}: " if len(results.main) > 1 else ""
-
-
 def fits(results: Results) -> bool:
     """Return whether all have several arms of two joints in a plane, or of three in space."""
     for problem in (c.prepared.problem for c in results.with_data):
@@ -86,24 +81,9 @@ def planar(condition: ConditionResults) -> bool:
     return bool(motions.problem(condition).assembly.table.planar)
 
 
-def arms(main: tuple[ConditionResults, ...]) -> str:
-    """Return which arms the conditions have, in words."""
-    return " and ".join(ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True))
-
-
 def margin(condition: ConditionResults) -> float:
     """Return the safety distance [length unit]."""
     return motions.problem(condition).security_margin
-
-
-def planar_scenes(results: Results) -> list[tuple[Results, str]]:
-    """Return all conditions of each scene in the plane, and the end of its figure's stem."""
-    return [(scene, suffix) for scene, suffix in _scenes(results) if planar(scene.with_data[0])]
-
-
-def spatial_scenes(results: Results) -> list[tuple[Results, str]]:
-    """Return all conditions of each scene in space, and the end of its figure's stem."""
-    return [(scene, suffix) for scene, suffix in _scenes(results) if not planar(scene.with_data[0])]
 
 
 def _scenes(results: Results) -> list[tuple[Results, str]]:
@@ -117,41 +97,10 @@ def _scenes(results: Results) -> list[tuple[Results, str]]:
     return [(scene, suffix if len(drawn) > 1 else "") for scene, suffix in drawn]
 
 
-def straight_terms(condition: ConditionResults) -> dict[str, float]:
-    """Return the named terms of the straight line."""
-    return condition.evaluate(motions.straight_line(condition))
-
-
-def straight_centres(sampled_distances: pd.DataFrame) -> float:
-    """Return the least distance of centres along the straight line [length unit]."""
-    straight = sampled_distances[sampled_distances["series"] == motions.STRAIGHT]
-    return float(straight["centres"].min())
-
-
 def longer(condition: ConditionResults) -> FloatArray:
     """Return how much longer than the straight line each run's best paths are, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
     return np.asarray(motions.straight_length(condition) * (ratio - 1.0))
-
-
-def dips(condition: ConditionResults) -> int:
-    """Count the runs whose centres come closer than the safety distance between via-points."""
-    return int(np.count_nonzero(condition.column(BETWEEN) < margin(condition)))
-
-
-def closer(condition: ConditionResults) -> int:
-    """Count the runs whose bodies come closer than the safety distance."""
-    return int(np.count_nonzero(condition.column("clearance") < margin(condition)))
-
-
-def redistributed(condition: ConditionResults) -> int:
-    """Count the free final strings that collide after redistribution."""
-    return motions.colliding_after(condition, relaxed=False)
-
-
-def relaxed(condition: ConditionResults) -> int:
-    """Count the free final strings that collide after redistribution and relaxation."""
-    return motions.colliding_after(condition, relaxed=True)
 
 
 def safety_share(condition: ConditionResults) -> FloatArray:
@@ -165,20 +114,10 @@ def refuted(condition: ConditionResults) -> Proportion:
     return Proportion(counts.refuted, counts.judged)
 
 
-def colliding(condition: ConditionResults) -> Proportion:
-    """Count the runs whose best string collides at a via-point by the paper's model."""
-    return Proportion(condition.done - condition.solved, condition.done)
-
-
 def length(condition: ConditionResults) -> FloatArray:
     """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
     ratio = condition.column("term_path_length_ratio")
     return np.asarray(motions.straight_length(condition) * ratio)
-
-
-def any_planar(results: Results) -> bool:
-    """Return whether the arms of any condition can be drawn in the plane."""
-    return any(map(drawable, results.main))
 
 
 def drawable(condition: ConditionResults) -> bool:
@@ -187,21 +126,6 @@ def drawable(condition: ConditionResults) -> bool:
     if not isinstance(problem, Problem) or not problem.assembly.table.planar:
         return False
     return all(stop - first == 2 for first, stop in problem.arm_slices)
-
-
-def several_arms(condition: ConditionResults) -> bool:
-    """Return whether a condition has arms to keep apart."""
-    return drawable(condition) and condition.problem(Problem).assembly.num_arms > 1
-
-
-def crossover_readings(conditions: Sequence[ConditionResults]) -> list[ConditionResults]:
-    """Return the conditions that read "double cross-over" in another way than the first one."""
-    return _changing(conditions, "crossover_reading")
-
-
-def crossover_distances(conditions: Sequence[ConditionResults]) -> list[ConditionResults]:
-    """Return the conditions that cross strings at other distances than the first one."""
-    return _changing(conditions, "crossover_distance")
 
 
 def _changing(conditions: Sequence[ConditionResults], name: str) -> list[ConditionResults]:
@@ -217,16 +141,6 @@ def _changing(conditions: Sequence[ConditionResults], name: str) -> list[Conditi
     ]
 
 
-def cost_difference(other: ConditionResults, compared: tuple[FamilyComparison, ...]) -> str:
-    """Return how far the costs of a condition are from those of the first one, in words."""
-    return _difference(other, compared, {"best cost": "best cost"})
-
-
-def reading_difference(other: ConditionResults, compared: tuple[FamilyComparison, ...]) -> str:
-    """Return how far cost and evenness of a condition are from those of the first one."""
-    return _difference(other, compared, {"best cost": "best cost", EVENNESS: "unevenness C3 + C4"})
-
-
 def _difference(
     other: ConditionResults, compared: tuple[FamilyComparison, ...], names: dict[str, str]
 ) -> str:
@@ -240,14 +154,6 @@ def _difference(
         if row.quantity == other.label
     ]
     return "; ".join(told) or "nothing to compare"
-
-
-def told_apart(first: ConditionResults) -> str:
-    """Return the share of pairs that are too far apart to be crossed, in words."""
-    return ", ".join(
-        f"{100 * share:.1f} % in generation {generation}"
-        for generation, share in kept_apart(first).items()
-    )
 
 
 def kept_apart(condition: ConditionResults) -> dict[int, float]:
@@ -274,3 +180,49 @@ def kept_apart(condition: ConditionResults) -> dict[int, float]:
         if generation.index >= max(GENERATIONS):
             break
     return found
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # the beginning of a line about a condition: nothing if there is no other one
+    "who": lambda results, condition: f"{condition.label}: " if len(results.main) > 1 else "",
+    "arms": lambda main: " and ".join(
+        ARMS[flat] for flat in sorted(set(map(planar, main)), reverse=True)
+    ),
+    # least distance of centres along the straight line [length unit]
+    "straight_centres": lambda sampled_distances: float(
+        sampled_distances.loc[sampled_distances["series"] == motions.STRAIGHT, "centres"].min()
+    ),
+    # all conditions of each scene in the plane, or in space, and the end of its figure's stem
+    "planar_scenes": lambda results: [s for s in _scenes(results) if planar(s[0].with_data[0])],
+    "spatial_scenes": lambda results: [
+        s for s in _scenes(results) if not planar(s[0].with_data[0])
+    ],
+    "straight_terms": lambda condition: condition.evaluate(motions.straight_line(condition)),
+    # runs whose centres, or bodies, come closer than the safety distance
+    "dips": lambda condition: int(np.sum(condition.column(BETWEEN) < margin(condition))),
+    "closer": lambda condition: int(np.sum(condition.column("clearance") < margin(condition))),
+    # free final strings that collide after redistribution, and after both operators
+    "redistributed": lambda condition: motions.colliding_after(condition, relaxed=False),
+    "relaxed": lambda condition: motions.colliding_after(condition, relaxed=True),
+    # runs whose best string collides at a via-point by the paper's model
+    "colliding": lambda condition: Proportion(condition.done - condition.solved, condition.done),
+    "any_planar": lambda results: any(map(drawable, results.main)),
+    # conditions that read "double cross-over" in another way than the first one, or cross strings
+    # at other distances, and how far they are from it
+    "crossover_readings": lambda conditions: _changing(conditions, "crossover_reading"),
+    "crossover_distances": lambda conditions: _changing(conditions, "crossover_distance"),
+    "cost_difference": lambda other, compared: _difference(
+        other, compared, {"best cost": "best cost"}
+    ),
+    "reading_difference": lambda other, compared: _difference(
+        other, compared, {"best cost": "best cost", EVENNESS: "unevenness C3 + C4"}
+    ),
+    "several_arms": lambda condition: (
+        drawable(condition) and condition.problem(Problem).assembly.num_arms > 1
+    ),
+    # pairs that are too far apart to be crossed, in words
+    "told_apart": lambda first: ", ".join(
+        f"{100 * share:.1f} % in generation {generation}"
+        for generation, share in kept_apart(first).items()
+    ),
+}

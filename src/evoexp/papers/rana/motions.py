@@ -56,10 +56,7 @@ def paths_table(
     table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
     best: str,
 ) -> pd.DataFrame:
-    """Return one table of the replicates' solutions and of the straight line.
-
-    Of more than `MOST_PATHS` replicates the first ones are in it, and the best one.
-    """
+    """Return one table of the replicates' solutions and of the straight line."""
     solutions, best_replicate = condition.solutions, condition.best_replicate
     shown = [k for n, k in enumerate(solutions) if n < MOST_PATHS or k == best_replicate]
     others = OTHERS if len(shown) == len(solutions) else f"{OTHERS} of {len(solutions)}"

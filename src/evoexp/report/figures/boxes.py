@@ -15,20 +15,11 @@ DOT: dict[str, Any] = {"ms": 2.6, "mec": "none", "alpha": 0.5}
 
 
 def draw_box(
-    axes: Axes,
-    position: float,
-    values: FloatArray,
-    colour: str,
-    never: float | None = None,
+    axes: Axes, position: float, values: FloatArray, colour: str, never: float | None = None
 ) -> None:
-    """Draw median, quartiles and whiskers, and points, along the horizontal axis.
+    """Draw median, quartiles and whiskers of values (n,), and points, along the horizontal axis.
 
-    Args:
-        axes: To draw on.
-        position: Of the box along the axis of conditions.
-        values: (n,); inf: a run that never got there.
-        never: Where infinite values are drawn: the box is that of all runs, and median, quartile or
-            whisker may lie there. None: they are left out.
+    Infinite values, of runs that never got there, are drawn at `never`; None: they are left out.
     """
     ordered = np.sort(values[np.isfinite(values) if never is None else values > -np.inf])
     if not len(ordered):

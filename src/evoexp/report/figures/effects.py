@@ -34,11 +34,7 @@ def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataF
 
 
 def draw_values(table: pd.DataFrame) -> Figure:
-    """Draw Tukey's boxes of all runs, the first condition on top.
-
-    Where some runs never get there, "never" stands for infinity, and each condition says how many
-    of its runs do.
-    """
+    """Draw Tukey's boxes of all runs, the first condition on top."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     figure, panels = style.panels(0.32 * len(labels) + 1.1, len(quantities), sharey=True)

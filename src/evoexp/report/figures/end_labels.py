@@ -29,13 +29,9 @@ class CurveEnd(NamedTuple):
 
 
 def apart(wanted: FloatArray, gap: float) -> FloatArray:
-    """Return places within 0 to 1 with a gap between neighbours, nearest to the wanted ones.
+    """Return places within 0 to 1 with a gap between neighbours, nearest to the wanted ones (n,).
 
-    Neighbours that are too close become a block around the mean of what they want.
-
-    Args:
-        wanted: Sorted, (n,).
-        gap: Between neighbours; smaller where so many do not fit.
+    They are sorted. Neighbours that are too close become a block around the mean of what they want.
     """
     gap = min(gap, 1.0 / max(len(wanted) - 1, 1))
     steps = gap * np.arange(len(wanted))
@@ -53,10 +49,7 @@ def apart(wanted: FloatArray, gap: float) -> FloatArray:
 def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:
     """Write names to the right of a panel, each joined with the end of its curve by a line.
 
-    Args:
-        axes: Whose limits are set.
-        ends: Of its curves; those that end at infinity get no name.
-        gap: Between names, as a share of the height of the panel.
+    The panel's limits are set; curves that end at infinity get no name.
     """
     low, high = axes.get_ylim()
     known = sorted((end for end in ends if np.isfinite(end.y)), key=lambda end: end.y)

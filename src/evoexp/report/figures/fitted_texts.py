@@ -16,11 +16,7 @@ TURNED = 60.0  # [deg] of names along an axis that would touch
 
 
 def fit_texts(figure: Figure) -> bool:
-    """Break titles and names of axes that are wider than their room; say if any was.
-
-    Args:
-        figure: Already arranged: the room follows from the places of its panels.
-    """
+    """Break titles and names of axes of an arranged figure that are too wide; say if any was."""
     fitted = False
     parts: list[Figure | SubFigure] = [figure, *figure.subfigs]
     for part in parts:
@@ -73,11 +69,7 @@ def _touch(axis: Axis) -> bool:
 
 
 def _break(text: Text, room: float, *, is_upright: bool = False) -> bool:
-    """Break a text into lines that fit into some room [pixel], else write it smaller.
-
-    Returns:
-        Whether it was longer.
-    """
+    """Break a text that is longer than some room [pixel], or write it smaller; say if it was."""
     size = _length(text, is_upright)
     if not text.get_text() or size <= room or room <= 0.0:
         return False

@@ -57,12 +57,7 @@ def draw_covers(table: pd.DataFrame) -> Figure:
 def _panels(
     table: pd.DataFrame, per_line: int, height: float, room: Callable[[int], pd.DataFrame]
 ) -> Figure:
-    """Draw panels side by side, each as large as the bodies of some rows.
-
-    Args:
-        height: Of a line of panels [inch].
-        room: Returns the rows that a panel has room for.
-    """
+    """Draw lines of panels [inch], each as large as the bodies of the rows it has room for."""
     panels = list(groups(table, ["panel", "title"]))
     lines, planar = -(-len(panels) // per_line), bool(table["planar"].all())
     figure = style.figure(height * lines + 0.3)

@@ -23,11 +23,7 @@ COLUMNS = ["panel", "title", "element", "name", "arm", "kind", *SIZE, *POSE, "co
 
 
 def scenes_table(shown: Sequence[tuple[str, Recording]]) -> pd.DataFrame:
-    """Return bodies at start and goal, obstacles and ways of tools, one panel per motion.
-
-    Args:
-        shown: (title, motion).
-    """
+    """Return bodies at start and goal, obstacles and ways of tools, a panel per (title, motion)."""
     tables = []
     for panel, (title, recording) in enumerate(shown):
         rows = [
@@ -58,8 +54,7 @@ def stages_table(recording: Recording) -> pd.DataFrame:
 def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.DataFrame:
     """Return the exact bodies of robots at their start, and the covers that the search tests.
 
-    Args:
-        shown: (title, motion, covers as rows (Pinocchio's joint, start, end, radius)).
+    Those are rows (Pinocchio's joint, start, end, radius).
     """
     tables = []
     for k, (title, recording, covers) in enumerate(shown):

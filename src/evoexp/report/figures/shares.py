@@ -32,10 +32,7 @@ def shares_table(
 
 
 def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure:
-    """Draw one panel per quantity, one row per condition.
-
-    All panels have one scale: as many percentage points, from another least one on.
-    """
+    """Draw one panel per quantity, one row per condition; panels are equally wide [%]."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}

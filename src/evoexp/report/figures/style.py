@@ -1,8 +1,7 @@
 """The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
 
-import contextlib
 import io
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple
 
@@ -78,27 +77,31 @@ _METADATA: dict[str, dict[str, Any]] = {
 def drawn(
     draw: Callable[[], Figure], formats: Sequence[str], dpi: int, look: Look = PLAIN
 ) -> dict[str, bytes]:
-    """Draw a figure in evoexp's style, whatever the user's own settings are.
+    """Draw a figure in evoexp's style, whatever the user's own settings are, as a file per format.
 
-    Args:
-        draw: Gives the figure; called anew where a name with a $ begins no formula.
-        formats: File formats.
-        dpi: Resolution of raster formats [1/inch].
-        look: Width and style.
-
-    Returns:
-        One file per format; the same figure gives the same bytes.
+    The same figure gives the same bytes. It is drawn anew where a name with a $ begins no formula.
 
     Raises:
         SettingError: If the style file is none of matplotlib's.
     """
-    with _looking(look):
+    scale = _SCALES[look.width]
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        for name, value in own_style().items():
+            is_scaled = isinstance(value, float) and name.endswith(_SCALED)
+            mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
+        if look.style is not None:
+            for name, value in read_style_file(look.style).items():
+                mpl.rcParams[name] = value  # type: ignore[index]
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
+        token = _scale.set(scale)
         try:
             images = _images(draw(), formats, dpi)
         except ValueError:  # a name with a $ that begins no formula
             mpl.rcParams["text.parse_math"] = False
             images = _images(draw(), formats, dpi)
+        finally:
+            _scale.reset(token)
     if "svg" in images:
         images["svg"] = images["svg"].replace(_FONT, _FONTS)
     return images
@@ -120,25 +123,6 @@ def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes
     return images
 
 
-@contextlib.contextmanager
-def _looking(look: Look) -> Iterator[None]:
-    """Let figures be drawn in a look, for as long as the context lasts."""
-    scale = _SCALES[look.width]
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        for name, value in own_style().items():
-            is_scaled = isinstance(value, float) and name.endswith(_SCALED)
-            mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
-        if look.style is not None:
-            for name, value in read_style_file(look.style).items():
-                mpl.rcParams[name] = value  # type: ignore[index]
-        token = _scale.set(scale)
-        try:
-            yield
-        finally:
-            _scale.reset(token)
-
-
 def figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure that arranges itself [inch]; smaller where it is for a column."""
     scale = _scale.get()
@@ -148,13 +132,9 @@ def figure(height: float, width: float = WIDTH) -> Figure:
 def panels(
     height: float, count: int = 1, per_line: int = 0, foot: float = 0.0, *, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with some panels, and the panels, line by line.
+    """Return a figure with some panels, and the panels, line by line [inch].
 
-    Args:
-        height: Of a line [inch].
-        count: Number of panels.
-        per_line: Panels side by side at most, 0: all; half as many in a figure for a column.
-        foot: Height below the panels, for a legend [inch].
+    Side by side are `per_line` of them at most, 0: all; half as many in a figure for a column.
     """
     columns = min(count, per_line or count)
     columns = columns if _scale.get() is _SCALES["page"] else -(-columns // 2)

@@ -41,12 +41,7 @@ def corners_of(outline: Outline) -> FloatArray | None:
 
 
 def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> FloatArray:
-    """Return the triangles of a body in its own frame, (triangles, 3 corners, 3).
-
-    Args:
-        size: (3,) see there; what a kind does not need is ignored.
-        corners: Of a mesh.
-    """
+    """Return the triangles of a body of some size (3,) in its own frame, (triangles, 3, 3)."""
     if kind == "mesh" and corners is not None:
         return _hull(corners)
     if kind == "box":
@@ -148,20 +143,10 @@ def space(
     ticks: tuple[int, int],
     pale: bool = False,
 ) -> Any:
-    """Return axes in space with equal scales that hold a box (3,) and room beyond it.
+    """Return axes in space with equal scales that hold a box (3,) and room beyond it (3,).
 
-    Args:
-        figure: The figure that they are put into.
-        place: As `add_subplot` takes it.
-        low: (3,) the least coordinates that they hold.
-        high: (3,) the greatest ones.
-        pad: (3,) room beyond them.
-        unit: Of lengths.
-        view: Elevation and azimuth [deg].
-        zoom: Of the box in its panel [-].
-        label_pads: From the numbers along x, y and z to their labels [pt].
-        ticks: At most, along a narrow side and along a wide one.
-        pale: Whether the panes are, behind shaded bodies.
+    The view is elevation and azimuth [deg]; labels stand so far from the numbers along x, y and z
+    [pt]; ticks are those of a narrow side and of a wide one, at most.
     """
     axes: Any = figure.add_subplot(*place, projection="3d")
     sides = high - low + 2.0 * pad

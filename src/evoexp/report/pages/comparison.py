@@ -1,7 +1,7 @@
 """The page of `evoexp compare`: planners in one currency, by their proven answers alone."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ from evoexp.report.statistics.inference import (
     quantile,
     spread,
 )
-from evoexp.report.statistics.problem_ranks import Standing, standing
+from evoexp.report.statistics.problem_ranks import standing
 
 
 class Rated(NamedTuple):
@@ -84,16 +84,6 @@ def page(
 
 ranks = standing
 compared_conditions = stored_conditions
-
-
-def ranked_conditions(runs: Sequence[PlannerRuns], ranks: Standing) -> tuple[ConditionResults, ...]:
-    """Return the conditions of problems that count for ranks."""
-    return stored_conditions(own for own in runs if own.problem.name in ranks.problems)
-
-
-def one_problem(runs: Sequence[PlannerRuns]) -> bool:
-    """Return whether there is but one."""
-    return len(problem_order(runs)) == 1
 
 
 def more_panels(runs: Sequence[PlannerRuns]) -> str:
@@ -263,3 +253,12 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
         for row in rows
     )
     return table.to_csv(index=False, lineterminator="\n").encode()
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # conditions of problems that count for ranks
+    "ranked_conditions": lambda runs, ranks: stored_conditions(
+        own for own in runs if own.problem.name in ranks.problems
+    ),
+    "one_problem": lambda runs: len(problem_order(runs)) == 1,
+}

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 from urllib.parse import quote
@@ -118,8 +118,20 @@ def home_page(
     found: Sequence[ReportSummary], papers: Sequence[Paper], runs: Sequence[StoredRun]
 ) -> bytes:
     """Return the home page; the same reports and runs give the same bytes."""
+    search = list[dict[str, Any]]()  # the entries that the search looks through
+    for each in found:
+        entries = [
+            ("report", each.title, ""),
+            *(("heading", text, place) for text, place in each.headings if text not in USUAL),
+            *((f"claim, {verdict}", text, "claims") for text, verdict in each.claims),
+            *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
+        ]
+        search += [
+            {"text": text, "kind": kind, "report": each.folder, "url": each.url(place)}
+            for kind, text, place in entries
+        ]
     content = site(found, papers, runs)
-    return written("home_page.html", site=content, search=script_json(list(_search(found))))
+    return written("home_page.html", site=content, search=script_json(search))
 
 
 def site(
@@ -169,16 +181,3 @@ def _card(paper: Paper, reports: Sequence[ReportSummary]) -> dict[str, Any]:
         # experiments without a report
         "missing": sorted({name for name in names if paper.has(name)} - shown),
     }
-
-
-def _search(found: Iterable[ReportSummary]) -> Iterator[dict[str, Any]]:
-    """Yield the entries that the search looks through."""
-    for each in found:
-        entries = [
-            ("report", each.title, ""),
-            *(("heading", text, place) for text, place in each.headings if text not in USUAL),
-            *((f"claim, {verdict}", text, "claims") for text, verdict in each.claims),
-            *(("run", f"{name} {label}", f"run-{name}") for name, label in each.runs),
-        ]
-        for kind, text, place in entries:
-            yield {"text": text, "kind": kind, "report": each.folder, "url": each.url(place)}

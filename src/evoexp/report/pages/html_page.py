@@ -16,7 +16,8 @@ from evoexp.report.pages.page_parts import Document, Figures, Verdict
 HTML = "index.html"
 FEW = 3  # failures named at the top
 PIXELS_PER_POINT = 4.0 / 3.0
-VERDICTS = ("reproduced", "contradicted", "undecided", "not")  # their first words, in order
+# first words of verdicts, in order
+VERDICTS = ("reproduced", "practically", "depends", "contradicted", "undecided", "not")
 TELLING = ("snapshot", "scene", "motion", "stages", "operational", "posture", "path")
 """Parts of the names of figures that show what an experiment is about, the best one first."""
 NO_VALUE = ("–", "")  # cells of a column of numbers that hold none

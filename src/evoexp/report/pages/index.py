@@ -7,7 +7,6 @@ from pathlib import Path
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_file import own_pages
 from evoexp.report.pages.page_parts import (
-    Claim,
     Document,
     Figures,
     FigureText,
@@ -44,9 +43,19 @@ def document(
     players: Mapping[tuple[str, int], Player] | None = None,
 ) -> Document:
     """Return the text of a page, with the players of motions by the keys of the played runs."""
-    first = _conditions(results, settings), _quantities(page, results)
+    claims = (
+        (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
+        for c in page.claims
+    )
+    failures = (
+        (c.label, replicate, reason)
+        for c in results.conditions
+        for replicate, reason in c.failures.items()
+    )
+    # what came out, before what it follows from
+    quantities = _quantities(page, results)
+    first = _table("claims", claims), _conditions(results, settings), quantities
     later = (
-        _claims(page.claims),
         Table("Known defects and checks", ("check", "finding"), page.checks),
         *(_comparison(heading, rows, settings) for heading, rows in page.comparisons),
     )
@@ -63,7 +72,8 @@ def document(
         )
     )
     sections = list[Table | Figures]()
-    for table in (*first, *page.tables, *later, figures, _parameters(results), _failures(results)):
+    last = _parameters(results), _table("failures", failures)
+    for table in (*first, *page.tables, *later, figures, *last):
         if isinstance(table, Table) and table.rows:
             number = 1 + sum(isinstance(section, Table) for section in sections)
             words = "_".join(re.findall("[a-z0-9]+", table.heading.lower()))[:LONGEST_NAME]
@@ -173,14 +183,6 @@ def _quantities(page: Page, results: Results) -> Table:
     return _table("results", rows * bool(labels), behind=heads)
 
 
-def _claims(claims: Sequence[Claim]) -> Table:
-    rows = [
-        (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
-        for c in claims
-    ]
-    return _table("claims", rows)
-
-
 def _comparison(heading: str, rows: Iterable[Comparison], settings: ReportSettings) -> Table:
     cells = [
         (
@@ -218,16 +220,6 @@ def _parameters(results: Results) -> Table:
         for parameter, labels in by_name[name].items()
     ]
     return _table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
-
-
-def _failures(results: Results) -> Table:
-    """Return the table of failed replicates."""
-    rows = (
-        (c.label, replicate, reason)
-        for c in results.conditions
-        for replicate, reason in c.failures.items()
-    )
-    return _table("failures", rows)
 
 
 def have_two_parts(labels: Sequence[str]) -> bool:

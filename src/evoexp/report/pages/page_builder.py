@@ -5,7 +5,6 @@ from functools import partial
 from typing import Any, cast
 
 from evoexp.report.pages import GENERIC, page_registration, swept
-from evoexp.report.pages.assumptions import Headline
 from evoexp.report.pages.motion_pictures import best_motions
 from evoexp.report.pages.page_file import PageFile, own_pages, read_page_file
 from evoexp.report.pages.page_parts import (
@@ -18,6 +17,7 @@ from evoexp.report.pages.page_parts import (
     quantity,
 )
 from evoexp.report.pages.page_scope import Scope
+from evoexp.report.pages.readings import Headline
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import Results
 from evoexp.report.results.swept_settings import sweep_of
@@ -79,12 +79,12 @@ def build(
     if "headlines" not in entry:
         return PageBuilder(file, scope.inner(compared=_compared(scope, entry))).page(entry)
     return own_page(
-        "assumptions",
+        "readings",
         results,
         settings,
         paper=file.name,
         rules=file.rules,
-        assumed_results=scope.value(entry.get("conditions", "results")),
+        read_results=scope.value(entry.get("conditions", "results")),
         headlines=[_headline(scope, each) for each in entry["headlines"]],
     )
 
@@ -276,10 +276,7 @@ def measure(
 
 
 def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
-    """Return the comparisons of families that a page asks for: what functions know as `compared`.
-
-    Measures are a function's, or rows of the page.
-    """
+    """Return the comparisons of families that a page asks for, which functions name `compared`."""
     found: list[FamilyComparison] = []
     for entry in page.get("comparisons", ()):
         if isinstance(entry, Mapping) and "families" in entry:

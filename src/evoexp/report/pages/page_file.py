@@ -105,9 +105,17 @@ def read_page_file(package: str, file: str = FILE) -> PageFile:
     modules = [
         importlib.import_module(f"{package}.{name}") for name in entries.get("functions", ())
     ]
-    functions = Functions(page_values.PARTS)
+    functions = Functions({})
     for module in (page_values, run_measures, *modules):
-        functions |= _functions_of(module)
+        functions |= {  # also those that it makes of others
+            name: each
+            for name, each in vars(module).items()
+            if isinstance(each, types.FunctionType)
+            and not name.startswith("_")
+            # a function that the module imports has its own name, and another home
+            and (each.__module__ == module.__name__ or each.__name__ != name)
+        }
+        functions |= getattr(module, "PAGE_VALUES", {})
     with resources.as_file(folder.joinpath(RULES_FILE)) as path:
         rules = read_rules(path) if path.is_file() else NO_RULES
     sections = {section: entries.get(section, {}) for section in sorted(KEYS["file"])}
@@ -116,18 +124,6 @@ def read_page_file(package: str, file: str = FILE) -> PageFile:
     page_file = PageFile(entries["name"], sections, functions, rules, package, shared)
     _check(page_file, field)
     return page_file
-
-
-def _functions_of(module: types.ModuleType) -> dict[str, types.FunctionType]:
-    """Return the functions of a module, those among them that it makes of others."""
-    return {
-        name: each
-        for name, each in vars(module).items()
-        if isinstance(each, types.FunctionType)
-        and not name.startswith("_")
-        # a function that the module imports has its own name, and another home
-        and (each.__module__ == module.__name__ or each.__name__ != name)
-    }
 
 
 def _check_keys(field: str, entry: Mapping[str, Any], kind: str) -> None:

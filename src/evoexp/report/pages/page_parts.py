@@ -76,6 +76,26 @@ class Verdict(NamedTuple):
         return f"**{self.text}**"
 
 
+class EffectSize(NamedTuple):
+    """The number that decides a claim, with its interval."""
+
+    name: str  # "A12", "share of runs"
+    value: float
+    low: float
+    high: float
+    neutral: float  # where neither answer is favoured; of a claim about every run: all of them
+    equal: float = 0.0  # the smallest difference from `neutral` that matters; 0: any does
+
+    @property
+    def is_negligible(self) -> bool:
+        """Whether the whole interval is nearer to `neutral` than any difference that matters."""
+        return self.neutral - self.equal <= self.low and self.high <= self.neutral + self.equal
+
+    def __str__(self) -> str:
+        """Return the number with its interval in words: "A12 0.812 [0.771, 0.847]"."""
+        return f"{self.name} {self.value:.3f} [{self.low:.3f}, {self.high:.3f}]"
+
+
 class Claim(NamedTuple):
     """A claim of a paper with our evidence and verdict."""
 
@@ -86,6 +106,7 @@ class Claim(NamedTuple):
     name: str = ""  # of the claim among the paper's
     rule: str = ""  # when it is reproduced, and when contradicted
     n: str = ""  # runs, pairs of runs, or whatever was counted
+    size: EffectSize | None = None  # the number that decides, where the rule has one
 
 
 class Page(NamedTuple):

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from evoexp.report.pages.page_parts import PlayedRun, Quantity, quantity
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.run_measures import search_seconds
+from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics import judging
 from evoexp.report.statistics.comparisons import (
     Comparison,
@@ -16,13 +17,28 @@ from evoexp.report.statistics.comparisons import (
     by_column,
     rows_by_name,
 )
-from evoexp.report.statistics.inference import Proportion
 from evoexp.store.messages import TERM
 
 FEW = 4  # conditions whose average costs can be drawn beside the best ones
 
 
-PARTS: dict[str, Callable[..., Any]] = {
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # evaluations of each run per second of its search, (done,) [1/s]
+    "evaluations_per_second": lambda condition: (
+        condition.column("evaluations") / search_seconds(condition)
+    ),
+    # the quantities of a figure, without those that no run has
+    "known": lambda of, results: {
+        name: values
+        for name, values in of.items()
+        if any(not np.isnan(values(c)).all() for c in results.with_data)
+    },
+    # (quantity, position, condition, how many) of the shares of a figure
+    "counts_of": lambda of, results: [
+        (name, results.position(c.label), c.label, count(c))
+        for name, count in of.items()
+        for c in results.with_data
+    ],
     "experiment": lambda results: results.experiment or "stored runs",  # as titles have it
     "conditions": lambda results: results.with_data,
     "main": lambda results: results.main,  # without controls and references
@@ -63,12 +79,6 @@ def terms(results: Results) -> Iterator[Quantity]:
         yield quantity(results, name, unit, by_column(column))
 
 
-def known(of: Mapping[str, Values], results: Results) -> dict[str, Values]:
-    """Return the quantities of a figure, without those that no run has."""
-    values = of.items()
-    return {k: v for k, v in values if any(not np.isnan(v(c)).all() for c in results.with_data)}
-
-
 def censored(quantities: Mapping[str, Values], results: Results) -> str:
     """Explain infinite values of a figure; empty if there are none."""
     every = (of(c) for of in quantities.values() for c in results.with_data)
@@ -86,14 +96,3 @@ def effect_rows(
     """Return the comparisons of families by quantity: of all, or of those that have a name."""
     rows = rows_by_name(compared)
     return {shown: rows[name] for name, shown in names.items() if name in rows} if names else rows
-
-
-def counts_of(
-    of: Mapping[str, Callable[[ConditionResults], Proportion]], results: Results
-) -> list[tuple[str, int, str, Proportion]]:
-    """Return (quantity, position, condition, how many) of the shares of a figure."""
-    return [
-        (name, results.position(c.label), c.label, count(c))
-        for name, count in of.items()
-        for c in results.with_data
-    ]

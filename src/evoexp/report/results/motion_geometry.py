@@ -28,13 +28,6 @@ Measure = Callable[[FloatArray], FloatArray]  # (nq, configurations) → (config
 LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]  # columns of `links_table`
 
 
-class Nearest(NamedTuple):
-    """The two nearest points of two bodies."""
-
-    distance: float  # between them
-    points: FloatArray  # (2, 3)
-
-
 def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:
     """Return the configurations of a solution's motion, (nq, instants) [deg]."""
     return np.ascontiguousarray(prepared.planner.motion(prepared.problem, solution).q.T / DEGREE)
@@ -56,11 +49,7 @@ def straight_line(
 
 
 def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
-    """Return a motion, q (nq, instants), at so many samples per straight segment.
-
-    Returns:
-        Times in instants, (segments · samples + 1,), and configurations, (nq, the same).
-    """
+    """Return times (n,) and configurations (nq, n) of q (nq, instants), sampled per segment."""
     times = np.arange((q.shape[1] - 1) * samples + 1) / samples
     before = np.minimum(times.astype(np.int64), q.shape[1] - 2)
     share = times - before
@@ -132,16 +121,16 @@ class BodyDistance:
         self._model, self._geometry = model, geometry
         self._data, self._placements = model.createData(), geometry.createData()
 
-    def nearest(self, q: FloatArray, pair: int | None = None) -> Nearest:
-        """Return the nearest points of two bodies at one configuration (nq,) [rad].
+    def nearest(self, q: FloatArray, pair: int | None = None) -> tuple[float, FloatArray]:
+        """Return distance and nearest points (2, 3) of a pair of bodies at q (nq,) [rad].
 
-        `pair` is the number of the pair, None: the closest one. Where bodies touch it is 0.
+        None: of the closest pair. Where bodies touch the distance is 0.
         """
         pin.computeDistances(self._model, self._data, self._geometry, self._placements, q)
         results = list(self._placements.distanceResults)
         least = min(results if pair is None else [results[pair]], key=lambda r: r.min_distance)
         points = np.array([least.getNearestPoint1(), least.getNearestPoint2()])
-        return Nearest(max(0.0, float(least.min_distance)), points)
+        return max(0.0, float(least.min_distance)), points
 
     def __call__(self, q: FloatArray) -> FloatArray:
         """Return the least distance at each configuration (nq, configurations) [rad]."""
@@ -164,10 +153,7 @@ def link_distance(assembly: Assembly) -> BodyDistance:
 
 
 def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
-    """Return all links at every instant of a motion, q (nq, instants) [deg], link by link.
-
-    Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit].
-    """
+    """Return all links at every instant of a motion, q (nq, instants) [deg], link by link."""
     rows = [
         (instant, arm, link, *start[instant], *end[instant])
         for arm, link, start, end in joint_positions(assembly, q)
@@ -206,7 +192,7 @@ def contact(
     motion = planner.motion(problem, solution)
     scene = next(p.scene for p in planner.parts(problem, motion) if p.first <= instant <= p.last)
     number = [PAIR.join(scene.pair_names(k)) for k in range(len(scene.pairs))].index(pair)
-    points = BodyDistance(scene.model, scene.geometry).nearest(motion.at(instant), number).points
+    _, points = BodyDistance(scene.model, scene.geometry).nearest(motion.at(instant), number)
     x, y, _ = np.mean(points, axis=0)
     return float(x), float(y)
 

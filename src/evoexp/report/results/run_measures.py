@@ -38,11 +38,6 @@ def search_seconds(condition: ConditionResults) -> FloatArray:
     return np.asarray(condition.column("cpu_s") - condition.column("certificate_s"))
 
 
-def evaluations_per_second(condition: ConditionResults) -> FloatArray:
-    """Return the evaluations of each run per second of its search, (done,) [1/s]."""
-    return np.asarray(condition.column("evaluations") / search_seconds(condition))
-
-
 def median_replicate(
     condition: ConditionResults, values: FloatArray, among: np.ndarray | None = None
 ) -> int:

@@ -1,34 +1,6 @@
 """The rules by which claims are judged, as data.
 
-A paper keeps its claims in a file `claims.yaml` beside its pages, which its entry point
-`evoexp.claims` names (`my_paper = "my_paper:claims.yaml"`), one entry per claim:
-
-    free_at_via_points:                     # its name
-      claim: "{who}The motion is free of collision at the via-points, in every run"
-      source: "section 3.5, Fig. {figure}"  # where the paper makes it
-      kind: every                           # one of `KINDS`, which says when it is reproduced
-      experiments: [rana, rana_planar]      # those that judge it
-      evidence: "{free} finished runs"      # the numbers; {x!n}: as text, see `markdown.filled`
-    reasonable:
-      claim: "100 individuals are reasonable: {metric}"
-      source: "section 5"
-      kind: own                             # then it says itself when it is
-      reproduced: "the effort of 100 is at most {most} times that of the best size, on every task"
-      contradicted: "it is more on a task"  # optional; without it: wherever it is not reproduced
-      limits: {most: 2.0}                   # numbers that the rule needs, read by the code
-      experiments: [corsepius_population]
-
-Words in braces are limits, or are given where the claim is judged:
-
-    RULES = read_rules(Path(__file__).with_name("claims.yaml"))
-    judge = judging.judge(results, settings, RULES)
-    hearing = judge.on("free_at_via_points", who="", figure="4")
-    hearing.every({"free": share}, holds, done, planned)
-    most = RULES["reasonable"].limits["most"]
-    judge.on("reasonable", metric="cycles").own(evidence, n=50, holds=factor <= most)
-
-The evidence holds the numbers alone; the rule stands in a column of its own. Evidence that depends
-on more than numbers is given as a text instead.
+The format stands at the head of `claim_kinds.yaml` beside this module.
 """
 
 import collections
@@ -37,15 +9,14 @@ from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import yaml
 
 from evoexp.registry import Registration
 
 OWN = "own"
-# kind → (reproduced, contradicted)
-KINDS: dict[str, tuple[str, str]] = yaml.safe_load(
+KINDS: dict[str, dict[str, Any]] = yaml.safe_load(
     Path(__file__).with_name("claim_kinds.yaml").read_text(encoding="utf-8")
 )
 
@@ -62,6 +33,7 @@ class Rule(NamedTuple):
     limits: Mapping[str, float]  # numbers that the rule needs, by name
     experiments: tuple[str, ...]  # names of the experiments that judge it
     evidence: str = ""  # the numbers in a sentence, as `markdown.filled` takes it
+    equal: str = ""  # when both sides are practically equal, in words
 
     def about(self, **words: object) -> "Rule":
         """Return the rule with its words in braces filled in; limits are known already.
@@ -78,17 +50,18 @@ class Rule(NamedTuple):
     def _filled(self, words: dict[str, object]) -> "Rule":
         for name, limit in self.limits.items():
             words.setdefault(name, f"{limit:g}")
-        texts = (self.claim, self.source, self.reproduced, self.contradicted)
-        claim, source, reproduced, contradicted = (text.format_map(words) for text in texts)
-        return self._replace(
-            claim=claim, source=source, reproduced=reproduced, contradicted=contradicted
-        )
+        fields = ("claim", "source", "reproduced", "contradicted", "equal")
+        return self._replace(**{name: getattr(self, name).format_map(words) for name in fields})
 
     @property
     def text(self) -> str:
         """The rule in one sentence."""
-        against = f"; contradicted if {self.contradicted}" if self.contradicted else ""
-        return f"reproduced if {self.reproduced}{against}"
+        verdicts = {
+            "reproduced": self.reproduced,
+            "practically equal": self.equal,
+            "contradicted": self.contradicted,
+        }
+        return "; ".join(f"{verdict} if {words}" for verdict, words in verdicts.items() if words)
 
 
 Rules = Mapping[str, Rule]
@@ -115,10 +88,11 @@ def read_rules(path: Path) -> Rules:
         if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
             must = f"a rule of kind {OWN}, and no other, says when it is reproduced"
             raise ValueError(f"{name}: {must}")
-        words = dict(zip(("reproduced", "contradicted"), KINDS[entry["kind"]], strict=True))
+        words = {"reproduced": "", "contradicted": "", **KINDS[entry["kind"]]}
+        least = {"equal": words.pop("least")} if "least" in words else {}
         data = {
             "source": str(entry["source"]),
-            "limits": MappingProxyType(dict(entry.get("limits", {}))),
+            "limits": MappingProxyType({**least, **entry.get("limits", {})}),
             "experiments": tuple(entry["experiments"]),
         }
         rules[name] = Rule(name=name, **{**words, **entry, **data})

@@ -134,11 +134,7 @@ def adjusted(comparisons: Iterable[Comparison]) -> list[Comparison]:
 def compared_with_controls(
     results: Results, settings: ReportSettings, measures: Sequence[Measure]
 ) -> Iterator[tuple[str, tuple[Comparison, ...]]]:
-    """Compare every condition with its controls: those that wrap the same planner.
-
-    Yields:
-        (heading, one comparison per quantity), p-values adjusted over the quantities.
-    """
+    """Yield (heading, a comparison per quantity) of every condition with each of its controls."""
     for first, second in itertools.product(results.evolved, repeat=2):
         is_pair = not first.is_control and second.is_control
         if is_pair and beside(first.condition, second.condition):
@@ -160,17 +156,9 @@ def compared(
     lower_is_better: bool = True,
     named: Callable[[ConditionResults, ConditionResults], str] = lambda first, second: second.label,
 ) -> tuple[Comparison, ...]:
-    """Compare pairs of conditions in one quantity.
+    """Compare pairs of conditions in one quantity, p-values adjusted over the pairs.
 
-    Args:
-        pairs: (first, second); pairs without runs of both are left out.
-        values: The quantity of a condition, (done,).
-        settings: Levels.
-        lower_is_better: Which of two values is better.
-        named: Gives the name of a pair's row; by default the label of the second condition.
-
-    Returns:
-        One comparison per pair, p-values adjusted over the pairs.
+    Pairs without runs of both are left out. `named` gives the name of a pair's row.
     """
     measure = Measure("", values, lower_is_better=lower_is_better)
     rows = (_row(measure, pair, named(*pair), settings) for pair in pairs)

@@ -83,24 +83,14 @@ class Effect(NamedTuple):
 
 
 def quantile(values: FloatArray, share: float) -> float:
-    """Return a quantile by linear interpolation of order statistics.
-
-    Args:
-        values: (n,); NaN is ignored, ±inf is a value.
-        share: In [0, 1].
-    """
+    """Return a quantile of values (n,), see `quantiles`."""
     return float(quantiles(values[None], (share,))[0, 0])
 
 
 def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
-    """Return the same quantiles as `quantile` of each row.
+    """Return quantiles of each row (rows, n) by interpolating order statistics, (shares, rows).
 
-    Args:
-        values: (rows, n); NaN is ignored, ±inf is a value.
-        shares: In [0, 1].
-
-    Returns:
-        (shares, rows); NaN where a row has no values.
+    NaN is ignored, ±inf is a value; NaN where a row has no values.
     """
     found = np.full((len(shares), len(values)), np.nan)
     if values.shape[1] == 0:
@@ -250,14 +240,9 @@ def _newcombe_interval(a12: float, n: int, m: int, confidence: float) -> Interva
 
 
 def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
-    """Return the expected running time (Hansen et al. 2009): all effort over all successes.
+    """Return the expected running time of runs (runs,), see Hansen et al. 2009; inf: no success.
 
-    Args:
-        effort: (runs,) of every run, failed ones included.
-        solved: (runs,) whether it succeeded.
-
-    Returns:
-        The cost of a success if failed runs are started again; inf if there is none.
+    All effort over all successes is the cost of one if failed runs are started again.
     """
     having = int(np.count_nonzero(solved))
     return float(np.sum(effort)) / having if having else math.inf

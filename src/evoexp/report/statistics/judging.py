@@ -6,21 +6,23 @@ from typing import NamedTuple
 
 from evoexp.registry import CLAIMS, names, registered
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Claim
+from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import option, planned_replicates
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.claim_rules import NO_RULES, OWN, Rule, Rules, registered_rules
 from evoexp.report.statistics.comparisons import Comparison, Values, compared
-from evoexp.report.statistics.inference import Proportion, fisher_exact, runs_for_shares
+from evoexp.report.statistics.inference import (
+    Proportion,
+    fisher_exact,
+    newcombe,
+    runs_for_shares,
+)
 from evoexp.shipped import config_directory, shipped
 
-REPRODUCED, CONTRADICTED, UNDECIDED, NOT_JUDGED = (
-    "reproduced",
-    "contradicted",
-    "undecided",
-    "not judged",
-)
+REPRODUCED, CONTRADICTED, EQUAL = "reproduced", "contradicted", "practically equal"
+UNDECIDED, NOT_JUDGED = "undecided", "not judged"
+DEPENDS = "depends on the reading"
 MANY_RUNS = 10_000  # beyond which nobody waits for a verdict
 ONLY_CONTROLS = "only a control was run"
 Evidence = str | Mapping[str, object]
@@ -39,20 +41,18 @@ class Hearing(NamedTuple):
 
         One counter-example contradicts; all planned runs are needed to reproduce.
         """
-        return self._claim("every", evidence, done, 0 < planned <= done, holds < done)
+        size = self._share("share of runs", holds, done, 1.0)
+        return self._claim("every", evidence, done, 0 < planned <= done, holds < done, size)
 
     def majority(self, evidence: Evidence, holds: int, done: int) -> Claim:
         """Judge a claim that is reproduced if it holds in more than half of the runs."""
-        most = holds > done / 2
-        return self._claim("majority", evidence, done, most, bool(done) and not most)
+        most, size = holds > done / 2, self._share("share of runs", holds, done, 0.5)
+        return self._claim("majority", evidence, done, most, bool(done) and not most, size)
 
     def better(self, row: Comparison | None, word: str, told: str = "{}") -> Claim:
         """Judge a claim that the first condition of a comparison is better than the second.
 
-        Args:
-            row: The comparison; None where one of the two has no run.
-            word: Of the one that is better: "lower", "earlier".
-            told: The evidence; its {} stands for the comparison in words.
+        The word is that of the better one ("lower"); {} in `told` stands for the comparison.
         """
         says = row.says(self.significance) if row else 0
         words = evidence(row, word) if row else "nothing to compare"
@@ -60,7 +60,7 @@ class Hearing(NamedTuple):
             rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
         )
         counted, would_do = row and row.num_runs, row and row.runs_to_decide(self.significance)
-        judged = counted, says == 1, says == -1, would_do
+        judged = counted, says == 1, says == -1, self._effect([row] if row else []), would_do
         return heard._claim("better", told.replace("{}", words), *judged)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
@@ -71,7 +71,7 @@ class Hearing(NamedTuple):
         says = {row.says(self.significance) for row in rows}
         undecided = [row for row in rows if not row.says(self.significance)]
         would_do = max((row.runs_to_decide(self.significance) for row in undecided), default=None)
-        judged = _runs(rows), says == {1}, -1 in says, would_do
+        judged = _runs(rows), says == {1}, -1 in says, self._effect(rows), would_do
         return self._claim("better than all", evidence, *judged)
 
     def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
@@ -82,8 +82,8 @@ class Hearing(NamedTuple):
         good, so not all need be.
         """
         says = {row.says(self.significance) for row in rows}
-        holds = best_median and 1 in says
-        return self._claim("best", evidence, _runs(rows), holds, -1 in says)
+        holds, size = best_median and 1 in says, self._effect(rows)
+        return self._claim("best", evidence, _runs(rows), holds, -1 in says, size)
 
     def greater(
         self, evidence: Evidence, one: Proportion, two: Proportion, p_adjusted: float | None = None
@@ -97,31 +97,49 @@ class Hearing(NamedTuple):
         counted = f"{one.total} and {two.total}"
         is_known = one.total > 0 and two.total > 0
         would_do = runs_for_shares(one, two, self.significance) if is_known else None
-        return self._claim("greater", evidence, counted, says == 1, says == -1, would_do)
+        judged = counted, says == 1, says == -1, self._difference(one, two), would_do
+        return self._claim("greater", evidence, *judged)
 
     def same_share(
         self, evidence: Evidence, own: Proportion, printed: Proportion, p_adjusted: float
     ) -> Claim:
         """Judge a claim that gives a share, a sample itself, by Fisher's exact test."""
-        same, counted = p_adjusted >= self.significance, f"{own.total} and {printed.total}"
-        is_known = own.total > 0
-        return self._claim(
-            "same share", evidence, counted, is_known and same, is_known and not same
-        )
+        differs = own.total > 0 and p_adjusted < self.significance
+        counted, size = f"{own.total} and {printed.total}", self._difference(own, printed)
+        return self._claim("same share", evidence, counted, False, differs, size)
 
-    def own(self, evidence: Evidence, n: object, holds: bool | None) -> Claim:
-        """Judge a claim by a rule of its own, which its `claims.yaml` states.
-
-        Args:
-            evidence: The numbers.
-            n: Runs, or whatever else was counted.
-            holds: Whether it is reproduced; None: nobody can say.
-        """
-        return self._claim(OWN, evidence, n, holds is True, holds is False)
+    def own(
+        self, evidence: Evidence, n: object, holds: bool | None, size: EffectSize | None = None
+    ) -> Claim:
+        """Judge a claim by a rule of its own; n runs, or whatever was counted; None: undecided."""
+        return self._claim(OWN, evidence, n, holds is True, holds is False, size)
 
     def elsewhere(self, evidence: Evidence) -> Claim:
         """Return the claim unjudged: another experiment judges it, or nothing can."""
         return self.made(evidence, "–", NOT_JUDGED)
+
+    def _share(self, name: str, holds: int, done: int, neutral: float) -> EffectSize:
+        own = Proportion(holds, done)
+        return EffectSize(name, own.share, *own.interval(1.0 - self.significance), neutral)
+
+    def _difference(self, one: Proportion, two: Proportion) -> EffectSize:
+        ends = newcombe(one, two, 1.0 - self.significance)
+        return EffectSize(
+            "difference of shares",
+            one.share - two.share,
+            *ends,
+            0.0,
+            self.rule.limits.get("equal", 0.0),
+        )
+
+    def _effect(self, rows: Sequence[Comparison]) -> EffectSize | None:
+        """Return the least A12 of some comparisons."""
+        if not rows:
+            return None
+        least = min((row.better for row in rows), key=lambda each: each.a12)
+        return EffectSize(
+            "A12", least.a12, *least.interval, 0.5, self.rule.limits.get("equal", 0.0)
+        )
 
     def _claim(
         self,
@@ -130,6 +148,7 @@ class Hearing(NamedTuple):
         n: object,
         reproduced: bool,
         contradicted: bool,
+        size: EffectSize | None,
         would_decide: float | None = None,  # runs of each condition
     ) -> Claim:
         if kind != self.rule.kind:
@@ -139,7 +158,9 @@ class Hearing(NamedTuple):
         if reason:
             return self.made(evidence, n, f"{NOT_JUDGED} ({reason})")
         verdict = CONTRADICTED if contradicted else REPRODUCED if reproduced else UNDECIDED
-        claim = self.made(evidence, n, verdict)
+        if size is not None and size.is_negligible:
+            verdict = EQUAL
+        claim = self.made(evidence, n, verdict)._replace(size=size)
         if verdict != UNDECIDED or would_decide is None:
             return claim
         if would_decide > MANY_RUNS:
@@ -162,10 +183,7 @@ def _runs(rows: Sequence[Comparison]) -> str:
 
 
 def greater(one: Proportion, two: Proportion, p_value: float, significance: float) -> int:
-    """Return 1 if a proportion is significantly greater than another, −1 if smaller, else 0.
-
-    The p-value is that of Fisher's exact test, adjusted where it is one of several.
-    """
+    """Return 1 if a proportion is greater, −1 if smaller, 0: not significantly by Fisher's test."""
     if not one.total or not two.total or p_value >= significance:
         return 0
     return int(one.share > two.share) - int(one.share < two.share)
@@ -177,11 +195,6 @@ class Judge(NamedTuple):
     reason: str  # why nothing is judged ("budget smoke"); empty: claims are judged
     settings: ReportSettings  # levels and resamples
     rules: Rules = NO_RULES  # of the paper's claims, by name
-
-    @property
-    def significance(self) -> float:
-        """Below this adjusted p-value a difference counts."""
-        return self.settings.significance
 
     @property
     def level(self) -> float:
@@ -199,18 +212,14 @@ class Judge(NamedTuple):
         return proportion.with_interval(self.level, decimals)
 
     def on(self, name: str, **words: object) -> Hearing:
-        """Open the hearing of a claim.
-
-        Args:
-            name: Of its rule.
-            words: Filled in for the words in braces of its texts.
+        """Open the hearing of a claim, with the words in braces of its texts.
 
         Raises:
             KeyError: If there is no such rule, or a word is missing.
         """
         # a rule that compares names its own word where it is judged
         rule = self.rules[name].about(**{"word": "{word}", **words})
-        return Hearing(rule, self.reason, self.significance)
+        return Hearing(rule, self.reason, self.settings.significance)
 
 
 def judge(results: Results, settings: ReportSettings, rules: Rules = NO_RULES) -> Judge:

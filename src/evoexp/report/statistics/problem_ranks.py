@@ -92,13 +92,9 @@ def standing(runs: Sequence[PlannerRuns]) -> Standing:
 
 
 def effort_ratios(efforts: FloatArray) -> FloatArray:
-    """Return each effort over the least one of its problem (Dolan and Moré 2002, Eq. 2.1).
+    """Return each effort (problems, planners) over its problem's least (Dolan and Moré, Eq. 2.1).
 
-    Args:
-        efforts: (problems, planners); inf: never solved.
-
-    Returns:
-        (problems, planners); inf: never solved, also where no planner solves the problem.
+    Never solved are infinite ones, also where no planner solves the problem.
     """
     best = efforts.min(axis=1, keepdims=True)
     ratios = np.full(efforts.shape, np.inf)
@@ -107,11 +103,7 @@ def effort_ratios(efforts: FloatArray) -> FloatArray:
 
 
 def friedman(lengths: FloatArray) -> Friedman:
-    """Test whether planners rank alike (Friedman 1937).
-
-    Args:
-        lengths: (problems, planners), three planners at least.
-    """
+    """Test whether three planners or more rank alike (Friedman 1937), (problems, planners)."""
     if (lengths == lengths[:, :1]).all():  # nothing but ties
         return Friedman(0.0, 1.0)
     found = stats.friedmanchisquare(*lengths.T)
@@ -125,14 +117,7 @@ def critical_difference(num_planners: int, num_problems: int, significance: floa
 
 
 def alike(mean_ranks: Sequence[float], difference: float) -> list[tuple[int, int]]:
-    """Return the groups of planners that do not differ significantly, none inside of another.
-
-    Args:
-        mean_ranks: In ascending order.
-
-    Returns:
-        (first, last) position of each group of two or more.
-    """
+    """Return (first, last) of the groups of ascending ranks that do not differ significantly."""
     groups: list[tuple[int, int]] = []
     for first, low in enumerate(mean_ranks):
         last = max(k for k, rank in enumerate(mean_ranks) if rank - low < difference)

@@ -14,7 +14,6 @@ from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
 from evoexp.planners.two_stage.planner import Problem
 from evoexp.report.figures import groups, style
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import PlayedRun
 from evoexp.report.results.run_measures import median_replicate
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.inference import Proportion
@@ -103,11 +102,6 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
         xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]", adjustable="datalim", aspect="equal"
     )
     axes.margins(0.1)
-
-
-def median_missions(conditions: Sequence[ConditionResults]) -> list[PlayedRun]:
-    """Return the run of median cost of every condition."""
-    return [PlayedRun(c, median_replicate(c, c.column("best_cost"))) for c in conditions]
 
 
 def mission_checks(

@@ -48,10 +48,7 @@ def _colour(method: str) -> str:
 
 
 def fitness_table(cases: list[Case]) -> pd.DataFrame:
-    """Return median and quartiles over runs of the best fitness f = E_m − E so far.
-
-    For the criterion of the least torque norm it is that norm itself, as in the paper.
-    """
+    """Return median and quartiles over runs of the best fitness f = E_m − E so far."""
     parts = []
     for panel, case in enumerate(cases):
         given = panel, case.name, "fitness f"
@@ -260,10 +257,7 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:
-    """Draw E in colours, one column per criterion: the whole landscape, and around the best.
-
-    White: no posture is feasible.
-    """
+    """Draw E in colours, a column per criterion: the whole, and around the best; white: none."""
     figure, count = style.figure(7.4), table["panel"].nunique()
     places = figure.subplots(2, count, squeeze=False)
     for (whole, close), (_, rows) in zip(places.T, groups(table, "panel"), strict=True):

@@ -1,7 +1,7 @@
 """Chen & Zalzala 1995, Fig. 1: two numerical potential fields, and the slips of their print."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
 from typing import Any
 
@@ -17,7 +17,7 @@ from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, records, style
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.results.stored_results import ConditionResults, Results
+from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.judging import Judge
 
 BLOCKED = "*"
@@ -166,23 +166,6 @@ def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
     )
 
 
-def field_references(results: Results) -> tuple[ConditionResults, ...]:
-    """Return the references that hold potential fields."""
-    return tuple(c for c in results.references if isinstance(c.planner, GridPathGa))
-
-
-def printed_fields(field_references: Sequence[ConditionResults]) -> list[ConditionResults]:
-    """Return the references of the printed map."""
-    return [c for c in field_references if _fields(c)[0].shape == (16, 16)]
-
-
-def single_fields(printed_fields: list[ConditionResults]) -> list[tuple[str, pd.DataFrame]]:
-    """Return the name and the nodes of every field."""
-    return [
-        (str(name), rows) for c in printed_fields for name, rows in groups(nodes_table(c), "field")
-    ]
-
-
 def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
     return condition.array("goal_field"), condition.array("unsafeness")
 
@@ -233,11 +216,6 @@ def _alike(slip: Any, table: pd.DataFrame) -> str:
     return f" (or any equal one of columns {first} to {last})" if first < last else ""
 
 
-def map_shape(condition: ConditionResults) -> str:
-    """Return the numbers of nodes along both axes, as stems have them."""
-    return "_".join(map(str, _fields(condition)[0].shape))
-
-
 def map_table(condition: ConditionResults) -> pd.DataFrame:
     """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
@@ -245,3 +223,20 @@ def map_table(condition: ConditionResults) -> pd.DataFrame:
     fields = zip(NAMES, (goal, np.where(np.isnan(goal), np.nan, unsafeness)), strict=True)
     parts = [{"field": name, "x": x, "y": y, "value": values.ravel()} for name, values in fields]
     return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # the references that hold potential fields, and those of the printed map
+    "field_references": lambda results: tuple(
+        c for c in results.references if isinstance(c.planner, GridPathGa)
+    ),
+    "printed_fields": lambda field_references: [
+        c for c in field_references if _fields(c)[0].shape == (16, 16)
+    ],
+    # name and nodes of every field
+    "single_fields": lambda printed_fields: [
+        (str(name), rows) for c in printed_fields for name, rows in groups(nodes_table(c), "field")
+    ],
+    # numbers of nodes along both axes, as stems have them
+    "map_shape": lambda condition: "_".join(map(str, _fields(condition)[0].shape)),
+}

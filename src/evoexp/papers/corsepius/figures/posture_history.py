@@ -24,11 +24,7 @@ BESIDE: dict[str, Any] = {"va": "center", "ha": "left"}  # a text to the right o
 
 
 def history_table(results: Results) -> pd.DataFrame:
-    """Return cost and distance of the best so far, per phase and cycle of the phase.
-
-    A search that has ended keeps its last value, so that every cycle counts all runs that began the
-    phase.
-    """
+    """Return cost and distance of the best so far, per phase and cycle of the phase."""
     parts = []
     for position, c in enumerate(results.main):
         names = measures.phase_names(c)

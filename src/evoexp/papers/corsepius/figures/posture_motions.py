@@ -167,10 +167,7 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
 
 
 def scope_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return the shown path in its two liveliest joints, and the tool's reach at the start.
-
-    The reach is told by hulls of the tool's places after one random step.
-    """
+    """Return the shown path in its two liveliest joints, and hulls of the tool's first steps."""
     replicate = measures.shown_replicate(condition)
     problem, q = measures.problem(condition), measures.paths(condition)[replicate]
     moved = np.abs(np.diff(q, axis=0)).sum(axis=0)

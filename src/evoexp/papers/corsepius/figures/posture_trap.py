@@ -43,11 +43,7 @@ def stuck_pair(obstructed: Conditions) -> Conditions:
 
 
 def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
-    """Return ways of the tools with distances to the goal, and the cost around a stuck posture.
-
-    That posture is the end of the median run that is stuck. The planner's own `cost` judges all
-    postures, by the only phase of the task without sub-goals.
-    """
+    """Return ways of the tools, and the cost around the end of the median run that is stuck."""
     rows: Rows = []
     planner, problem = stuck.prepared
     for series, condition in ((STUCK, stuck), (HELPED, helped)):

@@ -1,7 +1,8 @@
 """Curkovic et al. 2013, Fig. 5: Pareto fronts of the populations in an early generation."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from evoexp.report.figures import groups, marks, rounded, style
 from evoexp.report.pages.page_parts import Quantity
 from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.inference import Proportion, spread
+from evoexp.report.statistics.inference import spread
 from evoexp.store.log_reader import read_log
 
 CRITERIA = ("c1", "c2", "c3", "c4")
@@ -99,11 +100,6 @@ def front_conditions(results: Results) -> list[tuple[ConditionResults, str]]:
     ]
 
 
-def best_fronts(condition: ConditionResults, fronts: Fronts) -> list[FrontRow]:
-    """Return the fronts of the best replicate."""
-    return fronts[condition.best_replicate]
-
-
 def front_sizes(results: Results) -> Iterator[Quantity]:
     """Yield the rows of the sizes of fronts, population by population."""
     found = {c.label: fronts(c) for c in results.with_data}
@@ -125,11 +121,11 @@ def _sizes(fronts: Fronts, population: int | None = None) -> FloatArray:
     return np.array(sizes)
 
 
-def large_fronts(condition: ConditionResults, fronts: Fronts) -> Proportion:
-    """Count the fronts that are larger than the hall of fame may be."""
-    return counted(_sizes(fronts) > condition.planner.ga.num_hall_teams)
-
-
-def single_fronts(fronts: Fronts) -> Proportion:
-    """Count the fronts of a single point."""
-    return counted(_sizes(fronts) == 1)
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    "best_fronts": lambda condition, fronts: fronts[condition.best_replicate],
+    # fronts that are larger than the hall of fame may be, and those of a single point
+    "large_fronts": lambda condition, fronts: counted(
+        _sizes(fronts) > condition.planner.ga.num_hall_teams
+    ),
+    "single_fronts": lambda fronts: counted(_sizes(fronts) == 1),
+}

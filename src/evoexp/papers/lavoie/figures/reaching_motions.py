@@ -1,6 +1,6 @@
 """Arms reaching into a box of ellipses (Lavoie & Boudreau 2001, Figs. 1 and 2)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -50,22 +50,6 @@ class ShownMotion(NamedTuple):
     replicate: int | None = None
     # (instant, bodies) of the first contact on each sub-path that has one
     contacts: Sequence[tuple[float, str]] = ()
-
-
-def starts(conditions: Sequence[ConditionResults]) -> list[ShownMotion]:
-    """Return the start posture of every condition."""
-    return [ShownMotion(c.label, c) for c in conditions]
-
-
-def solutions(conditions: Sequence[ConditionResults]) -> list[ShownMotion]:
-    """Return every condition's solved run of median error."""
-    return [_shown(c, solved(c)) for c in conditions if solved(c).any()]
-
-
-def refuted_solutions(conditions: Sequence[ConditionResults]) -> list[ShownMotion]:
-    """Return every condition's solved run of median error among those that touch an obstacle."""
-    touching = ((c, solved(c) & measures.touches(c)) for c in conditions)
-    return [_shown(c, rows) for c, rows in touching if rows.any()]
 
 
 def _shown(condition: ConditionResults, among: np.ndarray) -> ShownMotion:
@@ -227,3 +211,17 @@ def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> Non
 def _colour(sub_path: int) -> str:
     """Return the colour of a sub-path; that of the start for 0."""
     return style.arm_colour(sub_path - 1) if sub_path else style.NEUTRAL
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {
+    # its solved run of median error among those that touch an obstacle
+    "refuted_solutions": lambda conditions: [
+        _shown(c, rows)
+        for c in conditions
+        for rows in (solved(c) & measures.touches(c),)
+        if rows.any()
+    ],
+    # the start posture of every condition, and its solved run of median error
+    "starts": lambda conditions: [ShownMotion(c.label, c) for c in conditions],
+    "solutions": lambda conditions: [_shown(c, solved(c)) for c in conditions if solved(c).any()],
+}

@@ -77,10 +77,7 @@ def draw_arms(table: pd.DataFrame) -> Figure:
 
 
 def via_points_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return the via-points of the best replicate, at the beginning and at the end.
-
-    At the beginning: the best individual of the initial population.
-    """
+    """Return the via-points of the best replicate, at the beginning and at the end."""
     solutions = {
         "best of the initial population": condition.first_solution,
         "best at the end": condition.solutions[condition.best_replicate],
@@ -163,10 +160,8 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     )
     a, b = min(couples, key=lambda ab: float(np.linalg.norm(ab[0] - ab[1])))
     rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
-    nearest = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
-    rows.append(
-        ("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance)
-    )
+    least, (a, b) = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
+    rows.append(("bodies", -1, *a[:2], *b[:2], np.nan, least))
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
     return rounded(pd.DataFrame(rows, columns=names)).assign(
         safety_distance=problem.security_margin,

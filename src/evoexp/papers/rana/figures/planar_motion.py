@@ -147,11 +147,7 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 
 
 def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
-    """Return the distances along the best motion and the straight line, and their range over all.
-
-    They are the least distances between two arms, and to obstacles where there are any: of circle
-    centres and of the links themselves. An instant is a fraction between via-points.
-    """
+    """Return least distances along the best motion and the straight line, their range over all."""
     prepared = condition.prepared
     measures = _measures(condition)
 
@@ -183,10 +179,7 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
 
 
 def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]:
-    """Return column of `sampled_distances` → its exact measure, and one that is as good and quick.
-
-    Both take configurations (nq, instants) [deg].
-    """
+    """Return column → its exact measure, and one as good and quick, of q (nq, instants) [deg]."""
     problem, kinds = motions.problem(condition), motions.kinds_of_pairs(condition)
     scene, by_coal = problem.scene, {motions.ARMS: motion_geometry.link_distance(problem.assembly)}
     centres = {
@@ -236,10 +229,7 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
-    """Draw the least distances at each instant: of circle centres, and of the bodies themselves.
-
-    Distances to obstacles stand beside those between arms.
-    """
+    """Draw the least distances at each instant, those to obstacles beside those between arms."""
     figure = style.figure(5.4)
     kinds = list(dict.fromkeys(table["kind"]))
     panels = figure.subplots(2, len(kinds), sharex=True, squeeze=False)

@@ -63,10 +63,7 @@ def draw_arm(table: pd.DataFrame) -> Figure:
 
 
 def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return the links of all arms at start (instant 0) and goal (instant 1), and their reach.
-
-    The reach of an arm is the length of its links that move, from its shoulder on.
-    """
+    """Return links at start (instant 0) and goal (1), and each arm's reach from its shoulder on."""
     problem = motions.problem(condition)
     table = links_table(condition, np.column_stack([problem.start, problem.goal]))
     lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))

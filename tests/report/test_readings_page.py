@@ -1,10 +1,10 @@
-"""The page of assumed numbers, on a small experiment of its own."""
+"""The page of a paper's readings, on a small experiment of its own."""
 
 import pytest
 
-from evoexp.report.pages.assumptions import Headline
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Claim, Page
+from evoexp.report.pages.readings import Headline, over_readings
 from evoexp.report.results.stored_results import ConditionResults, Results, gather
 from evoexp.report.statistics.claim_rules import Rule
 from evoexp.report.statistics.comparisons import by_column
@@ -21,15 +21,19 @@ defaults:
   - override /objective: chen_path_a
   - override /collision: chen
 conditions:
-  "as assumed": []
-  "as assumed, random walks": [control=random_search]
-  "one elite": [ga.num_elites=1]
-  "a smaller map": ["scenario.obstacles=[[6, 8, 9, 11]]"]
+  "(a)":
+    beside: {"random walks": [control=random_search]}
+    readings:
+      "one elite": [ga.num_elites=1]
+      "a smaller map": ["scenario.obstacles=[[6, 8, 9, 11]]"]
 """
 RULES = {
     "short": Rule("short", "{who}a short path", "Fig. 2", "own", "it is short", "", {}, ("e",))
 }
 CONTROLS: dict[str, list[str]] = {}
+DEPENDS_ON_BOTH = (
+    "depends on the reading (practically equal under 1 of 2, contradicted under 1 of 2)"
+)
 
 
 def judged(condition: ConditionResults, controls: tuple[ConditionResults, ...]) -> Claim:
@@ -45,13 +49,13 @@ HEADLINE = Headline("short", "length [node]", by_column("term_distance"), judged
 
 def page_of(results: Results) -> Page:
     """Return the page of one headline claim."""
-    own = {"paper": "Chen", "assumed_results": results, "headlines": [HEADLINE]}
-    return own_page("assumptions", results, SETTINGS, **own)
+    own = {"paper": "Chen", "read_results": results, "headlines": [HEADLINE]}
+    return own_page("readings", results, SETTINGS, **own)
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    folder = tmp_path_factory.mktemp("assumptions")
+    folder = tmp_path_factory.mktemp("readings")
     (folder / "open.yaml").write_text(EXPERIMENT)
     experiment, outputs = smoke_experiment(str(folder / "open.yaml")), folder / "outputs"
     store(outputs, experiment)
@@ -63,37 +67,51 @@ def test_every_assumed_number_stands_with_its_reason_and_its_variations(results:
     page = page_of(results)
     effects, numbers = page.tables
     rows = {str(row[0]): row for row in numbers.rows}
-    assert rows["`ga.num_elites`"][1:] == ("0", "–", "not printed", "one elite")
+    assert rows["`ga.num_elites`"][1:] == ("0", "–", "not printed", "(a), one elite")
     assert rows["`scenario.obstacles[…]`"][1] == "13 values"
-    assert rows["`scenario.obstacles[…]`"][4] == "a smaller map"
+    assert rows["`scenario.obstacles[…]`"][4] == "(a), a smaller map"
     assert rows["`ga.mutation_rate`"][4] == "not varied"
     assert "`ga.population_size`" not in rows  # it is printed
     assert [row[:2] for row in effects.rows] == [
-        ("as assumed", "as assumed"),
-        ("one elite", "`ga.num_elites`"),
-        ("a smaller map", "`scenario.obstacles`"),
+        ("(a)", "as we read it"),
+        ("(a), one elite", "`ga.num_elites`"),
+        ("(a), a smaller map", "`scenario.obstacles`"),
     ]
     assert "**contradicted**" in str(effects.rows[2][3])
     assert "**" not in str(effects.rows[1][3])
-    assert CONTROLS["as assumed"] == ["as assumed, random walks"]
-    assert CONTROLS["one elite"] == []
+    assert CONTROLS["(a)"] == ["(a), random walks"]
+    assert CONTROLS["(a), one elite"] == ["(a), one elite, random walks"]
 
 
-def test_a_claim_survives_where_no_variation_changes_its_verdict(results: Results) -> None:
-    first, survives = page_of(results).claims
-    assert (first.text, first.verdict) == ("as assumed: a short path", "reproduced")
-    assert "1 of 2 variations: a smaller map (contradicted)" in survives.evidence
-    assert survives.verdict == "not judged (budget smoke)"
-    assert survives.n == "2 variations"
+def test_a_claim_has_one_verdict_over_all_readings(results: Results) -> None:
+    (claim,) = page_of(results).claims
+    assert claim.text == "(a): a short path"
+    assert claim.verdict == (
+        "depends on the reading (reproduced under 2 of 3, contradicted under 1 of 3)"
+    )
+    assert claim.evidence == "told; contradicted if a smaller map"
 
 
-def test_the_figure_has_a_row_for_every_condition(results: Results) -> None:
+@pytest.mark.parametrize(
+    ("first", "others", "verdict"),
+    [
+        ("reproduced", [], "reproduced"),
+        ("reproduced", ["reproduced"], "reproduced (under all 2 readings)"),
+        ("undecided", ["reproduced"] * 2, "reproduced (under 2 of 3)"),
+        ("undecided", ["undecided"], "undecided (under all 2 readings)"),
+        ("practically equal", ["contradicted"], DEPENDS_ON_BOTH),
+        ("not judged (budget smoke)", ["not judged (budget smoke)"], "not judged (budget smoke)"),
+    ],
+)
+def test_verdicts_over_readings(first: str, others: list[str], verdict: str) -> None:
+    assert over_readings(first, others) == verdict
+
+
+def test_the_figure_sorts_the_readings(results: Results) -> None:
     page = page_of(results)
     table = page.drawings[0].table()
-    assert list(table["condition"]) == ["as assumed", "one elite", "a smaller map"]
+    assert list(table["reading"]) == ["as we read it", "one elite", "a smaller map"]
     assert list(table["verdict"]) == ["reproduced", "reproduced", "contradicted"]
-    assert len(set(table["shipped"])) == 1
     figure = page.drawings[0].draw(table)
-    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == list(
-        table["condition"]
-    )
+    shown = [text.get_text() for text in figure.axes[0].get_yticklabels()]
+    assert shown == list(table.sort_values(["value", "reading"])["reading"])

@@ -1,38 +1,28 @@
-"""The page of what a paper leaves open: every assumed number, and which claims survive another one.
+"""The page of a paper's readings: its headline claims, judged under every one of them.
 
-The functions below give what the page `assumptions` of `page.yaml` shows. `assumed_results` are
-those of the experiment `<paper>_assumptions`, or of some of its conditions.
+A reading is a number or an interpretation that the text leaves open. The functions below give what
+the page `readings` of `page.yaml` shows. `read_results` are those of the experiment
+`<paper>_claims`, or of some of its conditions.
 """
 
 import itertools
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_parts import Claim
-from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.parameters import OVERRIDE, Parameter, parameters
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics import judging
-from evoexp.report.statistics.claim_rules import OWN, Rule
 from evoexp.report.statistics.comparisons import Values, beside
 from evoexp.report.statistics.inference import spread
-from evoexp.report.statistics.judging import Hearing
+from evoexp.report.statistics.judging import DEPENDS, NOT_JUDGED, UNDECIDED
 
 ASSUMED = "assumed"
+AS_READ = "as we read it"  # the shipped condition
 SHOWN = 4  # values of a list that are written out
 _INDEX = re.compile(r"\[\d+\]")
-SURVIVES = Rule(
-    name="survives",
-    claim="{claim} — whatever number is assumed",
-    source="our question",
-    kind=OWN,
-    reproduced="the verdict under every variation is that under the assumed numbers",
-    contradicted="the verdict is another one under a variation",
-    limits={},
-    experiments=(),
-)
 
 
 class Headline(NamedTuple):
@@ -52,6 +42,12 @@ class Family(NamedTuple):
     # Each other condition with the names of the settings that it changes
     varied: tuple[tuple[ConditionResults, tuple[str, ...]], ...]
 
+    def reading(self, condition: ConditionResults) -> str:
+        """Return the label of a condition without that of the family: "N = 10"."""
+        if condition is self.shipped:
+            return AS_READ
+        return condition.label.removeprefix(f"{self.shipped.label}, ")
+
 
 class Judged(NamedTuple):
     """A headline claim under one condition."""
@@ -63,15 +59,15 @@ class Judged(NamedTuple):
     same: bool  # whether the verdict is that under the assumed numbers
 
 
-def families(assumed_results: Results) -> tuple[Family, ...]:
+def families(read_results: Results) -> tuple[Family, ...]:
     """Return the conditions as assumed, each with those that change its settings by overrides."""
     changed = {
         c: tuple(
             p.name
-            for p in parameters(assumed_results, c)
+            for p in parameters(read_results, c)
             if p.source == OVERRIDE and p.name not in ("seed", "num_replicates")
         )
-        for c in assumed_results.main
+        for c in read_results.main
     }
     options = {c: sorted((each.group, each.name) for each in c.options) for c in changed}
     return tuple(
@@ -85,7 +81,7 @@ def families(assumed_results: Results) -> tuple[Family, ...]:
 
 
 def judged(
-    assumed_results: Results, families: Sequence[Family], headlines: Sequence[Headline]
+    read_results: Results, families: Sequence[Family], headlines: Sequence[Headline]
 ) -> Iterator[Judged]:
     """Judge every headline claim on every condition of a family, first as assumed."""
     for family, headline in itertools.product(families, headlines):
@@ -93,7 +89,7 @@ def judged(
         for condition in (family.shipped, *(varied for varied, _ in family.varied)):
             controls = tuple(
                 c
-                for c in assumed_results.evolved
+                for c in read_results.evolved
                 if c.is_control and beside(condition.condition, c.condition)
             )
             claim = headline.judge(condition, controls)
@@ -101,27 +97,51 @@ def judged(
             yield Judged(headline, family, condition, claim, claim.verdict == first)
 
 
-def headline_claims(
-    assumed_results: Results, settings: ReportSettings, judged: Sequence[Judged]
-) -> Iterator[Claim]:
-    """Yield each claim as assumed, then whether it survives every variation."""
-    reason = judging.not_judged(assumed_results)
+def headline_claims(judged: Sequence[Judged]) -> Iterator[Claim]:
+    """Yield each claim with its verdict over all readings of a family."""
     for family, headline in dict.fromkeys((one.family, one.headline) for one in judged):
         first, *others = (
             one for one in judged if one.family is family and one.headline is headline
         )
         label = f"{first.condition.label}: "
         text = label + first.claim.text.removeprefix(label)
-        yield first.claim._replace(text=text)
-        differing = [
-            f"{one.condition.label} ({one.claim.verdict})" for one in others if not one.same
-        ]
-        told = (
-            f"{first.claim.verdict} as assumed; another verdict under "
-            f"{len(differing)} of {len(others)} variations: {', '.join(differing) or '–'}"
-        )
-        hearing = Hearing(SURVIVES.about(claim=text), reason, settings.significance)
-        yield hearing.own(told, f"{len(others)} variations", not differing if others else None)
+        verdicts = {family.reading(one.condition): one.claim.verdict for one in others}
+        verdict = over_readings(first.claim.verdict, verdicts.values())
+        evidence = [first.claim.evidence] if first.claim.evidence else []
+        for word in dict.fromkeys(verdicts.values()):
+            if word != first.claim.verdict:
+                own = ", ".join(name for name, other in verdicts.items() if other == word)
+                evidence.append(f"{word} if {own}")
+        yield first.claim._replace(text=text, verdict=verdict, evidence="; ".join(evidence))
+
+
+def curve_title(judged: Sequence[Judged], headline: Headline) -> str:
+    """Return a headline claim in words."""
+    first = next(one for one in judged if one.headline is headline)
+    return first.claim.text.removeprefix(f"{first.condition.label}: ")
+
+
+def over_readings(first: str, others: Iterable[str]) -> str:
+    """Return the verdict over several readings, from the verdict under each, the default first.
+
+    Where readings are decided, and not all alike, it depends on the reading: "depends on the
+    reading (reproduced under 11 of 12)".
+    """
+    verdicts = [first, *others]
+    judged = [verdict for verdict in verdicts if not verdict.startswith(NOT_JUDGED)]
+    if not judged or len(verdicts) == 1:
+        return first
+    counts = Counter(judged)
+    decided = [word for word in counts if word != UNDECIDED]
+    if len(decided) == 1:
+        return f"{decided[0]} ({_under(decided[0], counts)})"
+    words = ", ".join(f"{word} {_under(word, counts)}" for word in decided)
+    return f"{DEPENDS} ({words})" if decided else f"{UNDECIDED} ({_under(UNDECIDED, counts)})"
+
+
+def _under(word: str, counts: Counter[str]) -> str:
+    having, total = counts[word], counts.total()
+    return f"under all {total} readings" if having == total else f"under {having} of {total}"
 
 
 def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
@@ -137,7 +157,7 @@ def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
             f"{one.claim.verdict if one.same else f'**{one.claim.verdict}**'}"
             for one in own
         )
-        names = ", ".join(f"`{name}`" for name in changed) or "as assumed"
+        names = ", ".join(f"`{name}`" for name in changed) or AS_READ
         rows.append((condition.label, names, condition.done, *cells))
     return rows
 
@@ -147,12 +167,12 @@ def headline_quantities(headlines: Sequence[Headline]) -> list[str]:
     return [f"{each.name}: {each.quantity}" for each in headlines]
 
 
-def assumed_rows(assumed_results: Results, families: Sequence[Family]) -> list[tuple[object, ...]]:
+def assumed_rows(read_results: Results, families: Sequence[Family]) -> list[tuple[object, ...]]:
     """Return every assumed number, with the conditions that vary it."""
     # name of a setting, or of a list of settings → its entries; entry → the varying conditions
     lists: dict[str, dict[Parameter, list[str]]] = {}
     for family in families:
-        for parameter in parameters(assumed_results, family.shipped):
+        for parameter in parameters(read_results, family.shipped):
             if ASSUMED in parameter.source:
                 names = {parameter.name, parameter.name.split("[")[0]}
                 by = [c.label for c, changed in family.varied if names & set(changed)]

@@ -36,16 +36,6 @@ def geometry_of(*bodies: tuple[str, int, Any, Any], pairs: Any = ()) -> pin.Geom
     return geometry
 
 
-def convex(corners: Any, faces: Any) -> coal.Convex:
-    """Return a convex body of corners (n, 3) and triangles (m, 3)."""
-    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for corner in corners:
-        points.append(corner)
-    for face in faces:
-        triangles.append(coal.Triangle(*map(int, face)))
-    return coal.Convex(points, triangles)
-
-
 def mesh(triangles: Any) -> coal.BVHModelOBBRSS:
     """Return a mesh of triangles (m, 3, 3), which has no inside."""
     model = coal.BVHModelOBBRSS()

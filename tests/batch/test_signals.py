@@ -266,6 +266,14 @@ def wait_for_ever(words):
     finally:
         threading.Event().wait()  # a library that waits for somebody who is gone
 
+class Slow:
+    def __del__(self, sleep=time.sleep):
+        sleep(1.0)  # what Python takes down last
+
+def interrupt(words):
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(60)
+
 def run(command):
     cli.command_module = lambda name: type("", (), {"main": command})
     sys.exit(cli.main())
@@ -288,6 +296,11 @@ def ignore():
     ("code", "returncode", "complaint"),
     [
         ("interruption.ENDING_S = 0.5; run(leave_threads)", -2, "evoexp: interrupted\n"),
+        (
+            "interruption.ENDING_S = 0.3; kept = Slow(); run(interrupt)",
+            130,
+            "evoexp: interrupted\n",
+        ),
         ("interruption.PATIENCE_S = 0.5; run(wait_for_ever)", 143, "evoexp: interrupted\n"),
         ("interruption.CLOSING_S = 0.5; close_for_ever()", -2, ""),
         ("ignore()", 0, ""),  # a signal that the process was started to ignore

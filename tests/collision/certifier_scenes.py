@@ -6,10 +6,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from coal_shapes import convex, mesh
+from coal_shapes import mesh
 from evoexp.collision.scene import Scene, geometry_scene
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.paths.motion import Motion, cubic_motion
+from evoexp.robots.mesh_pieces import convex_shape
 
 SAMPLES = 10_000  # per segment
 
@@ -21,7 +22,7 @@ HULL_FACES = [(0, 1, 3), (1, 2, 3), (2, 0, 3), (1, 0, 4), (2, 1, 4), (0, 2, 4)]
 
 
 def hull(scale: float) -> Any:
-    return convex(HULL_CORNERS * scale, HULL_FACES)
+    return convex_shape(HULL_CORNERS * scale, HULL_FACES)
 
 
 def open_mesh() -> Any:
@@ -46,7 +47,7 @@ def random_shape(rng: np.random.Generator) -> Any:
         lambda: coal.Cone(a, 2.0 * b),
         lambda: coal.Ellipsoid(a, 2.0 * b, c),
         lambda: hull(a),
-        lambda: convex(*(hull_of(0.4 * a * rng.normal(size=(100, 3))) or ())),
+        lambda: convex_shape(*(hull_of(0.4 * a * rng.normal(size=(100, 3))) or ())),
     ][rng.integers(8)]()
 
 

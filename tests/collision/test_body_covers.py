@@ -9,12 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from coal_shapes import convex, distance_of_point, placed
+from coal_shapes import distance_of_point, placed
 from evoexp.collision.bodies.body_models import BodyCapsules
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.covers import body_covers as covers
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
+from evoexp.robots.mesh_pieces import convex_shape
 
 TURN = pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix()
 PLACE = pin.SE3(TURN, np.array([0.3, -0.2, 0.1]))
@@ -49,7 +50,7 @@ def cloud(rng: np.random.Generator, kind: str, count: int) -> np.ndarray:
 
 def hull(kind: str, scale: float = 1.0) -> coal.Convex:
     points = cloud(np.random.default_rng(8), kind, 150) * SIZES[kind] * np.array([1.0, 1.3, 0.8])
-    return convex(*(hull_of(points * scale) or ()))
+    return convex_shape(*(hull_of(points * scale) or ()))
 
 
 def points_of(shape: Any) -> np.ndarray:

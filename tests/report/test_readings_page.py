@@ -1,7 +1,9 @@
 """The page of a paper's readings, on a small experiment of its own."""
 
+import pandas as pd
 import pytest
 
+from evoexp.report.figures.specification import draw_specification
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Claim, Page
 from evoexp.report.pages.readings import Headline, over_readings
@@ -115,3 +117,12 @@ def test_the_figure_sorts_the_readings(results: Results) -> None:
     figure = page.drawings[0].draw(table)
     shown = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     assert shown == list(table.sort_values(["value", "reading"])["reading"])
+
+
+def test_families_stand_one_below_the_other(results: Results) -> None:
+    table = page_of(results).drawings[0].table()
+    both = pd.concat([table, table.assign(family="(b)")])
+    (axes,) = draw_specification(both).axes
+    labels = [text.get_text() for text in axes.get_yticklabels()]
+    assert len(labels) == 2 * (len(table) + 1) and [labels[0], labels[4]] == ["(a):", "(b):"]
+    assert sorted(labels[1:4]) == sorted(labels[5:]) == sorted(table["reading"])

@@ -11,13 +11,14 @@ import pytest
 import yaml
 
 import evoexp
-from coal_shapes import convex, distance_of_point, placed
+from coal_shapes import distance_of_point, placed
 from composed import composed
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.planners.moveit_tasks import posture_task
+from evoexp.robots.mesh_pieces import convex_shape
 from evoexp.scenarios.obstacles import obstacle_hulls, obstacle_table
 from evoexp.testing import conditions
 from moveit_samples import (
@@ -48,7 +49,7 @@ def solid(shape: PlacedShape) -> Any:
         height, radius = shape.sizes
         return (coal.Cylinder if shape.kind == "cylinder" else coal.Cone)(radius, height)
     if shape.kind == "mesh":
-        return convex(*(hull_of(shape.corners) or ()))
+        return convex_shape(*(hull_of(shape.corners) or ()))
     return {"box": coal.Box, "sphere": coal.Sphere}[shape.kind](*shape.sizes)
 
 

@@ -53,6 +53,9 @@ class Interruption:
         for number in _SIGNALS:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._hear)
+        # the timer of `end` stops once threads have ended, and what libraries do at exit is done:
+        # Python takes its handlers back then, and the timer alone would change the exit code
+        atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
         # what callbacks and threads of libraries say of their interrupted work helps nobody
         in_callback, in_thread = sys.unraisablehook, threading.excepthook
         sys.unraisablehook = lambda it: None if self.number is not None else in_callback(it)
@@ -69,8 +72,6 @@ class Interruption:
                 if signal.getsignal(number) == self._hear:
                     signal.signal(number, signal.SIG_IGN)
             signal.setitimer(signal.ITIMER_REAL, ENDING_S)
-            # all threads have ended then, and soon no handler of Python's hears the timer any more
-            atexit.register(signal.setitimer, signal.ITIMER_REAL, 0.0)
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
         if self.number is None and not self._has_ended:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report.figures import groups, records, style
+from evoexp.report.figures import records, style
 from evoexp.report.statistics.inference import spread
 from evoexp.report.statistics.judging import CONTRADICTED, EQUAL, REPRODUCED
 
@@ -47,25 +47,27 @@ def specification_table(judged: Sequence[Any], headline: Any) -> pd.DataFrame:
 
 
 def draw_specification(table: pd.DataFrame) -> Figure:
-    """Draw one panel per family, its readings sorted by the number that decides.
+    """Draw readings sorted by the number that decides, families one below the other.
 
     Args:
         table: Of `specification_table`; infinite values stand at the right edge, as "never".
     """
-    families = [own for _, own in groups(table, "family")]
-    most = max(len(own) for own in families)
-    figure, panels = style.panels(0.24 * most + 1.4, len(families))
-    for axes, own in zip(panels, families, strict=True):
-        rows = own.sort_values(["value", "reading"], kind="stable").reset_index(drop=True)
-        numbers = rows[["value", "low", "high", "neutral"]].to_numpy(np.float64)
-        finite = numbers[np.isfinite(numbers)]
-        low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
-        room = 0.08 * (high - low) or 0.5
-        edge = high + room
-        neutral = rows["neutral"].iloc[0]
-        if np.isfinite(neutral):
-            axes.axvline(neutral, color=style.FAINT, ls=(0, (4, 2)), lw=0.9)
-        for place, row in enumerate(records(rows)):
+    numbers = table[["value", "low", "high", "neutral"]].to_numpy(np.float64)
+    finite = numbers[np.isfinite(numbers)]
+    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 1.0)
+    room = 0.08 * (high - low) or 0.5
+    edge, families = high + room, list(dict.fromkeys(table["family"]))
+    labels = dict[float, tuple[str, bool]]()  # place of a line → its label, whether it is bold
+    place = 0.0
+    figure, (axes,) = style.panels(0.2 * (len(table) + 1.5 * len(families)) + 1.2)
+    for family in families:
+        rows = table[table["family"] == family].sort_values(["value", "reading"], kind="stable")
+        if len(families) > 1:
+            labels[place] = f"{family}:", False
+            place += 1.0
+        first = place
+        for row in records(rows):
+            labels[place] = row.reading, row.default
             mark = MARKS.get(row.verdict, MARKS[OTHERWISE])
             ends = [min(end, edge) for end in (row.low, row.high)]
             axes.hlines(place, *ends, color=mark["mec"], linewidth=1.4)
@@ -73,14 +75,20 @@ def draw_specification(table: pd.DataFrame) -> Figure:
             if not np.isfinite(row.value):
                 beside: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points"}
                 axes.annotate("never", (edge, place), va="center", fontsize=6.5, **beside)
-        axes.set_xlim(low - room, edge + (0.25 * (edge - low) if np.isinf(numbers).any() else 0))
-        axes.xaxis.set_major_locator(style.few_ticks())
-        style.shorten_thousands(axes.xaxis)
-        axes.set_xlabel(f"{rows['quantity'].iloc[0]}: {rows['family'].iloc[0]}")
-        axes.set_yticks(range(len(rows)), rows["reading"])
-        for tick, is_default in zip(axes.get_yticklabels(), rows["default"], strict=True):
-            tick.set_fontweight("bold" if is_default else "normal")
-        axes.set_ylim(most - 0.4, -0.6)
+            place += 1.0
+        neutral = rows["neutral"].iloc[0]
+        if np.isfinite(neutral):
+            lines: dict[str, Any] = {"color": style.FAINT, "ls": (0, (4, 2)), "lw": 0.9}
+            axes.vlines(neutral, first - 0.5, place - 0.5, **lines)
+        place += 0.5
+    axes.set_xlim(low - room, edge + (0.25 * (edge - low) if np.isinf(numbers).any() else 0))
+    axes.xaxis.set_major_locator(style.few_ticks())
+    style.shorten_thousands(axes.xaxis)
+    axes.set_xlabel(", ".join(dict.fromkeys(table["quantity"])))
+    axes.set_yticks(list(labels), [label for label, _ in labels.values()])
+    for tick, (_, is_bold) in zip(axes.get_yticklabels(), labels.values(), strict=True):
+        tick.set_fontweight("bold" if is_bold else "normal")
+    axes.set_ylim(place - 1.0, -0.6)
     entries = [style.key(label, ls="", ms=5, **look) for label, look in MARKS.items()]
     style.keys_below(figure, entries)
     return figure

@@ -121,6 +121,14 @@ def test_distinct_genomes_are_the_default_and_no_part_of_the_canonical_form() ->
             "hall_distinct: must be genome where there",
         ),
         (
+            {"hall_depth": 0.0, "hall_members": "front"},
+            "hall_members: must be pairs where there is no hall",
+        ),
+        (
+            {"hall_members": "front", "hall_memory": 3},
+            "hall_memory: must be null where fronts are copied",
+        ),
+        (
             {"hall_distinct": "genomes"},
             "'genome' or 'index', was 'genomes'; did you mean 'genome'?",
         ),

@@ -87,6 +87,8 @@ def test_the_papers_methods_agree(method: str) -> None:
         {"ga.hall_distinct": "index"},
         {"ga.hall_distinct": "index", "ga.hall_memory": 2},
         {"ga.hall_distinct": "index", "ga.hall_frozen": True},
+        {"ga.hall_members": "front"},
+        {"ga.hall_members": "front", "ga.hall_depth": 1.0},
         {"collision.collision_substeps": 3},
         {"chromosome_length": 2},
         {"ga.population_size": 13, "ga.crossover_rate": 1.0},
@@ -124,9 +126,11 @@ def test_three_robots_agree(label: str, discs: list[Any]) -> None:
     assert (events["contacts"] > 0) is bool(discs)
 
 
-@pytest.mark.parametrize("distinct", ["genome", "index"])
-def test_a_robot_that_stands_still_agrees(distinct: str) -> None:
-    changes = SMALL | {"ga.hall_distinct": distinct}
+@pytest.mark.parametrize(
+    "hall", [{}, {"ga.hall_distinct": "index"}, {"ga.hall_members": "front"}], ids=str
+)
+def test_a_robot_that_stands_still_agrees(hall: dict[str, Any]) -> None:
+    changes = SMALL | hall
     compare(condition(changes, "curkovic_stationary", "configurations only"), 0)
 
 

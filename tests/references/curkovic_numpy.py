@@ -43,6 +43,7 @@ class Curkovic:
     hall_memory: int | None
     hall_frozen: bool
     hall_distinct: str
+    hall_members: str
     restart_after: int | None
     collision_weight: float
     path_weight: float
@@ -224,26 +225,42 @@ def bred(
     c: Curkovic, rng: np.random.Generator, generation: Generation, hall: list[Member], index: int
 ) -> Array:
     """Return the next populations: offspring, then elites, then the hall's members."""
-    count = c.population_size - c.num_elites - len(hall)
-    uniforms = rng.random((int(c.moving.sum()), count + 2 * (count // 2) + 3 * count))
+    copied = copied_members(c, generation, hall)
+    most = c.population_size - c.num_elites - min(map(len, copied))
+    uniforms = rng.random((int(c.moving.sum()), most + 2 * (most // 2) + 3 * most))
     rate = c.mutation_rate - c.mutation_decay * index / c.num_generations  # Eq. 10
     populations, rows = generation.populations.copy(), iter(uniforms)
     for r in np.flatnonzero(c.moving):
         draws, before, costs = next(rows), generation.populations[r], generation.judged.costs[r]
+        count = c.population_size - c.num_elites - len(copied[r])
         parents = roulette(c, costs, draws[:count])
         offspring = before[:, parents]
         crossover(c, draws[count : count + 2 * (count // 2)].reshape(-1, 2), offspring)
-        mutation(c, draws[count + 2 * (count // 2) :].reshape(-1, 3), offspring, rate)
+        rest = draws[count + 2 * (count // 2) :][: 3 * count]
+        mutation(c, rest.reshape(-1, 3), offspring, rate)
         elites = before[:, np.argsort(costs, kind="stable")[: c.num_elites]]
-        members = before[:, [member.team[r] for member in hall]]
-        populations[r] = np.concatenate([offspring, elites, members], axis=1)
+        populations[r] = np.concatenate([offspring, elites, before[:, copied[r]]], axis=1)
     return populations
+
+
+def copied_members(c: Curkovic, generation: Generation, hall: list[Member]) -> list[list[int]]:
+    """Return for each robot the individuals that are copied: the hall's, or the cheapest front."""
+    if c.hall_members == "pairs":
+        return [[member.team[r] for member in hall] for r in range(len(c.start))]
+    fronts: list[list[int]] = [[] for _ in c.start]
+    for r, i in front_members(generation, [], by_genome=c.hall_distinct == "genome"):
+        fronts[r].append(i)
+    return [
+        sorted(own, key=lambda i: float(costs[i]))[: c.num_hall_teams]
+        for own, costs in zip(fronts, generation.judged.costs, strict=True)
+    ]
 
 
 def roulette(c: Curkovic, costs: Array, uniforms: Array) -> Integers:
     """Draw parents in proportion to the inverse of costs, or to their distance to the highest."""
     ends = np.cumsum(1.0 / costs if c.selection == "inverse" else costs.max() - costs)
-    return np.array([np.flatnonzero(ends > u * ends[-1])[0] for u in uniforms])
+    drawn = [np.flatnonzero(ends > u * ends[-1])[0] for u in uniforms]
+    return np.array(drawn, dtype=np.int64)
 
 
 def crossover(c: Curkovic, uniforms: Array, offspring: Array) -> None:
@@ -269,7 +286,7 @@ def mutation(c: Curkovic, uniforms: Array, offspring: Array, rate: float) -> Non
 
 def renewed_hall(c: Curkovic, generation: Generation, hall: list[Member]) -> list[Member]:
     """Return the best teams of the hall and around the fronts; no genome, or index, is in two."""
-    if not c.num_hall_teams:
+    if not c.num_hall_teams or c.hall_members == "front":
         return []
     judged, by_genome = generation.judged, c.hall_distinct == "genome"
     for k, member in enumerate(hall):

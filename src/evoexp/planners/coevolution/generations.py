@@ -20,6 +20,8 @@ from evoexp.planners.coevolution.kernels import (
     Heredity,
     LineTask,
     breed_robots,
+    copy_fronts,
+    count_members,
     evaluate_lines,
     renew,
 )
@@ -123,7 +125,10 @@ def follow(
     """
     own, other = index % len(table.team_costs), (index + 1) % len(table.team_costs)
     hall, before, judged = heredity.hall, table.populations[own], table.judged
-    if len(hall.teams):
+    if heredity.copies_fronts:
+        criteria, costs = judged.criteria[own], judged.costs[own]
+        num_teams[0] = copy_fronts(before, criteria, costs, heredity)
+    elif len(hall.teams):
         num_teams[0] = renew(
             before,
             judged.criteria[own],
@@ -133,10 +138,11 @@ def follow(
             num_teams[0],
             heredity,
         )
-    moving = 0
+    moving, fewest, teams = 0, num_teams[0], hall.teams[: num_teams[0]]
     for robot in range(len(before)):
         moving += heredity.moving[robot]
-    numbers, teams = np.sum(heredity.breeding.sizes[num_teams[0]]), hall.teams[: num_teams[0]]
+        fewest = min(fewest, count_members(teams, robot))
+    numbers = np.sum(heredity.breeding.sizes[fewest])
     draws = uniforms[: moving * numbers].reshape((moving, numbers))
     costs, following = judged.costs[own], table.populations[other]
     breed_robots(
@@ -182,6 +188,7 @@ class TeamSearch(TableSearch):
                 exclusive=problem.moving if by_genome else np.ones_like(problem.moving),
             ),
             by_genome,
+            ga.num_hall_teams > 0 and ga.hall_members == "front",
         )
         self._num_teams = np.zeros(1, dtype=np.int64)
 

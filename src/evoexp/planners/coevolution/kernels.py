@@ -31,6 +31,7 @@ class Heredity(NamedTuple):
     # whether copies count as one individual, and members of the hall are offered again; else
     # members of the hall and their copies leave the fronts
     by_genome: bool
+    copies_fronts: bool  # whether the hall is the front of each population, not pairs
 
 
 class LineTask(NamedTuple):
@@ -54,20 +55,24 @@ def breed_robots(
     rate: float,  # probability that an allele of an individual is mutated (Eq. 10)
     populations: FloatArray,  # (robots, genes, individuals)
     costs: FloatArray,  # (robots, individuals)
-    # (teams, robots) members of the hall; written: their places in the next populations
+    # (teams, robots) members of the hall, −1: none; written: their places in the next populations
     teams: IntArray,
     heredity: Heredity,
     bred: FloatArray,  # like populations, written
 ) -> None:
     """Write the next populations: offspring, then elites, then members of the hall, unchanged."""
-    num_elites = heredity.num_elites
-    count = populations.shape[2] - num_elites - len(teams)
-    parents, elites = np.empty(count, dtype=np.int64), np.empty(num_elites, dtype=np.int64)
+    num_elites, elites = heredity.num_elites, np.empty(heredity.num_elites, dtype=np.int64)
     rules, normals, row = heredity.breeding, np.empty((0, 0)), 0
     for robot in range(len(populations)):
+        held = count_members(teams, robot)
+        count = populations.shape[2] - num_elites - held
+        members = teams[:held, robot].copy()
+        for k in range(held):
+            teams[k, robot] = count + num_elites + k
         if not heredity.moving[robot]:
             bred[robot] = populations[robot]
             continue
+        parents = np.empty(count, dtype=np.int64)
         draws, genes, before = uniforms[row], bred[robot], populations[robot]
         own, row = costs[robot], row + 1
         breed(
@@ -76,9 +81,48 @@ def breed_robots(
         # elites and members of the hall, untouched
         choose_elites(own, elites)
         copy_members(before, elites, genes, count)
-        copy_members(before, teams[:, robot], genes, count + num_elites)
-    for k in range(len(teams)):
-        teams[k] = count + num_elites + k
+        copy_members(before, members, genes, count + num_elites)
+
+
+@kernel
+def count_members(teams: IntArray, robot: int) -> int:
+    """Return how many individuals of a robot's population the hall (teams, robots) holds."""
+    held = 0
+    while held < len(teams) and teams[held, robot] >= 0:
+        held += 1
+    return held
+
+
+@kernel
+def copy_fronts(
+    populations: FloatArray,  # (robots, genes, individuals)
+    criteria: FloatArray,  # (robots, criteria, individuals), all minimised
+    costs: FloatArray,  # (robots, individuals)
+    heredity: Heredity,  # the hall and its rules
+) -> int:
+    """Let the hall hold the front of each population, the cheapest if it has too few places.
+
+    "The Pareto front is copied to the next generation. The size of the front is limited"
+    (section 3). A population whose front is smaller has members −1 at the end.
+
+    Returns:
+        Number of rows of the hall that are used.
+    """
+    teams, fronts, used = heredity.hall.teams, np.empty(costs.shape, dtype=np.bool_), 0
+    for robot in range(len(populations)):
+        fronts[robot] = pareto_front(criteria[robot])
+    if heredity.by_genome:
+        merge_copies(populations, criteria[:, 1], teams[:0], fronts)
+    for robot in range(len(populations)):
+        front = np.flatnonzero(fronts[robot])
+        held = min(len(front), len(teams))
+        order = np.empty(held, dtype=np.int64)
+        choose_elites(costs[robot][front], order)
+        teams[:, robot] = -1
+        for k in range(held):
+            teams[k, robot] = front[order[k]]
+        used = max(used, held)
+    return used
 
 
 @kernel

@@ -44,6 +44,9 @@ class CoevolutionSettings(PopulationSettings):
     # offered again. Runs by index are bit for bit those of revision 1 of `coevolution`,
     # unless a link's angle is exactly a multiple of 90°
     hall_distinct: Literal["genome", "index"] = "genome"
+    # what the hall holds. `pairs`: teams of members of the fronts, until a better one is found;
+    # `front`: the present front of each population, the cheapest first, copied to the next
+    hall_members: Literal["pairs", "front"] = "pairs"
 
     crossover: Named[Crossover] | None = None  # None: at one point
     mutation: Named[Mutation] | None = None  # None: of one allele (Eq. 9)
@@ -51,6 +54,7 @@ class CoevolutionSettings(PopulationSettings):
     @model_validator(mode="after")
     def _settings_agree(self) -> Self:
         no_hall, no_rule = self.hall_depth == 0.0, "null where there is no hall (hall_depth is 0)"
+        front, no_pairs = self.hall_members == "front", "null where fronts are copied"
         most = self.population_size - self.num_hall_teams
         for wrong, field, must in (
             (
@@ -70,6 +74,13 @@ class CoevolutionSettings(PopulationSettings):
                 "hall_distinct",
                 no_rule.replace("null", "genome"),
             ),
+            (
+                no_hall and front,
+                "hall_members",
+                no_rule.replace("null", "pairs"),
+            ),
+            (front and self.hall_memory is not None, "hall_memory", no_pairs),
+            (front and self.hall_frozen, "hall_frozen", no_pairs.replace("null", "false")),
             (
                 self.hall_frozen and self.hall_memory is not None,
                 "hall_memory",

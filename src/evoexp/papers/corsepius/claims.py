@@ -20,6 +20,10 @@ from evoexp.report.statistics.judging import Judge, fisher_evidence
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 RECOMMENDED = 100.0  # individuals (section 5)
+# what else a smaller population changes
+KEPT, SCALED = "all else equal", "parents in proportion, patience in evaluations"
+# (task, size, its condition, that of the recommended size)
+SizePair = tuple[str, float, ConditionResults, ConditionResults]
 METRICS: dict[str, Values] = {
     "cycles": measures.cycles,
     "evaluations": measures.evaluations,
@@ -32,7 +36,8 @@ def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
     found = measures.obstructed(results.main)
     for c in found:
         yield judge_met(judge, c)
-        yield judge_free(judge, c)
+        if avoids := judge_free(judge, c, results):
+            yield avoids
         yield from _tilt(judge, c)
         # the planning time that the paper prints beside ours
         objects = [getattr(phase.goal, "object", "") for phase in c.scenario.phases]
@@ -74,8 +79,13 @@ def judge_met(judge: Judge, condition: ConditionResults) -> Claim:
     return hearing.majority(f"goal met {judge.share(met)}", *met)
 
 
-def judge_free(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge that binary ratings of distances keep the whole motion free."""
+def judge_free(judge: Judge, condition: ConditionResults, results: Results) -> Claim | None:
+    """Judge that binary ratings of distances keep the whole motion free.
+
+    None where no obstacle of the task ever acts: then its paths say nothing of obstacles.
+    """
+    if not measures.obstacles_act(condition, results):
+        return None
     refuted, free = measures.refuted(condition), run_measures.certified(condition).having
     planned = refuted.total if condition.done == condition.planned else 0
     told = (
@@ -142,20 +152,22 @@ class SizeComparison(NamedTuple):
 
 
 def judge_study(
-    judge: Judge, sizes: Tasks, size_ratios: dict[str, list[SizeComparison]]
+    judge: Judge, results: Results, sizes: Tasks, size_ratios: dict[str, list[SizeComparison]]
 ) -> tuple[Claim, ...]:
     """Judge the claims on the size."""
+    kept, scaled = list(_beside_recommended(sizes)), list(_scaled(results, sizes))
+    rows = _compared(scaled, "evaluations", judge.settings)
     return (
         *(claim for metric, rows in size_ratios.items() for claim in _larger(judge, metric, rows)),
-        *(_over_proportional(judge, metric, rows) for metric, rows in size_ratios.items()),
-        _converges_less(judge, sizes),
+        *(_over_proportional(judge, metric, KEPT, rows) for metric, rows in size_ratios.items()),
+        _over_proportional(judge, "evaluations", SCALED, rows),
+        _converges_less(judge, KEPT, kept),
+        _converges_less(judge, SCALED, scaled),
         *(_reasonable(judge, metric, sizes, values) for metric, values in METRICS.items()),
     )
 
 
-def _beside_recommended(
-    found: Tasks,
-) -> Iterator[tuple[str, float, ConditionResults, ConditionResults]]:
+def _beside_recommended(found: Tasks) -> Iterator[SizePair]:
     """Yield (task, size, its condition, that of the recommended size) where either solves it."""
     for task in found:
         own = task.by_value.get(RECOMMENDED)
@@ -164,13 +176,26 @@ def _beside_recommended(
                 yield task.name, value, c, own
 
 
+def _scaled(results: Results, found: Tasks) -> Iterator[SizePair]:
+    """Yield the same of sizes whose parents and patience change with the size."""
+    for task in found:
+        own = task.by_value.get(RECOMMENDED)
+        for c in results.main if own is not None else ():
+            scaled = c.planner.ga.num_parents != own.planner.ga.num_parents
+            if scaled and measures.scene(c) == measures.scene(own) and (own.solved or c.solved):
+                yield task.name, float(c.planner.ga.num_offspring), c, own
+
+
 def compare_sizes(found: Tasks, metric: str, settings: ReportSettings) -> list[SizeComparison]:
     """Compare every size with the recommended one, task by task.
 
-    Intervals are of one family: their levels are Bonferroni's over all of them. Tasks that neither
-    size ever solves are left out.
+    Tasks that neither size ever solves are left out.
     """
-    pairs = list(_beside_recommended(found))
+    return _compared(list(_beside_recommended(found)), metric, settings)
+
+
+def _compared(pairs: list[SizePair], metric: str, settings: ReportSettings) -> list[SizeComparison]:
+    """Compare efforts, as one family: levels of intervals are Bonferroni's over all of them."""
     level = 1.0 - (1.0 - settings.confidence) / max(1, len(pairs))
     rows = []
     for name, value, c, own in pairs:
@@ -224,7 +249,9 @@ def _larger(judge: Judge, metric: str, compared: list[SizeComparison]) -> Iterat
     yield hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
 
 
-def _over_proportional(judge: Judge, metric: str, compared: list[SizeComparison]) -> Claim:
+def _over_proportional(
+    judge: Judge, metric: str, how: str, compared: list[SizeComparison]
+) -> Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
     rows = [row for row in compared if row.value < RECOMMENDED]
     says = [row.says for row in rows]
@@ -233,13 +260,13 @@ def _over_proportional(judge: Judge, metric: str, compared: list[SizeComparison]
         f"above: {_ratios(rows, 1)}; below: {_ratios(rows, -1)}; not certain: {says.count(0)} of "
         f"{len(rows)}"
     )
-    hearing = judge.on("smaller_over_proportional", metric=metric, exceeds=exceeds)
+    hearing = judge.on("smaller_over_proportional", metric=metric, how=how, exceeds=exceeds)
     return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
 
-def _converges_less(judge: Judge, found: Tasks) -> Claim:
+def _converges_less(judge: Judge, how: str, sizes: list[SizePair]) -> Claim:
     """Judge that smaller populations meet their goals less often."""
-    pairs = [pair for pair in _beside_recommended(found) if pair[1] < RECOMMENDED]
+    pairs = [pair for pair in sizes if pair[1] < RECOMMENDED]
     shares = [(run_measures.success(own), run_measures.success(c)) for _, _, c, own in pairs]
     says = [
         judging.greater(*pair, p, judge.settings.significance)
@@ -255,7 +282,7 @@ def _converges_less(judge: Judge, found: Tasks) -> Claim:
         f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
         f"often in {more}: {texts or '–'}"
     )
-    hearing = judge.on("smaller_converge_less")
+    hearing = judge.on("smaller_converge_less", how=how)
     return hearing.own(told, f"{len(pairs)} pairs", _unless(more, less))
 
 

@@ -176,6 +176,20 @@ def with_empty_scenes(conditions: Conditions) -> list[Pair]:
     return _pairs_but_for(conditions, "empty_scene")
 
 
+def obstacles_act(condition: ConditionResults, results: Results) -> bool:
+    """Return whether a task's runs differ from those in its empty scene; True where none was run.
+
+    The task is named by the first word of the labels, whatever else a reading changes.
+    """
+    task = condition.label.split(", ")[0]
+    named = {c.label: c for c in results.with_data}
+    own, empty = named.get(task), named.get(f"{task}, empty scene")
+    if own is None or empty is None:
+        return True
+    costs = [c.summaries["best_cost"].reindex(own.summaries.index) for c in (own, empty)]
+    return not costs[0].equals(costs[1])
+
+
 def _pairs_but_for(conditions: Conditions, setting: str) -> list[Pair]:
     """Return (one without a setting of the task, the same one with it)."""
 

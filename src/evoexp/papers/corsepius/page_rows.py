@@ -184,6 +184,9 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     ],
     # the tasks whose numbers of parents differ, and those whose populations differ in size
     "parents": lambda results: measures.tasks(results, "num_parents"),
+    "with_obstacles": lambda results: results._replace(
+        conditions=measures.obstructed(results.conditions)
+    ),
     "sizes": lambda results: measures.tasks(results, "num_offspring"),
     "size_ratios": lambda sizes, settings: {
         metric: claims.compare_sizes(sizes, metric, settings) for metric in METRICS

@@ -15,14 +15,15 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import judging
-from evoexp.report.statistics.comparisons import Comparison, Values, by_column, compared
+from evoexp.report.statistics.comparisons import Comparison, by_column, compared
+from evoexp.report.statistics.inference import Proportion
 from evoexp.report.statistics.judging import Judge
 
 Rows = tuple[Comparison, ...]
 Conditions = Sequence[ConditionResults]
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))  # with a hall, and without
 EFFORT = "evaluations to a team whose cost is the threshold"
-METHOD, PLAIN, ELITES = "V", "I", "15 elites"
+METHOD, ELITES = "V", "15 elites"
 KEPT = "least distance of an end-effector from another robot's links"
 
 
@@ -115,30 +116,40 @@ def judge_motions(judge: Judge, results: Results, compared_radii: Rows) -> list[
     """Judge the claims on motions and radii."""
     found = list[Claim]()
     for c in results.main:
-        scene, where = _scene_claim(c)
+        name, scene, where = _scene_claim(c)
         words = {"condition": c.label, "scene": scene, "where": where}
-        hearing = judge.on("free_motion", judge="the paper's model", **words)
+        hearing = judge.on(name, judge="the paper's model", **words)
         told = f"{markdown.share(c.solved, c.done)} runs"
-        found.append(hearing.every(told, c.solved, c.done, c.planned))
-        found.append(_whole_motion_free(judge, c, words))
+        found.append(hearing.majority(told, c.solved, c.done))
+        if enveloped(c):
+            free = int(np.count_nonzero(measures.free_by_envelope(c)))
+            told = f"{markdown.share(free, c.done)} runs, {measures.INSTANTS} instants per segment"
+            hearing = judge.on(name, judge="the paper's own envelope on the whole motion", **words)
+            found.append(hearing.majority(told, free, c.done))
+        found.append(_whole_motion_free(judge, name, c, words))
     found += [
         judge.on("larger_radius", pair=row.quantity).better(row, "larger") for row in compared_radii
     ]
     return found
 
 
-def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
-    """Return the claim that the paper makes of a scene, and its source."""
-    problem = condition.problem(Problem)
+def _scene_claim(condition: ConditionResults) -> tuple[str, str, str]:
+    """Return the name of the claim that the paper makes of a scene, its words, and its source."""
+    problem, other = condition.problem(Problem), "free_in_other_scenes"
     if len(problem.start) > 2:
-        return "The method takes new robots: it finds a collision-free motion of three", "section 5"
+        text = "The method takes new robots: it finds a collision-free motion of three"
+        return other, text, "section 5"
     if not problem.moving.all():
         text = "One robot stands still, obstacles stand around: a collision-free motion"
-        return text, "section 4, Fig. 10"
+        return other, text, "section 4, Fig. 10"
     if enveloped(condition):
         text = "Envelopes and circles: a collision-free motion of the robots with their bodies"
-        return text, "section 4"
-    return "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
+        return other, text, "section 4"
+    return (
+        "free_motion",
+        "A collision-free motion of two robots in each other's way",
+        "section 4, Figs. 8, 9",
+    )
 
 
 def enveloped(condition: ConditionResults) -> bool:
@@ -205,9 +216,13 @@ def motion_words(condition: ConditionResults, radius_conditions: Conditions) -> 
 
 
 def with_hall(results: Results) -> Results:
-    """Return the results of method V under all numbers."""
-    treated = (c for c in results.conditions if c.label.partition(", ")[0] == METHOD)
+    """Return the results of the methods with a hall, under all numbers."""
+    treated = (c for c in results.conditions if _method(c) in dict(PAIRS))
     return results._replace(conditions=tuple(treated))
+
+
+def _method(condition: ConditionResults) -> str:
+    return condition.label.partition(", ")[0]
 
 
 def effort(condition: ConditionResults, settings: ReportSettings) -> FloatArray:
@@ -217,41 +232,60 @@ def effort(condition: ConditionResults, settings: ReportSettings) -> FloatArray:
 
 
 def assumed_faster(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
-    """Judge method V against method I under the same numbers."""
-    hearing = judge.on("faster", who="", measure=EFFORT, pair=f": {METHOD} against {PLAIN}")
+    """Judge a method with a hall against its twin without, under the same numbers."""
+    method = _method(condition)
+    pair = f": {method} against {dict(PAIRS)[method]}"
+    hearing = judge.on("faster", who="", measure=EFFORT, pair=pair)
     values = partial(effort, settings=judge.settings)
-    return hearing.better(_against(judge, results, condition, PLAIN, values), "lower")
+    twin = _twin(results, condition, dict(PAIRS)[method])
+    return hearing.better(judge.compared(condition, twin, values) if twin else None, "lower")
 
 
-def assumed_elites(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
-    """Judge method V against elites under the same numbers."""
-    row = _against(judge, results, condition, ELITES, by_column("best_cost"))
-    told = judging.evidence(row, "lower") if row else "nothing to compare"
+def assumed_refuted(judge: Judge, condition: ConditionResults, results: Results) -> Claim:
+    """Judge the share of refuted motions beside that of the twin without a hall."""
+    plain = dict(PAIRS)[_method(condition)]
+    twin = _twin(results, condition, plain)
+    known = (measures.defects(c).refuted if c else Proportion(0, 0) for c in (condition, twin))
+    own, others = known
+    told = f"{own} with a hall, {others} without"
+    return judge.on("refuted_more", plain=plain).greater(told, own, others)
+
+
+def assumed_elites(judge: Judge, condition: ConditionResults, results: Results) -> Claim | None:
+    """Judge method V against elites under the same numbers, where elites were run."""
+    twin = _twin(results, condition, ELITES)
+    if twin is None or _method(condition) != METHOD:
+        return None
+    row = judge.compared(condition, twin, by_column("best_cost"))
     hearing = judge.on("hall_beyond_elites", who="", elites=ELITES, measure="best cost")
+    told = judging.evidence(row, "lower") if row else "nothing to compare"
     return hearing.better_than_all(told, [row] if row else [])
 
 
-def _against(
-    judge: Judge, results: Results, condition: ConditionResults, other: str, values: Values
-) -> Comparison | None:
-    """Compare method V with another treatment under the same numbers.
+def _twin(results: Results, condition: ConditionResults, other: str) -> ConditionResults | None:
+    """Return another treatment of the same scene under the same numbers, or None.
 
-    Numbers of the hall are no numbers of a treatment without one: that is as assumed then.
+    Numbers of the hall are no numbers of a treatment without one: these are as assumed then.
     """
-    _, comma, changed = condition.label.partition(", ")
-    by_label = {c.label: c for c in results.with_data}
-    twin = by_label.get(f"{other}{comma}{changed}", by_label.get(other))
-    return None if twin is None else judge.compared(condition, twin, values)
+    readings = set(condition.label.split(", "))
+    scene = condition.robot, condition.scenario
+    twins = [c for c in results.with_data if _method(c) == other and (c.robot, c.scenario) == scene]
+    alike = [c for c in twins if set(c.label.split(", ")) - {other} <= readings]
+    return max(alike, key=lambda c: c.label.count(", "), default=None)
 
 
-def assumed_free(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge that the whole motion is free, under assumed numbers."""
+def assumed_free(judge: Judge, condition: ConditionResults) -> Claim | None:
+    """Judge that the whole motion of method V is free, under assumed numbers."""
+    if _method(condition) != METHOD:
+        return None
     scene = "a collision-free motion of two robots in each other's way"
     words = {"condition": "Figs. 8, 9", "scene": scene, "where": "section 4, Figs. 8, 9"}
-    return _whole_motion_free(judge, condition, words)
+    return _whole_motion_free(judge, "free_motion", condition, words)
 
 
-def _whole_motion_free(judge: Judge, c: ConditionResults, words: dict[str, str]) -> Claim:
+def _whole_motion_free(
+    judge: Judge, name: str, c: ConditionResults, words: dict[str, str]
+) -> Claim:
     free, judged = run_measures.certified(c).having, c.done - c.verdicts.undecided
-    hearing = judge.on("free_motion", judge="the exact verdict on the whole motion", **words)
-    return hearing.every(f"{markdown.share(free, judged)} runs", free, judged, c.planned)
+    hearing = judge.on(name, judge="the exact verdict on the whole motion", **words)
+    return hearing.majority(f"{markdown.share(free, judged)} runs", free, judged)

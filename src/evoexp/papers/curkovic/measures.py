@@ -7,7 +7,8 @@ import numpy as np
 
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
+from evoexp.report.pages.page_parts import PlayedRun
 from evoexp.report.results.run_measures import counted, search_seconds, solved
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
@@ -15,6 +16,7 @@ from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Proportion, quantile
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
+INSTANTS = 100  # of a segment, at which the paper's model looks for contacts of whole motions
 CERTIFIED = "best cost, a refuted motion counting as worse than any"
 
 
@@ -68,6 +70,23 @@ def refuted(condition: ConditionResults) -> FloatArray:
     """
     found = condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=np.float64)
     return np.where(solved(condition), found, np.nan)
+
+
+def free_by_envelope(condition: ConditionResults) -> BoolArray:
+    """Return whether each run's motion is free by the paper's own model between instants, (done,).
+
+    The exact verdict judges links that are round at their ends and so reach a little further.
+    """
+    planner = condition.planner
+    fine = planner.collision.model_copy(update={"collision_substeps": INSTANTS})
+    fine_planner = planner.model_copy(update={"collision": fine})
+    planner, problem = condition.condition._replace(planner=fine_planner).prepare()
+    return np.array(
+        [
+            planner.evaluate(problem, condition.solutions[int(k)])["team_collisions"] == 0.0
+            for k in condition.summaries.index
+        ]
+    )
 
 
 def _over_robots(name: str) -> Values:
@@ -139,6 +158,7 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "bound": lambda first: lower_bound(first),  # in the first condition's scene
     "threshold": lambda bound, settings: settings.threshold_ratio * bound,  # of effort
     "one_scene": lambda results: len({(c.robot, c.scenario) for c in results.with_data}) == 1,
+    "exemplar_run": lambda condition: (PlayedRun(condition, exemplar(condition)),),
     # runs whose first generation holds a collision-free team
     "free_at_first": lambda condition: int(
         (condition.column("first_feasible_generation") == 0).sum()

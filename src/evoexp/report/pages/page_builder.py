@@ -289,8 +289,10 @@ def _compared(scope: Scope, page: Entry) -> tuple[FamilyComparison, ...]:
 def _headline(scope: Scope, entry: Entry) -> Headline:
     """Return a headline claim of a paper, which a function judges on one condition."""
 
-    def judged(condition: Any, controls: Any) -> Claim:
+    def judged(condition: Any, controls: Any) -> Claim | None:
         function = scope.functions[entry["judge"]]
-        return cast("Claim", scope.inner(condition=condition, controls=controls).call(function))
+        return cast(
+            "Claim | None", scope.inner(condition=condition, controls=controls).call(function)
+        )
 
     return Headline(entry["claim"], scope.text(entry["quantity"]), scope[entry["values"]], judged)

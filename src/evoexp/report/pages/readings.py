@@ -31,8 +31,8 @@ class Headline(NamedTuple):
     name: str  # of its rule
     quantity: str  # that is drawn, with its unit
     values: Values  # the quantity of a condition's runs, (done,); inf: never
-    # Judges the claim on one condition with its controls
-    judge: Callable[[ConditionResults, tuple[ConditionResults, ...]], Claim]
+    # Judges the claim on one condition with its controls; None: it says nothing of this condition
+    judge: Callable[[ConditionResults, tuple[ConditionResults, ...]], Claim | None]
 
 
 class Family(NamedTuple):
@@ -93,8 +93,9 @@ def judged(
                 if c.is_control and beside(condition.condition, c.condition)
             )
             claim = headline.judge(condition, controls)
-            first = first or claim.verdict
-            yield Judged(headline, family, condition, claim, claim.verdict == first)
+            if claim is not None:
+                first = first or claim.verdict
+                yield Judged(headline, family, condition, claim, claim.verdict == first)
 
 
 def headline_claims(judged: Sequence[Judged]) -> Iterator[Claim]:
@@ -147,16 +148,18 @@ def _under(word: str, counts: Counter[str]) -> str:
 def headline_rows(judged: Sequence[Judged]) -> list[tuple[object, ...]]:
     """Return all verdicts, one row per condition: in the first family it is of."""
     first = {one.condition: one.family for one in reversed(judged)}
+    headlines = dict.fromkeys(one.headline for one in judged)
     rows = list[tuple[object, ...]]()
     for condition in dict.fromkeys(one.condition for one in judged):
         family = first[condition]
-        own = [one for one in judged if one.family is family and one.condition is condition]
-        changed = dict(family.varied).get(condition, ())
-        cells = (
-            f"{markdown.spread(spread(one.headline.values(condition)))}: "
+        own = {
+            one.headline: f"{markdown.spread(spread(one.headline.values(condition)))}: "
             f"{one.claim.verdict if one.same else f'**{one.claim.verdict}**'}"
-            for one in own
-        )
+            for one in judged
+            if one.family is family and one.condition is condition
+        }
+        changed = dict(family.varied).get(condition, ())
+        cells = (own.get(headline, "–") for headline in headlines)
         names = ", ".join(f"`{name}`" for name in changed) or AS_READ
         rows.append((condition.label, names, condition.done, *cells))
     return rows

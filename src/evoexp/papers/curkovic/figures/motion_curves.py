@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers.curkovic import link_motions
+from evoexp.papers.curkovic import link_motions, measures
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style
@@ -27,7 +27,7 @@ LOWEST, HIGHEST, BEST, STRAIGHT = "lowest", "highest", "best replicate", "straig
 def joints_table(condition: ConditionResults) -> pd.DataFrame:
     """Return link angles and their speeds along the best replicate's motion."""
     prepared = condition.prepared
-    motion = link_motions.executed(prepared, condition.solutions[condition.best_replicate])
+    motion = link_motions.executed(prepared, condition.solutions[measures.exemplar(condition)])
     found, limits = link_motions.sampled(motion, SAMPLES), link_motions.speed_limits(prepared)
     parts = [
         pd.DataFrame(
@@ -105,7 +105,7 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
         series = {
             LOWEST: motions[0].at_lowest,
             HIGHEST: motions[0].at_highest,
-            BEST: sampled(c.best_replicate),
+            BEST: sampled(measures.exemplar(c)),
             STRAIGHT: sampled(None),
         }
         for name, q in series.items():

@@ -28,8 +28,11 @@ DASHES: Any = (0, (2, 1))
 
 
 def motion_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return the trail of the best replicate, and end-effector paths and contacts of all."""
-    prepared, best = condition.prepared, condition.best_replicate
+    """Return the trail of the best replicate, and end-effector paths and contacts of all.
+
+    The best one is the cheapest that the exact verdict does not refute, if there is one.
+    """
+    prepared, best = condition.prepared, measures.exemplar(condition)
     outlines = motion_geometry.obstacle_outlines(obstacle_table(condition.scenario.obstacles))
     edges = [
         (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)

@@ -179,11 +179,11 @@ def _beside_recommended(found: Tasks) -> Iterator[SizePair]:
 def _scaled(results: Results, found: Tasks) -> Iterator[SizePair]:
     """Yield the same of sizes whose parents and patience change with the size."""
     for task in found:
-        own = task.by_value.get(RECOMMENDED)
-        for c in results.main if own is not None else ():
-            scaled = c.planner.ga.num_parents != own.planner.ga.num_parents
-            if scaled and measures.scene(c) == measures.scene(own) and (own.solved or c.solved):
-                yield task.name, float(c.planner.ga.num_offspring), c, own
+        if own := task.by_value.get(RECOMMENDED):
+            for c in results.main:
+                scaled = c.planner.ga.num_parents != own.planner.ga.num_parents
+                if scaled and measures.scene(c) == measures.scene(own) and own.solved + c.solved:
+                    yield task.name, float(c.planner.ga.num_offspring), c, own
 
 
 def compare_sizes(found: Tasks, metric: str, settings: ReportSettings) -> list[SizeComparison]:

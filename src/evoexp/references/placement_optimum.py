@@ -22,6 +22,7 @@ from evoexp.validation import Count
 
 SAME = 1e-3  # [deg] two minima so close are one
 ACTIVE = 1e-6  # a margin below it is taken to be 0
+CIRCLE, RADIUS = 24, 0.01  # postures around a minimum, and how far they are [deg]
 MOST_STEPS = 12  # of Newton's method; it takes three or four
 DIFFERENCE = 1e-5  # of Newton's central differences, precise enough for its steps
 
@@ -36,6 +37,7 @@ class PlacementOptimum(Reference):
     """
 
     component: ClassVar[str] = "placement_optimum"
+    revision: ClassVar[int] = 2  # 2: saddles on kinks of E are no minima
 
     # values of either angle that the dense search takes
     num_angles: Annotated[int, Field(ge=8, le=10_000)]
@@ -61,7 +63,11 @@ class PlacementOptimum(Reference):
                 exact += [] if polished is None else ends[-1:]
         # distinct feasible minima, the lowest first, by the planner's kernels
         measured = [(theta, own.posture(*theta)) for theta in ends]
-        rows = [np.array([*theta, best[0]]) for theta, (branch, best, _) in measured if branch >= 0]
+        rows = [
+            np.array([*theta, best[0]])
+            for theta, (branch, best, _) in measured
+            if branch >= 0 and _is_lowest(own, theta, branch, best[0])
+        ]
         distinct = list[FloatArray]()
         for row in sorted(rows, key=lambda row: (round(float(row[2]), 9), *np.round(row[:2], 6))):
             distinct += [] if _is_among(distinct, row[:2]) else [row]
@@ -150,6 +156,13 @@ def polish(programme: Programme, x: FloatArray) -> End | None:
     if not np.isfinite(y).all() or moved > 1e-3 or np.abs(conditions(y)).max() > 1e-9:
         return None
     return End(y[:3], programme.cost(y[:3]), steps)
+
+
+def _is_lowest(model: Model, theta: FloatArray, branch: int, cost: float) -> bool:
+    """Return whether no posture on a small circle around one costs less: a saddle is no minimum."""
+    turns = np.linspace(0.0, 2.0 * np.pi, CIRCLE, endpoint=False)
+    circle = theta[:, None] + RADIUS * np.stack([np.cos(turns), np.sin(turns)])
+    return bool((model.measure_branches(circle)[0][branch] >= cost).all())
 
 
 def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:

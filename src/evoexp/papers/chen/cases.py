@@ -4,16 +4,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.planners.placement_ga.planner import NAMES, Problem
 from evoexp.records import FloatArray
 from evoexp.report.results.run_measures import counted, grouped
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.inference import Proportion
+from evoexp.report.statistics.inference import Interval, Proportion
 
 METHODS = {
     "Newton-type": "newton",
     "Newton-type, smooth form": "bounded",
     "subgradient": "subgradient",
 }  # conventional methods: names on the page → names in the records of the reference
+AROUND, STEP = 10.0, 0.05  # [deg] from the optimum, where near postures are looked for
 CLOSE = (0.001, 0.01)  # [-] gaps to the optimum; shares of runs within them are given
 
 
@@ -95,6 +97,19 @@ class Case(NamedTuple):
     def measured(self, angles: Any) -> dict[str, float]:
         """Return the named terms of the posture θ1, θ2 [deg]; see `PlacementGa.evaluate`."""
         return self.conditions[0].evaluate(np.asarray(angles, dtype=np.float64))
+
+    def near_values(self, term: str, close: float) -> Interval:
+        """Return the least and the greatest value of a term within a gap [-] of the optimum.
+
+        Of postures around the optimum, at most `AROUND` away in either angle.
+        """
+        assert self.optimal_angles is not None
+        steps = np.arange(-AROUND, AROUND + 0.5 * STEP, STEP)
+        pairs = self.optimal_angles[:, None, None] + np.stack(np.meshgrid(steps, steps))
+        problem = self.conditions[0].problem(Problem)
+        found = problem.model.measure(np.ascontiguousarray(pairs.reshape(2, -1)))
+        values = found[("cost", *NAMES).index(term)][self.gaps(found[0]) <= close]
+        return Interval(float(values.min()), float(values.max()))
 
     def torques(self, angles: Any) -> FloatArray:
         """Return τ1, τ2, τ3 of the posture θ1, θ2 [deg]."""

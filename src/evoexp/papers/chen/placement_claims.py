@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
+from scipy import stats
 
 from evoexp.papers.chen.cases import METHODS, Case
 from evoexp.records import FloatArray
 from evoexp.report.pages import markdown
-from evoexp.report.pages.page_parts import Claim
+from evoexp.report.pages.page_parts import Claim, EffectSize
 from evoexp.report.statistics.comparisons import by_column, compared
-from evoexp.report.statistics.inference import Proportion, fisher_exact
+from evoexp.report.statistics.inference import Interval, Proportion, fisher_exact
 from evoexp.report.statistics.judging import Judge
 
 
@@ -52,7 +53,7 @@ def judge_printed(judge: Judge, case: Case) -> Iterator[Claim]:
 
 
 def judge_value(judge: Judge, case: Case) -> Claim:
-    """Judge the printed number by that of the exact optimum."""
+    """Judge the printed number by that of the exact optimum, and of postures near it."""
     printed, exact = case.printed, case.measured(case.optimal_angles)
     best, name = exact[printed.term], printed.term.replace("_", " ")
     words = {"case": case.name, "term": name, "value": f"{printed.value:g}"}
@@ -63,7 +64,12 @@ def judge_value(judge: Judge, case: Case) -> Claim:
             f" (E = {markdown.number(case.least)}, of which the obstacle "
             f"{markdown.number(exact['obstacle'])})"
         )
-    agrees: bool | None = abs(best - printed.value) <= hearing.rule.limits["rounded"]
+    rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
+    low, high = case.near_values(printed.term, 0.01 * near)
+    told += (
+        f"; {markdown.number(low)} to {markdown.number(high)} where E is within {near:g} % of it"
+    )
+    agrees: bool | None = low - rounded <= printed.value <= high + rounded
     if case.name == "obstacle and platform":
         told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
         agrees = agrees or None
@@ -158,6 +164,15 @@ def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
             effort / share if share else np.inf
             for effort, share in ((of_run, own.share), (of_start, at_best.share))
         )
-        text = f"{run:.0f} against {start:.0f}".replace("inf", "∞")
-        better = run < start if min(run, start) < np.inf else None
-        yield efforts.own(text, f"{own.total} and {at_best.total}", better)
+        ratio, ends = run / start, Interval(0.0, np.inf)
+        if own.having and at_best.having:
+            # runs and starts cost about the same each: the ratio varies as that of the shares
+            shares = stats.contingency.relative_risk(*at_best, *own).confidence_interval(
+                judge.level
+            )
+            ends = Interval(of_run / of_start * shares.low, of_run / of_start * shares.high)
+        text = f"{run:.0f} against {start:.0f}; ratio {ratio:.3g} [{ends.low:.3g}, {ends.high:.3g}]"
+        holds = None if ends.low <= 1.0 <= ends.high else ends.high < 1.0
+        size = EffectSize("ratio of efforts per success", ratio, *ends, 1.0)
+        counted = f"{own.total} and {at_best.total}"
+        yield efforts.own(text.replace("inf", "∞"), counted, holds, size)

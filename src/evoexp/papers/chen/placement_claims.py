@@ -66,9 +66,7 @@ def judge_value(judge: Judge, case: Case) -> Claim:
         )
     rounded, near = (hearing.rule.limits[name] for name in ("rounded", "near_percent"))
     low, high = case.near_values(printed.term, 0.01 * near)
-    told += (
-        f"; {markdown.number(low)} to {markdown.number(high)} where E is within {near:g} % of it"
-    )
+    told += f"; within {near:g} % of it {markdown.number(low)} to {markdown.number(high)}"
     agrees: bool | None = low - rounded <= printed.value <= high + rounded
     if case.name == "obstacle and platform":
         told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
@@ -164,15 +162,15 @@ def _against_conventional(judge: Judge, case: Case) -> Iterator[Claim]:
             effort / share if share else np.inf
             for effort, share in ((of_run, own.share), (of_start, at_best.share))
         )
-        ratio, ends = run / start, Interval(0.0, np.inf)
+        ratio, between = run / start, Interval(0.0, np.inf)
         if own.having and at_best.having:
-            # runs and starts cost about the same each: the ratio varies as that of the shares
-            shares = stats.contingency.relative_risk(*at_best, *own).confidence_interval(
-                judge.level
-            )
-            ends = Interval(of_run / of_start * shares.low, of_run / of_start * shares.high)
-        text = f"{run:.0f} against {start:.0f}; ratio {ratio:.3g} [{ends.low:.3g}, {ends.high:.3g}]"
-        holds = None if ends.low <= 1.0 <= ends.high else ends.high < 1.0
-        size = EffectSize("ratio of efforts per success", ratio, *ends, 1.0)
+            # runs cost about the same each, and starts: the ratio varies as that of the shares
+            shares = stats.contingency.relative_risk(*at_best, *own)
+            by_shares, price = shares.confidence_interval(judge.level), of_run / of_start
+            between = Interval(price * by_shares.low, price * by_shares.high)
+        low, high = between
+        text = f"{run:.0f} against {start:.0f}; ratio {ratio:.3g} [{low:.3g}, {high:.3g}]"
+        holds = None if low <= 1.0 <= high else high < 1.0
+        size = EffectSize("ratio of efforts per success", ratio, low, high, 1.0)
         counted = f"{own.total} and {at_best.total}"
         yield efforts.own(text.replace("inf", "∞"), counted, holds, size)

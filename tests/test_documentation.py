@@ -7,6 +7,8 @@ import re
 import shlex
 import shutil
 from collections.abc import Iterator
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +23,8 @@ from evoexp.cli import main
 from evoexp.commands.command_parser import COMMANDS, command_parser
 from evoexp.configuration import compose
 from evoexp.configuration.search_path import options
+from evoexp.registry import CLAIMS, names, registered
+from evoexp.report.statistics.claim_rules import registered_rules
 from evoexp.version import __version__
 
 ROOT = Path(__file__).parents[1]
@@ -248,3 +252,16 @@ def test_code_and_queries_run_as_they_stand(
             else:
                 exec(compile(block.text, page.name, "exec"), names)
         assert page != NOTEBOOK or Path("convergence.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("paper", names(CLAIMS))
+def test_verdicts_of_a_paper_are_those_that_are_stored(paper: str) -> None:
+    path = str(ROOT / "scripts/update-verdicts")
+    spec = spec_from_loader("update_verdicts", SourceFileLoader("update_verdicts", path))
+    script = module_from_spec(spec)
+    spec.loader.exec_module(script)
+    stored = json.loads(script.STORED.read_text(encoding="utf-8"))[paper]
+    page = (ROOT / f"docs/paper_{paper}.md").read_text(encoding="utf-8")
+    assert page == script.with_table(page, stored), "run: scripts/update-verdicts"
+    claims = registered_rules(registered(CLAIMS, paper))
+    assert {row["name"] for row in stored} == {*claims}, "run: scripts/update-verdicts"

@@ -102,6 +102,13 @@ def judge_cases(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
     """Judge all claims; the optimum of every case is known."""
     for case in exact_cases:
         yield from judge_printed(judge, case)
+        if case.plain is not None:
+            hearing = judge.on("near_posture", case=case.name)
+            near = case.within(
+                case.plain.column("best_cost"), hearing.rule.limits["near_percent"] / 100.0
+            )
+            yield hearing.majority(judge.share(near), *near)
+    yield from _evener_torques(judge, exact_cases)
     yield from _against_search(judge, exact_cases)
     for case in exact_cases:
         yield from _against_conventional(judge, case)
@@ -111,6 +118,18 @@ def judge_cases(judge: Judge, exact_cases: list[Case]) -> Iterator[Claim]:
             hearing = judge.on("seconds", case=case.name)
             told, holds = {"milliseconds": 1e3 * seconds}, seconds <= hearing.rule.limits["most_s"]
             yield hearing.own(told, case.plain.done, holds)
+
+
+def _evener_torques(judge: Judge, cases: list[Case]) -> Iterator[Claim]:
+    """Judge that the minimax criterion loads the joints more evenly than the least norm."""
+    ratios = {}
+    for case in cases:
+        sizes = np.abs(case.torques(case.optimal_angles))
+        ratios[case.name] = float(sizes.max() / sizes.min())
+    if {"least torque norm", "minimax torque"} <= ratios.keys():
+        norm, minimax = ratios["least torque norm"], ratios["minimax torque"]
+        told = {"norm": norm, "minimax": minimax}
+        yield judge.on("evener_torques").own(told, 2, minimax < norm)
 
 
 def _against_search(judge: Judge, cases: list[Case]) -> list[Claim]:

@@ -14,7 +14,7 @@ from evoexp.report.results import run_measures
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference, judging
 from evoexp.report.statistics.comparisons import Values
-from evoexp.report.statistics.inference import Interval
+from evoexp.report.statistics.inference import Interval, quantile
 from evoexp.report.statistics.judging import Judge, fisher_evidence
 
 TILTS = ("upright", "keep_parallel")
@@ -68,8 +68,22 @@ def judge_tasks(judge: Judge, results: Results) -> Iterator[Claim]:
             f"{judge.share(measures.reasons(stuck)['stagnation'])}"
         )
         yield judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
+    yield _unforeseeable(judge, found)
     if pairs := measures.with_empty_scenes(results.main):
         yield _at_obstacles(judge, pairs)
+
+
+def _unforeseeable(judge: Judge, conditions: measures.Conditions) -> Claim:
+    """Judge that planning times differ from run to run: that they can hardly be foreseen."""
+    spreads = {}
+    for c in conditions:
+        efforts = measures.evaluations(c)
+        spreads[c.label] = quantile(efforts, 0.9) / quantile(efforts, 0.1)
+    hearing = judge.on("times_vary")
+    times = hearing.rule.limits["times"]
+    wide = [name for name, ratio in spreads.items() if ratio > times]
+    told = ", ".join(f"{name} {ratio:.1f}" for name, ratio in spreads.items())
+    return hearing.own(told, sum(c.done for c in conditions), 2 * len(wide) > len(spreads))
 
 
 def judge_met(judge: Judge, condition: ConditionResults) -> Claim:

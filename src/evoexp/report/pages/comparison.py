@@ -1,4 +1,7 @@
-"""The page of `evoexp compare`: planners in one currency, by their proven answers alone."""
+"""The page of `evoexp compare`: planners in one currency, by their proven answers alone.
+
+The functions give what the page `comparison` of `page.yaml` names.
+"""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -9,7 +12,6 @@ import pandas as pd
 
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
-from evoexp.records import FloatArray
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_builder import own_page
@@ -20,7 +22,7 @@ from evoexp.report.results.given_data import MARK, GivenData
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, compared
+from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
 from evoexp.report.statistics.inference import (
     Interval,
     Proportion,
@@ -30,7 +32,14 @@ from evoexp.report.statistics.inference import (
     quantile,
     spread,
 )
-from evoexp.report.statistics.problem_ranks import standing
+from evoexp.report.statistics.problem_ranks import (
+    MIN_PLANNERS,
+    MIN_PROBLEMS,
+    Standing,
+    critical_difference,
+    friedman,
+    standing,
+)
 
 
 class Rated(NamedTuple):
@@ -79,9 +88,6 @@ def page(
     return own_page("comparison", results, settings, runs=runs, given=given)
 
 
-# what the page `comparison` of `page.yaml` names
-
-
 ranks = standing
 compared_conditions = stored_conditions
 
@@ -118,31 +124,32 @@ def unequal(runs: Sequence[PlannerRuns]) -> str:
 
 def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
     """Return the conditions that have motions, rated by their proven answers."""
-    return [_rated(own, settings) for own in runs]
+    rows = []
+    for own in runs:
+        effort, reached = own.first_reached()
+        levels = settings.confidence, settings.num_resamples
+        row = Rated(
+            condition=own.label,
+            planner=own.planner,
+            problem=own.problem.name,
+            runs=len(own.replicates),
+            proven=int(reached.sum()),
+            first_own=np.nan,
+            queries=expected_effort(effort, reached),
+            interval=expected_interval(effort, reached, *levels),
+            lengths=spread(own.best_lengths),
+            straight=own.problem.straight,
+            best_known=own.problem.best_known,
+            unit=own.problem.unit,
+            refuted=own.condition.verdicts.solved_refuted if own.condition else 0,
+            judged=own.condition.verdicts.judged if own.condition else 0,
+        )
+        rows.append(row if own.condition is None else _with_coins(row, own, own.condition))
+    return rows
 
 
-def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
-    condition = own.condition
-    effort, reached = own.first_reached()
-    verdicts = condition.verdicts if condition else None
-    row = Rated(
-        condition=own.label,
-        planner=own.planner,
-        problem=own.problem.name,
-        runs=len(own.replicates),
-        proven=int(reached.sum()),
-        first_own=np.nan,
-        queries=expected_effort(effort, reached),
-        interval=expected_interval(effort, reached, settings.confidence, settings.num_resamples),
-        lengths=spread(own.best_lengths),
-        straight=own.problem.straight,
-        best_known=own.problem.best_known,
-        unit=own.problem.unit,
-        refuted=verdicts.solved_refuted if verdicts else 0,
-        judged=verdicts.judged if verdicts else 0,
-    )
-    if condition is None:
-        return row
+def _with_coins(row: Rated, own: PlannerRuns, condition: ConditionResults) -> Rated:
+    """Return a row with what only runs tell that were run here."""
     solved = own.table[own.table["solved"].astype(bool)]
     first = solved.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
     spent = {"evaluations": condition.column("evaluations"), "cpu_s": search_seconds(condition)}
@@ -212,20 +219,82 @@ def effort_text(queries: float) -> str:
 def compared_lengths(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare the planners of each problem."""
-    stored = [(own, own.condition) for own in runs if own.condition is not None]
-    by_label = {own.label: own for own, _ in stored}
-    pairs = [
-        (first, second)
-        for (a, first), (b, second) in itertools.combinations(stored, 2)
+    """Compare the planners of each problem, those that were run here."""
+    rows = [
+        compare(f"{a.label} – {b.label}", a.best_lengths, b.best_lengths, True, settings.confidence)
+        for a, b in itertools.combinations([own for own in runs if own.condition is not None], 2)
         if a.problem == b.problem
     ]
+    return (("best proven length", tuple(adjusted(rows))),) if rows else ()
 
-    def lengths(condition: ConditionResults) -> FloatArray:
-        return by_label[condition.label].best_lengths
 
-    rows = compared(pairs, lengths, settings, named=lambda a, b: f"{a.label} – {b.label}")
-    return (("best proven length", rows),) if rows else ()
+def rank_rows(ranks: Standing) -> list[tuple[str, ...]]:
+    """Return mean ranks, best first; none where there is but one planner, or one problem."""
+    if not ranks.can_be_profiled:
+        return []
+    lengths = ranks.lengths
+    best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
+    return [
+        (
+            planner,
+            f"{ranks.mean_ranks[k]:.2f}",
+            markdown.share(int(best[:, k].sum()), len(lengths)),
+            markdown.share(int(np.isfinite(lengths[:, k]).sum()), len(lengths)),
+            markdown.share(int(np.isfinite(ranks.efforts[:, k]).sum()), len(lengths)),
+        )
+        for k, planner in sorted(
+            enumerate(ranks.planners), key=lambda each: ranks.mean_ranks[each[0]]
+        )
+    ]
+
+
+def too_few_ranks(ranks: Standing) -> str:
+    """Say why planners are not ranked; empty if they are."""
+    if ranks.can_be_profiled:
+        return ""
+    return (
+        " Planners are not ranked: a problem counts once, however many seeds it has, and it takes "
+        "two planners, and two problems at least that both were run on."
+    )
+
+
+def left_out(ranks: Standing) -> str:
+    """Name the problems and planners that do not count; empty if all do."""
+    names = ", ".join(ranks.left_out)
+    problems = f" Left out, as some planner was not run on them: {names}." if names else ""
+    if not ranks.outsiders:
+        return problems
+    planners = ", ".join(ranks.outsiders)
+    return f"{problems} Not ranked, as run on less than half of the problems: {planners}."
+
+
+def rank_test(ranks: Standing, settings: ReportSettings) -> str:
+    """Tell the outcome of the tests, or why there are none."""
+    planners, problems = len(ranks.planners), len(ranks.problems)
+    if not ranks.can_be_tested:
+        return (
+            f"Too few for a test of ranks and its diagram: that takes {MIN_PLANNERS} planners and "
+            f"{MIN_PROBLEMS} problems that all of them were run on; here are {planners} planners "
+            f"and {problems} such problems."
+        )
+    test = friedman(ranks.lengths)
+    difference = critical_difference(planners, problems, settings.significance)
+    says = (
+        "the planners rank differently"
+        if test.p_value < settings.significance
+        else "no planner is shown to rank differently from another, whatever their differences"
+    )
+    return (
+        f"Friedman's test over {problems} problems: χ² = {test.statistic:.3g}, p = "
+        f"{markdown.p_value(test.p_value)}: {says}. Nemenyi's critical difference of mean ranks at "
+        f"{settings.significance:g}: {difference:.2f}."
+    )
+
+
+def never_proven(ranks: Standing) -> str:
+    """Tell how many problems no planner has a proven answer on; empty if there is none."""
+    unsolved = int(np.isinf(ranks.efforts).all(axis=1).sum())
+    return f" No planner has a proven answer on {unsolved} of them." if unsolved else ""
 
 
 def as_csv(rows: Sequence[Rated]) -> bytes:

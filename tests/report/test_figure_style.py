@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,7 +19,7 @@ from PIL import Image
 
 from evoexp.cli import main
 from evoexp.errors import SettingError
-from evoexp.report.figures import end_labels, matrix, style
+from evoexp.report.figures import end_labels, style
 from evoexp.report.figures.end_labels import MANY, CurveEnd, name_curves, name_ends
 from evoexp.report.figures.style import Look, drawn
 from report_samples import SMALL
@@ -199,21 +198,6 @@ def test_a_legend_takes_as_many_columns_as_fit(length: int, columns: int) -> Non
     places = [round(text.get_window_extent().x0) for text in legend.get_texts()]
     assert (len(places), len(set(places))) == (6, columns)
     assert legend.get_window_extent().width <= figure.bbox.width or columns == 1
-
-
-@pytest.mark.parametrize(
-    ("count", "name"), [(3, "c{}"), (9, "05cccfce1d2{}"), (5, "w" * 40 + "{}")]
-)
-def test_names_beside_a_matrix_are_not_cut_off(count: int, name: str) -> None:
-    labels = [name.format(k) for k in range(count)]
-    pairs = [(a, b, 0.6, 0.5, 0.7, 0.2, 20, 20) for a in labels for b in labels if a != b]
-    columns = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]
-    table = pd.DataFrame(pairs, columns=columns).assign(significance=0.05)
-    figure = at_width(lambda: matrix.draw_matrix(table))
-    for axes in figure.axes:
-        for text in (*axes.get_yticklabels(), *axes.get_xticklabels(), axes.yaxis.label):
-            box = text.get_window_extent()
-            assert box.x0 >= 0.0 and box.x1 <= figure.bbox.width, text.get_text()
 
 
 def test_a_style_file_changes_figures_and_nothing_that_comes_after(tmp_path: Path) -> None:

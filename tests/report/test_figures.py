@@ -138,13 +138,8 @@ def test_panels_of_shares_have_one_scale() -> None:
         ("low", 1, "b", Proportion(0, 0)),
     ]
     panels = shares.draw_shares(shares.shares_table(rows, {}, 0.95)).axes
-    (one, two), (three, four) = (axes.get_xlim() for axes in panels)
-    assert two - one == pytest.approx(four - three)
-    assert one < 100 * Proportion(180, 200).interval(0.95).low
-    assert two > 100.0 and three < 0.0
-    wide = [*rows, ("low", 2, "c", Proportion(150, 200))]
-    panels = shares.draw_shares(shares.shares_table(wide, {}, 0.95)).axes
-    assert panels[0].get_xlim() == panels[1].get_xlim()
+    (low, high), other = (axes.get_xlim() for axes in panels)
+    assert (low, high) == other and low < 0.0 and high > 100.0
 
 
 @pytest.fixture

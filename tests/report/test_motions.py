@@ -210,7 +210,6 @@ def test_every_motion_has_its_pictures(name: str) -> None:
     assert np.allclose(first, scale * shown.q[:, 0], atol=1e-6)
     pictures = [
         lambda: motion_scenes.draw_scenes(scenes),
-        lambda: motion_scenes.draw_stages(motion_tables.stages_table(shown)),
         lambda: motion_scenes.draw_joints(joints),
     ]
     if covers := planner.covers(problem):

@@ -29,21 +29,14 @@ class CurveEnd(NamedTuple):
 
 
 def apart(wanted: FloatArray, gap: float) -> FloatArray:
-    """Return places within 0 to 1 with a gap between neighbours, nearest to the wanted ones (n,).
+    """Return places within 0 to 1 with a gap between neighbours, near the wanted ones (n,), sorted.
 
-    They are sorted. Neighbours that are too close become a block around the mean of what they want.
+    Neighbours that are too close stand around the middle of what they want.
     """
-    gap = min(gap, 1.0 / max(len(wanted) - 1, 1))
-    steps = gap * np.arange(len(wanted))
-    blocks: list[list[float]] = []
-    for place in wanted - steps:  # without gaps the places only have to be in order
-        blocks.append([float(place)])
-        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
-            last = blocks.pop()
-            blocks[-1] += last
-    found = np.concatenate([np.full(len(block), np.mean(block)) for block in blocks] or [steps])
-    last_step = steps[-1] if len(steps) else 0.0
-    return np.asarray(np.clip(found, 0.0, 1.0 - last_step) + steps)
+    steps = min(gap, 1.0 / max(len(wanted) - 1, 1)) * np.arange(len(wanted))
+    free = wanted - steps  # without gaps the places only have to be in order
+    up, down = np.maximum.accumulate(free), np.minimum.accumulate(free[::-1])[::-1]
+    return np.asarray(np.clip(0.5 * (up + down), 0.0, 1.0 - steps[-1:].sum()) + steps)
 
 
 def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:

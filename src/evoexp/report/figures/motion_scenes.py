@@ -1,4 +1,4 @@
-"""Pictures of any motion: the scene with start and goal, stages, joints, and bodies beside covers.
+"""Pictures of any motion: the scene with start and goal, joints, and bodies beside covers.
 
 The functions draw the tables of `motion_tables` and need nothing else.
 """
@@ -26,43 +26,25 @@ FLOOR = 1.1  # [-] of the picture's radius: half the edge of the part of a half-
 
 
 def draw_scenes(table: pd.DataFrame) -> Figure:
-    """Draw one panel per motion; with one motion alone it is seen from above, too."""
-    panels = list(groups(table, ["panel", "title"]))
-    planar = bool(table["planar"].all())
-    alone = len(panels) == 1 and not planar
-    count = 2 if alone else len(panels)
-    lines = -(-count // 2)
-    figure = style.figure(3.5 * lines + 0.3)
-    for k, ((_, title), rows) in enumerate(panels):
-        _panel(figure, (lines, min(count, 2), k + 1), title, rows, planar=planar)
-    if alone:
-        (_, title), rows = panels[0]
-        _panel(figure, (1, 2, 2), "from above", rows, planar=True)
-    _key(figure, table)
-    return figure
-
-
-def draw_stages(table: pd.DataFrame) -> Figure:
-    """Draw one panel per instant, three side by side, all of the same scale."""
-    figure = _panels(table, 3, 2.4, lambda panel: table)
+    """Draw one panel per motion."""
+    figure = _panels(table, 3.5, lambda panel: table[table["panel"] == panel])
     _key(figure, table)
     return figure
 
 
 def draw_covers(table: pd.DataFrame) -> Figure:
     """Draw the exact bodies of each robot beside their covers, in the same scale."""
-    return _panels(table, 2, 3.2, lambda panel: table[table["panel"] // 2 == panel // 2])
+    return _panels(table, 3.2, lambda panel: table[table["panel"] // 2 == panel // 2])
 
 
-def _panels(
-    table: pd.DataFrame, per_line: int, height: float, room: Callable[[int], pd.DataFrame]
-) -> Figure:
-    """Draw lines of panels [inch], each as large as the bodies of the rows it has room for."""
+def _panels(table: pd.DataFrame, height: float, room: Callable[[int], pd.DataFrame]) -> Figure:
+    """Draw panels [inch], two side by side, each as large as the bodies of the rows in its room."""
     panels = list(groups(table, ["panel", "title"]))
-    lines, planar = -(-len(panels) // per_line), bool(table["planar"].all())
+    lines, planar = -(-len(panels) // 2), bool(table["planar"].all())
     figure = style.figure(height * lines + 0.3)
     for k, ((panel, title), rows) in enumerate(panels):
-        _panel(figure, (lines, per_line, k + 1), title, rows, planar=planar, room=room(panel))
+        place = lines, min(len(panels), 2), k + 1
+        _panel(figure, place, title, rows, planar=planar, room=room(panel))
     return figure
 
 
@@ -129,10 +111,10 @@ def _panel(
     rows: pd.DataFrame,
     *,
     planar: bool,
-    room: pd.DataFrame | None = None,
+    room: pd.DataFrame,
 ) -> None:
     """Draw a scene as seen along z, or in space, as large as the bodies of some rows."""
-    low, high = _room(rows if room is None else room)
+    low, high = _room(room)
     spans, unit = high - low, rows["length_unit"].iloc[0]
     middle, radius = 0.5 * (low + high), float(np.sqrt((spans**2).sum())) / 2.0
     bodies = [

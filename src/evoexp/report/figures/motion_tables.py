@@ -16,7 +16,6 @@ from evoexp.records import FloatArray
 from evoexp.report.figures import rounded, surfaces
 
 NO_LIMIT = 1e6  # [rad, length unit] from here on a joint has no limit
-STAGES = 5  # pictures of a motion besides that of its whole way
 POSE = ["x", "y", "z", "qx", "qy", "qz", "qw"]
 SIZE = ["size_1", "size_2", "size_3"]
 COLUMNS = ["panel", "title", "element", "name", "arm", "kind", *SIZE, *POSE, "corners"]
@@ -30,23 +29,8 @@ def scenes_table(shown: Sequence[tuple[str, Recording]]) -> pd.DataFrame:
             *_bodies(recording, 0, "start"),
             *_bodies(recording, -1, "goal"),
             *_still(recording),
-            *_ways(recording, 0, len(recording.times)),
+            *_ways(recording),
         ]
-        tables.append(_table(rows, panel, title, recording))
-    return pd.concat(tables, ignore_index=True)
-
-
-def stages_table(recording: Recording) -> pd.DataFrame:
-    """Return the bodies of one motion at some instants, evenly spread; see `scenes_table`."""
-    ticks = np.unique(np.linspace(0, len(recording.times) - 1, STAGES + 1).round().astype(int))
-    tables = []
-    for panel, tick in enumerate(ticks):
-        rows = [
-            *_bodies(recording, int(tick), "start"),
-            *_still(recording),
-            *_ways(recording, 0, int(tick) + 1),
-        ]
-        title = f"instant {recording.times[tick]:.4g} of {recording.times[-1]:.4g}"
         tables.append(_table(rows, panel, title, recording))
     return pd.concat(tables, ignore_index=True)
 
@@ -119,9 +103,9 @@ def _still(recording: Recording) -> Iterable[dict[str, Any]]:
         }
 
 
-def _ways(recording: Recording, first: int, last: int) -> Iterable[dict[str, Any]]:
+def _ways(recording: Recording) -> Iterable[dict[str, Any]]:
     for arm, way in enumerate(recording.traces):
-        for x, y, z in way[first:last]:
+        for x, y, z in way:
             yield {"element": "way", "name": "tool", "arm": arm, "x": x, "y": y, "z": z}
 
 

@@ -1,8 +1,12 @@
 """The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
 
+import functools
 import io
-from collections.abc import Callable, Iterable, Sequence
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextvars import ContextVar
+from importlib import resources
+from logging.handlers import BufferingHandler
 from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
@@ -15,8 +19,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from evoexp.errors import SettingError, brief
 from evoexp.report.figures.fitted_texts import fit_texts
-from evoexp.report.figures.style_files import own_style, read_style_file
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -87,12 +91,14 @@ def drawn(
     scale = _SCALES[look.width]
     with mpl.rc_context():
         mpl.rcdefaults()
-        for name, value in own_style().items():
-            is_scaled = isinstance(value, float) and name.endswith(_SCALED)
-            mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
-        if look.style is not None:
-            for name, value in read_style_file(look.style).items():
-                mpl.rcParams[name] = value  # type: ignore[index]
+        scaled = {
+            name: value * scale.text
+            if isinstance(value, float) and name.endswith(_SCALED)
+            else value
+            for name, value in _own_style().items()
+        }
+        theirs = _style_file(look.style) if look.style else {}
+        mpl.rcParams.update(scaled | theirs)  # type: ignore[arg-type]
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         token = _scale.set(scale)
         try:
@@ -105,6 +111,31 @@ def drawn(
     if "svg" in images:
         images["svg"] = images["svg"].replace(_FONT, _FONTS)
     return images
+
+
+@functools.cache
+def _own_style() -> Mapping[str, Any]:
+    """Return the parameters of evoexp's own style."""
+    with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
+        return dict(mpl.rc_params_from_file(path, use_default_template=False))
+
+
+def _style_file(path: str) -> dict[str, Any]:
+    """Return the parameters that a matplotlib style file sets, but those that name files' ids."""
+    logger, handler = logging.getLogger("matplotlib"), BufferingHandler(10_000)
+    handler.setLevel(logging.WARNING)  # matplotlib logs what a style file has wrong
+    logger.addHandler(handler)
+    style, reasons = dict[str, Any](), list[str]()
+    try:
+        style = dict(mpl.rc_params_from_file(path, use_default_template=False))
+    except (OSError, ValueError) as error:
+        reasons.append(str(error))
+    finally:
+        logger.removeHandler(handler)
+    if lines := [*(record.getMessage() for record in handler.buffer), *reasons]:
+        wrong = brief(lines[0].strip().partition("\n")[0])
+        raise SettingError("report.style", f"a matplotlib style file ({wrong})", path)
+    return {name: value for name, value in style.items() if name != "svg.hashsalt"}
 
 
 def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes]:

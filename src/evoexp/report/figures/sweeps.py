@@ -11,13 +11,14 @@ from matplotlib.figure import Figure
 from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
-from evoexp.report.figures.matrix import DARK, LUMINANCE
 from evoexp.report.results.stored_results import Results
 from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled
 from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import quantile
 
 PER_LINE = 3  # panels side by side
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue (ITU-R BT.709)
+DARK = 0.46  # [-] luminance below which a cell is dark
 MOST_PANELS = 18
 SETTLED = 0.05  # [-] of a run, after which the panels show all costs
 ORDINAL, PALEST = "viridis", 0.8  # colours of values that have an order, the palest to be read

@@ -12,8 +12,7 @@ LONG_TEXT = 30  # letters of a cell, from which on its column breaks lines
 NARROWEST = 14  # letters of a line in such a column
 BETWEEN = 3  # letters that the space between two columns takes
 NUMBERS = "0123456789−–∞"  # signs that numbers begin with
-SIZES = {"small": 84, "footnotesize": 94, "scriptsize": 108}
-"""Size of the type → its letters in a line of 345 pt, the width of LaTeX's own classes."""
+LINE = 94  # letters of the size of type in a line of 345 pt, the width of LaTeX's own classes
 
 SIGNS: dict[str, str] = yaml.safe_load(
     resources.files("evoexp").joinpath("assets/latex_signs.yaml").read_text(encoding="utf-8")
@@ -31,12 +30,29 @@ def latex_tables(document: Document) -> dict[str, bytes]:
 
 
 def _latex(table: Table, document: Document) -> str:
-    size, columns, fits = _layout(table)
-    headers, *rows = (
-        [escaped(_plain(each)) for each in row] for row in (table.headers, *table.rows)
+    plain = [
+        [str(getattr(value, "text", value)).replace("`", "") for value in row]
+        for row in (table.headers, *table.rows)
+    ]
+    # numbers stand to the right, long texts as paragraphs in the room that the others leave
+    columns = list(zip(*plain, strict=True))
+    wide = [max(map(len, cells), default=0) > LONG_TEXT for _, *cells in columns]
+    taken = sum(
+        max(map(len, cells)) for cells, is_wide in zip(columns, wide, strict=True) if not is_wide
     )
+    room = (LINE - taken - BETWEEN * len(columns)) // max(sum(wide), 1)
+    share, fits = max(room, NARROWEST) / LINE, room >= NARROWEST * any(wide)
+    kinds = [
+        rf"p{{{share:.2f}\linewidth}}"
+        if is_wide
+        else "r"
+        if k and all(cell[:1] in NUMBERS for cell in cells if cell)
+        else "l"
+        for k, ((_, *cells), is_wide) in enumerate(zip(columns, wide, strict=True))
+    ]
+    headers, *rows = ([escaped(text) for text in row] for row in plain)
     style = pd.DataFrame(rows, columns=headers).style.hide(axis="index")
-    lines = style.to_latex(column_format=columns, hrules=True).splitlines()
+    lines = style.to_latex(column_format="".join(kinds), hrules=True).splitlines()
     # heading, note, and whose runs these are
     note = f" {table.note}" if table.note else ""
     caption = f"{document.title}: {table.heading}.{note} {document.provenance}".replace("`", "")
@@ -46,7 +62,7 @@ def _latex(table: Table, document: Document) -> str:
         f"% runs: {', '.join(run.hash12 for run in document.runs)}",
         *([] if fits else [r"% wider than a line, so made smaller: needs \usepackage{graphicx}"]),
         r"\begin{table}",
-        rf"\centering\{size}",
+        r"\centering\footnotesize",
         rf"\caption{{{escaped(caption)}}}",
         rf"\label{{tab:{'-'.join(re.findall('[a-z0-9]+', words.lower()))}}}",
         *([] if fits else [r"\resizebox{\linewidth}{!}{%"]),
@@ -56,32 +72,3 @@ def _latex(table: Table, document: Document) -> str:
         "",
     ]
     return "\n".join(framed)
-
-
-def _layout(table: Table) -> tuple[str, str, bool]:
-    """Return the size of the type, how columns stand, and whether all of it fits on a line.
-
-    Numbers stand to the right, long texts as paragraphs in the room that the others leave.
-    """
-    cells = [[_plain(row[k]) for row in table.rows] for k in range(len(table.headers))]
-    longest = [max(map(len, column), default=0) for column in cells]
-    wide = [k for k, letters in enumerate(longest) if letters > LONG_TEXT]
-    heads = [len(_plain(header)) for header in table.headers]
-    taken = BETWEEN * len(cells) + sum(
-        max(letters, heads[k]) for k, letters in enumerate(longest) if k not in wide
-    )
-    room = {size: letters - taken for size, letters in SIZES.items()}
-    fitting = [size for size, letters in room.items() if letters >= NARROWEST * len(wide)]
-    size = fitting[0] if fitting else next(iter(SIZES))
-    letters = max(room[size] // max(len(wide), 1), NARROWEST)
-    share = letters / SIZES[size]
-    numbers = [all(cell[:1] in NUMBERS for cell in column if cell) for column in cells]
-    kinds = [
-        rf"p{{{share:.2f}\linewidth}}" if k in wide else "r" if k and numbers[k] else "l"
-        for k in range(len(cells))
-    ]
-    return size, "".join(kinds), bool(fitting)
-
-
-def _plain(value: object) -> str:
-    return str(getattr(value, "text", value)).replace("`", "")

@@ -158,21 +158,17 @@ def _check(file: PageFile, field: str) -> None:
                     must += "" if need == name else f" for this argument of {name}"
                     raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
     for page, entry in file.entries["pages"].items():
+        pages = {*file.entries["pages"], GENERIC}
+        named = [("otherwise", "pages", entry.get("otherwise", GENERIC), pages)]
         for section in ("tables", "checks", "figures"):
-            known_here = {*file.entries[section], *(file.shared if section == "figures" else ())}
+            choices = {*file.entries[section], *(file.shared if section == "figures" else ())}
             for each in entry.get(section, ()):
-                for name in [each] if isinstance(each, str) else each:
-                    if name not in known_here:
-                        where, must = (
-                            f"pages.{page}.{section}",
-                            f"one of the {section} of this file",
-                        )
-                        hint = nearest(name, known_here)
-                        raise SettingError(f"{field}: {where}", must, name, hint)
-        other = entry.get("otherwise", GENERIC)
-        if other not in {*file.entries["pages"], GENERIC}:
-            must, hint = "a page of this file", nearest(other, file.entries["pages"])
-            raise SettingError(f"{field}: pages.{page}.otherwise", must, other, hint)
+                names = [each] if isinstance(each, str) else each
+                named += [(section, section, name, choices) for name in names]
+        for key, kind, name, choices in named:
+            if name not in choices:
+                must, hint = f"one of the {kind} of this file", nearest(name, choices)
+                raise SettingError(f"{field}: pages.{page}.{key}", must, name, hint)
 
 
 def _mappings(path: str, entry: Any, kind: str) -> Iterator[tuple[str, Mapping[str, Any]]]:

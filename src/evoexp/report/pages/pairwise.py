@@ -87,16 +87,5 @@ def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]
     return rows
 
 
-def compared_pairs(
-    results: Results, settings: ReportSettings, differing: dict[str, Values]
-) -> list[tuple[tuple[str, str], Comparison]]:
-    """Return (labels, comparison of best costs) of all pairs of three conditions or more."""
-    if len(results.evolved) < 3 or "best cost" not in differing:
-        return []
-    every = list(itertools.combinations(results.evolved, 2))
-    rows = compared(every, differing["best cost"], settings)
-    return [((a.label, b.label), row) for (a, b), row in zip(every, rows, strict=True)]
-
-
 def _named(first: ConditionResults, second: ConditionResults) -> str:
     return f"{first.label} against {second.label}"

@@ -1,5 +1,6 @@
 """Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
 
+import collections
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -218,7 +219,7 @@ class Judge(NamedTuple):
             KeyError: If there is no such rule, or a word is missing.
         """
         # a rule that compares names its own word where it is judged
-        rule = self.rules[name].about(**{"word": "{word}", **words})
+        rule = self.rules[name].about({"word": "{word}", **words})
         return Hearing(rule, self.reason, self.settings.significance)
 
 
@@ -261,7 +262,8 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
         for rule in registered_rules(registration).values():
             if results.experiment in rule.experiments and rule.name not in known:
                 told = "not among its conditions: " + ", ".join(sorted(missing))
-                yield Hearing(rule.unjudged(), "", 0.0).made(told, "0", verdict)
+                unknown = rule.about(collections.defaultdict(lambda: "…"))  # words of a judge
+                yield Hearing(unknown, "", 0.0).made(told, "0", verdict)
 
 
 def fisher_evidence(one: Proportion, two: Proportion) -> str:

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from evoexp.errors import SettingError
+from evoexp.errors import EvoexpError
 from evoexp.report.figures.effort_curves import share_table
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
@@ -73,7 +73,7 @@ ENTRY = '{problem: a, length: 1.0, run: "0123456789ab", replicate: 0}'
 def test_what_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "f.yaml"
     path.write_text(text)
-    with pytest.raises(SettingError) as caught:
+    with pytest.raises(EvoexpError) as caught:
         read_best_known(path)
     assert said in str(caught.value) and "\n" not in str(caught.value)
 

@@ -1,6 +1,6 @@
 """Proven answers over collision queries: shares of targets reached, and the best lengths."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -106,53 +106,54 @@ def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
         axes.set_title(style.shortened(problem, 34), fontweight="normal")
         if not (own["share"].astype(float) > 0.0).any():
             axes.text(0.5, 0.5, "no proven answer", transform=axes.transAxes, **NOTE)
-        if style.begins_line(axes):
-            axes.set_ylabel("share reached")
-        else:
-            axes.tick_params(labelleft=False)
-        if style.ends_column(axes, panels):
-            axes.set_xlabel("collision queries")
+        axes.tick_params(labelleft=style.begins_line(axes))
+        axes.set_ylabel("share reached" if style.begins_line(axes) else "")
+        axes.set_xlabel("collision queries" if style.ends_column(axes, panels) else "")
     style.legend_below(figure, panels, 4)
     return figure
 
 
 def _draw_share_curves(axes: Axes, table: pd.DataFrame, planners: Sequence[str]) -> None:
-    """Draw a curve for each planner that a table has, in the look of its place among all.
-
-    The name of one that was run on fewer problems than others tells on how many targets.
-    """
+    """Draw the curves; the name of one that was run on fewer problems tells on how many targets."""
     most = int(table["targets"].max())
-    for k, planner in enumerate(planners):
-        curve = table[table["planner"] == planner]
-        if not len(curve):
-            continue
-        x, y = (curve[name].astype(float) for name in ("collision_queries", "share"))
-        targets = int(curve["targets"].iloc[0])
-        count = f" ({targets} of {most})" if targets < most else ""
-        axes.step(x, y, where="post", label=f"{planner}{count}", **style.curve_look(k))
+    counts = table.groupby("planner")["targets"].first()
+    names = {name: f"{name} ({n} of {most})" for name, n in counts.items() if n < most}
+    draw_steps(axes, table, "collision_queries", "share", planners, names)
     axes.set(ylim=(0.0, 1.02))
-    style.log_axis(axes, *_ends(table))
 
 
 def draw_lengths(table: pd.DataFrame) -> Figure:
     """Draw the best proven length so far of one problem."""
     figure, (axes,) = style.panels(3.6)
-    for k, planner in enumerate(table["planner"].unique()):
-        curve = table[table["planner"] == planner]
-        shown, look = curve.replace([np.inf], np.nan), style.curve_look(k)
-        x, colour = shown["collision_queries"], look["color"]
-        axes.fill_between(
-            x, shown["lower"], shown["upper"], step="post", color=colour, alpha=0.18, linewidth=0
-        )
-        axes.step(x, shown["median"], where="post", label=planner, **look)
-    axes.set_xlabel("collision queries")
-    style.log_axis(axes, *_ends(table))
-    axes.set_ylabel("best proven length so far [rad, m]")
+    planners = list(table["planner"].unique())
+    for k, planner in enumerate(planners):
+        band = table[table["planner"] == planner].replace([np.inf], np.nan)
+        look: dict[str, Any] = {"color": style.curve_look(k)["color"], "alpha": 0.18}
+        x, low, high = (band[name] for name in ("collision_queries", "lower", "upper"))
+        axes.fill_between(x, low, high, step="post", linewidth=0, **look)
+    draw_steps(axes, table.replace([np.inf], np.nan), "collision_queries", "median", planners)
+    axes.set(xlabel="collision queries", ylabel="best proven length so far [rad, m]")
     name_curves(figure, axes, 4)
     return figure
 
 
-def _ends(table: pd.DataFrame) -> tuple[float, float]:
-    """Return the ends of the axis of effort, also where no run has a proven answer."""
-    first, last = float(table["collision_queries"].min()), float(table["collision_queries"].max())
-    return first, max(last, 1.01 * first)
+def draw_steps(
+    axes: Axes,
+    table: pd.DataFrame,
+    across: str,
+    up: str,
+    planners: Sequence[str],
+    names: Mapping[Any, str] | None = None,
+) -> None:
+    """Draw a curve over a logarithmic axis for each planner that a table has.
+
+    It has the look of the planner's place among all, and its name unless it is given another one.
+    """
+    for k, planner in enumerate(planners):
+        curve = table[table["planner"] == planner]
+        if len(curve):
+            x, y = curve[across].astype(float), curve[up].astype(float)
+            label = (names or {}).get(planner, planner)
+            axes.step(x, y, where="post", label=label, **style.curve_look(k))
+    first, last = float(table[across].min()), float(table[across].max())
+    style.log_axis(axes, first, max(last, 1.01 * first))

@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import style
+from evoexp.report.figures.effort_curves import draw_steps
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.statistics.problem_ranks import (
     Standing,
@@ -38,13 +39,8 @@ def profiles_table(found: Standing) -> pd.DataFrame:
 def draw_profiles(table: pd.DataFrame) -> Figure:
     """Draw performance profiles."""
     figure, (axes,) = style.panels(3.4)
-    for k, planner in enumerate(table["planner"].unique()):
-        curve = table[table["planner"] == planner]
-        axes.step(
-            curve["ratio"], curve["share"], where="post", label=planner, **style.curve_look(k)
-        )
+    draw_steps(axes, table, "ratio", "share", list(table["planner"].unique()))
     count = int(table["problems"].iloc[0])
-    style.log_axis(axes, 1.0, float(table["ratio"].max()))
     axes.set(ylim=(0.0, 1.02), ylabel=f"share of {count} problems")
     axes.set_xlabel("expected running time to a proven answer, times that of the best planner [–]")
     name_curves(figure, axes, 3)

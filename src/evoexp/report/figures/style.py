@@ -117,7 +117,8 @@ def drawn(
 def _own_style() -> Mapping[str, Any]:
     """Return the parameters of evoexp's own style."""
     with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
-        return dict(mpl.rc_params_from_file(path, use_default_template=False))
+        own = mpl.rc_params_from_file(path, use_default_template=False)
+    return {str(name): value for name, value in own.items()}
 
 
 def _style_file(path: str) -> dict[str, Any]:
@@ -127,7 +128,8 @@ def _style_file(path: str) -> dict[str, Any]:
     logger.addHandler(handler)
     style, reasons = dict[str, Any](), list[str]()
     try:
-        style = dict(mpl.rc_params_from_file(path, use_default_template=False))
+        theirs = mpl.rc_params_from_file(path, use_default_template=False)
+        style = {str(name): value for name, value in theirs.items() if name != "svg.hashsalt"}
     except (OSError, ValueError) as error:
         reasons.append(str(error))
     finally:
@@ -135,7 +137,7 @@ def _style_file(path: str) -> dict[str, Any]:
     if lines := [*(record.getMessage() for record in handler.buffer), *reasons]:
         wrong = brief(lines[0].strip().partition("\n")[0])
         raise SettingError("report.style", f"a matplotlib style file ({wrong})", path)
-    return {name: value for name, value in style.items() if name != "svg.hashsalt"}
+    return style
 
 
 def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes]:

@@ -18,7 +18,7 @@ from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import shipped_best_known
-from evoexp.report.results.given_data import MARK, GivenData
+from evoexp.report.results.given_data import GivenData
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -33,8 +33,6 @@ from evoexp.report.statistics.inference import (
     spread,
 )
 from evoexp.report.statistics.problem_ranks import (
-    MIN_PLANNERS,
-    MIN_PROBLEMS,
     Standing,
     critical_difference,
     friedman,
@@ -90,36 +88,6 @@ def page(
 
 ranks = standing
 compared_conditions = stored_conditions
-
-
-def more_panels(runs: Sequence[PlannerRuns]) -> str:
-    """Tell how many problems have no panel; empty if all have one."""
-    count = len(problem_order(runs))
-    return f" The first {MAX_PANELS} of {count}; the CSV has all." if count > MAX_PANELS else ""
-
-
-def given_words(given: GivenData | None) -> str:
-    """Say whose word the given answers are; empty if none is given."""
-    if given is None:
-        return ""
-    return (
-        f" Planners marked{MARK} were not run here: their answers count as {given.name} "
-        f"(SHA-256 {given.sha256[:12]}…) tells them, the certifier has not seen them, and as seeds "
-        "are not common they are not compared pair by pair."
-    )
-
-
-def unequal(runs: Sequence[PlannerRuns]) -> str:
-    """Warn where planners were run on different problems; empty if all were run on the same."""
-    problems: dict[str, set[str]] = {}
-    for own in runs:
-        problems.setdefault(own.planner, set()).add(own.problem.name)
-    if len({frozenset(names) for names in problems.values()}) == 1:
-        return ""
-    return (
-        " Each planner's curve is over the problems that it was run on, which are not the same for "
-        "all: compare them problem by problem. In brackets: targets of those run on fewer."
-    )
 
 
 def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
@@ -248,55 +216,6 @@ def rank_rows(ranks: Standing) -> list[tuple[str, ...]]:
     ]
 
 
-def too_few_ranks(ranks: Standing) -> str:
-    """Say why planners are not ranked; empty if they are."""
-    if ranks.can_be_profiled:
-        return ""
-    return (
-        " Planners are not ranked: a problem counts once, however many seeds it has, and it takes "
-        "two planners, and two problems at least that both were run on."
-    )
-
-
-def left_out(ranks: Standing) -> str:
-    """Name the problems and planners that do not count; empty if all do."""
-    names = ", ".join(ranks.left_out)
-    problems = f" Left out, as some planner was not run on them: {names}." if names else ""
-    if not ranks.outsiders:
-        return problems
-    planners = ", ".join(ranks.outsiders)
-    return f"{problems} Not ranked, as run on less than half of the problems: {planners}."
-
-
-def rank_test(ranks: Standing, settings: ReportSettings) -> str:
-    """Tell the outcome of the tests, or why there are none."""
-    planners, problems = len(ranks.planners), len(ranks.problems)
-    if not ranks.can_be_tested:
-        return (
-            f"Too few for a test of ranks and its diagram: that takes {MIN_PLANNERS} planners and "
-            f"{MIN_PROBLEMS} problems that all of them were run on; here are {planners} planners "
-            f"and {problems} such problems."
-        )
-    test = friedman(ranks.lengths)
-    difference = critical_difference(planners, problems, settings.significance)
-    says = (
-        "the planners rank differently"
-        if test.p_value < settings.significance
-        else "no planner is shown to rank differently from another, whatever their differences"
-    )
-    return (
-        f"Friedman's test over {problems} problems: χ² = {test.statistic:.3g}, p = "
-        f"{markdown.p_value(test.p_value)}: {says}. Nemenyi's critical difference of mean ranks at "
-        f"{settings.significance:g}: {difference:.2f}."
-    )
-
-
-def never_proven(ranks: Standing) -> str:
-    """Tell how many problems no planner has a proven answer on; empty if there is none."""
-    unsolved = int(np.isinf(ranks.efforts).all(axis=1).sum())
-    return f" No planner has a proven answer on {unsolved} of them." if unsolved else ""
-
-
 def as_csv(rows: Sequence[Rated]) -> bytes:
     """Return the answers as CSV, numbers with all digits, `inf` where there is no proven answer.
 
@@ -329,5 +248,23 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "ranked_conditions": lambda runs, ranks: stored_conditions(
         own for own in runs if own.problem.name in ranks.problems
     ),
-    "one_problem": lambda runs: len(problem_order(runs)) == 1,
+    "num_problems": lambda runs: len(problem_order(runs)),
+    "one_problem": lambda num_problems: num_problems == 1,
+    "hidden_problems": lambda num_problems: num_problems > MAX_PANELS,  # without a panel
+    # planners were run on different problems
+    "unequal": lambda runs: (
+        len({frozenset(b.problem.name for b in runs if b.planner == a.planner) for a in runs}) > 1
+    ),
+    "left_out": lambda ranks: ", ".join(ranks.left_out),
+    "outsiders": lambda ranks: ", ".join(ranks.outsiders),
+    "friedman_test": lambda ranks: friedman(ranks.lengths),
+    "ranks_differ": lambda ranks, settings: (
+        ranks.can_be_tested and friedman(ranks.lengths).p_value < settings.significance
+    ),
+    "ranks_are_alike": lambda ranks, ranks_differ: ranks.can_be_tested and not ranks_differ,
+    "nemenyi": lambda ranks, settings: critical_difference(
+        len(ranks.planners), len(ranks.problems), settings.significance
+    ),
+    # problems that no planner has a proven answer on
+    "never_proven": lambda ranks: int(np.isinf(ranks.efforts).all(axis=1).sum()),
 }

@@ -1,4 +1,4 @@
-r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs}`."""
+r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs, adjustbox}`."""
 
 import re
 from importlib import resources
@@ -9,10 +9,7 @@ import yaml
 from evoexp.report.pages.page_parts import Document, Table
 
 LONG_TEXT = 30  # letters of a cell, from which on its column breaks lines
-NARROWEST = 14  # letters of a line in such a column
-BETWEEN = 3  # letters that the space between two columns takes
 NUMBERS = "0123456789−–∞"  # signs that numbers begin with
-LINE = 94  # letters of the size of type in a line of 345 pt, the width of LaTeX's own classes
 
 SIGNS: dict[str, str] = yaml.safe_load(
     resources.files("evoexp").joinpath("assets/latex_signs.yaml").read_text(encoding="utf-8")
@@ -34,22 +31,12 @@ def _latex(table: Table, document: Document) -> str:
         [str(getattr(value, "text", value)).replace("`", "") for value in row]
         for row in (table.headers, *table.rows)
     ]
-    # numbers stand to the right, long texts as paragraphs in the room that the others leave
-    columns = list(zip(*plain, strict=True))
-    wide = [max(map(len, cells), default=0) > LONG_TEXT for _, *cells in columns]
-    taken = sum(
-        max(map(len, cells)) for cells, is_wide in zip(columns, wide, strict=True) if not is_wide
-    )
-    room = (LINE - taken - BETWEEN * len(columns)) // max(sum(wide), 1)
-    share, fits = max(room, NARROWEST) / LINE, room >= NARROWEST * any(wide)
-    kinds = [
-        rf"p{{{share:.2f}\linewidth}}"
-        if is_wide
-        else "r"
-        if k and all(cell[:1] in NUMBERS for cell in cells if cell)
-        else "l"
-        for k, ((_, *cells), is_wide) in enumerate(zip(columns, wide, strict=True))
-    ]
+    # numbers stand to the right, long texts as paragraphs
+    kinds = []
+    for k, (_, *cells) in enumerate(zip(*plain, strict=True)):
+        is_number = k and all(cell[:1] in NUMBERS for cell in cells if cell)
+        is_long = max(map(len, cells), default=0) > LONG_TEXT
+        kinds.append(r"p{0.4\linewidth}" if is_long else "r" if is_number else "l")
     headers, *rows = ([escaped(text) for text in row] for row in plain)
     style = pd.DataFrame(rows, columns=headers).style.hide(axis="index")
     lines = style.to_latex(column_format="".join(kinds), hrules=True).splitlines()
@@ -60,14 +47,13 @@ def _latex(table: Table, document: Document) -> str:
     framed = [
         f"% made by {' '.join(document.command.split())}",
         f"% runs: {', '.join(run.hash12 for run in document.runs)}",
-        *([] if fits else [r"% wider than a line, so made smaller: needs \usepackage{graphicx}"]),
         r"\begin{table}",
         r"\centering\footnotesize",
         rf"\caption{{{escaped(caption)}}}",
         rf"\label{{tab:{'-'.join(re.findall('[a-z0-9]+', words.lower()))}}}",
-        *([] if fits else [r"\resizebox{\linewidth}{!}{%"]),
-        *lines[:-1],
-        lines[-1] + "}" * (not fits),
+        r"\begin{adjustbox}{max width=\linewidth}",  # wider ones are made smaller
+        *lines,
+        r"\end{adjustbox}",
         r"\end{table}",
         "",
     ]

@@ -191,10 +191,7 @@ class PageBuilder:
                 for name, value in zip(names, item if len(names) > 1 else (item,), strict=True):
                     inner = inner.inner(**{name: value})
                 scopes.append(inner)
-        if "when" not in entry:
-            return iter(scopes)
-        name = entry["when"].removeprefix("not ")
-        return (each for each in scopes if bool(each.value(name)) == (name == entry["when"]))
+        return (each for each in scopes if "when" not in entry or each.holds(entry["when"]))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""

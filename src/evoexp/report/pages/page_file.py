@@ -42,7 +42,7 @@ _NAMED = (
     *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
     *("plays", "shows"),
 )
-_TEXTS = ("title", "caption", "finding", "text", "stem", "note", "cells")
+_TEXTS = ("title", "introduction", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (
     *("results", "settings", "rules", "paper", "page", "condition", "controls", "compared"),
     *("shown", "of", "names"),  # in figures
@@ -192,6 +192,14 @@ def _names(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if "each" in entry:
         yield "each", str(entry["each"]).rpartition(" in ")[2].partition(".")[0]
     for key in _TEXTS:
-        for text in entry[key] if key == "cells" and key in entry else (entry.get(key),):
-            if isinstance(text, str):
-                yield from ((key, name) for name in names_in(text))
+        yield from ((key, name) for text in _texts(entry.get(key)) for name in names_in(text))
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield the texts in the parts of a text, and their conditions as words in braces."""
+    if isinstance(value, str):
+        yield value
+    for part in value if isinstance(value, list) else ():
+        if isinstance(part, Mapping):
+            yield "{" + str(part.get("when", "")).removeprefix("not ") + "}"
+        yield from _texts(part["text"] if isinstance(part, Mapping) else part)

@@ -121,9 +121,21 @@ class Scope:
         """Return the value of a dotted name: `results.main`, `collision.blind`."""
         return markdown.Sentence(self).get_field(path, (), self)[0]
 
+    def holds(self, condition: str) -> bool:
+        """Return whether `name` is true, or `not name` is false."""
+        name = condition.removeprefix("not ")
+        return bool(self.value(name)) == (name == condition)
+
     def text(self, template: object) -> str:
-        """Return a text with its words in braces filled in, see `markdown.filled`."""
-        return markdown.filled(str(template), self)
+        """Return a text with its words in braces filled in, see `markdown.filled`.
+
+        Of a list all parts that are texts, or mappings of a `text` and of a condition that holds.
+        """
+        if not isinstance(template, list):
+            return markdown.filled(str(template), self)
+        parts = ({"text": part} if isinstance(part, str) else part for part in template)
+        shown = (part["text"] for part in parts if "when" not in part or self.holds(part["when"]))
+        return " ".join(map(self.text, shown))
 
 
 def names_in(template: object) -> Iterator[str]:

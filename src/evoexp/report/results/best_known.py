@@ -41,6 +41,7 @@ def read_best_known(path: str | Path) -> dict[str, BestKnown]:
 
     Raises:
         SettingError: If something in it cannot be.
+        UnknownSetting: If an entry has another key.
         OSError: If it cannot be read.
     """
     return parsed(read_bounded(path), Path(path).name)

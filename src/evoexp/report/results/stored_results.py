@@ -1,6 +1,7 @@
 """Stored results of the conditions that a report is asked for."""
 
 import functools
+import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -123,20 +124,14 @@ class ConditionResults:
     @property
     def verdicts(self) -> Verdicts:
         """Count of the exact verdicts."""
-        motions = self.summaries[
-            self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
-        ]
-        certified, margin = motions["certified"], motions["certified_margin"]
-        refuted = certified.eq(False).fillna(False)
-        return Verdicts(
-            len(motions),
-            int(certified.eq(True).sum()),
-            int(refuted.sum()),
-            int(certified.isna().sum()),
-            int((refuted & motions["solved"]).sum()),
-            int(margin.eq(True).sum()),
-            int((margin.eq(False).fillna(False) & certified.eq(True).fillna(False)).sum()),
+        known = self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
+        motions = self.summaries[known]
+        certified, refuted, margin, broken = (
+            motions[name].eq(value).fillna(False)
+            for name, value in itertools.product(("certified", "certified_margin"), (True, False))
         )
+        rows = certified, refuted, motions["certified"].isna(), refuted & motions["solved"]
+        return Verdicts(len(motions), *(int(r.sum()) for r in (*rows, margin, broken & certified)))
 
     @property
     def best_replicate(self) -> int:

@@ -93,11 +93,13 @@ def main_effects(
                 continue
             rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
             drawn = rng.integers(0, len(pairs), (num_resamples, len(pairs)))
-            interval = percentiles(np.array([_median(pairs[rows]) for rows in drawn]), confidence)
+            interval = percentiles(
+                np.array([quantile(pairs[rows].ravel(), 0.5) for rows in drawn]), confidence
+            )
             known = pairs[~np.isnan(pairs)]
             better = float((known < 0.0).mean() + 0.5 * (known == 0.0).mean())
             names = base, setting, first, other
-            yield MainEffect(*names, len(known), _median(pairs), interval, better)
+            yield MainEffect(*names, len(known), quantile(known, 0.5), interval, better)
 
 
 def _pairs(
@@ -124,11 +126,6 @@ def _pairs(
     if not differences:
         return np.empty((0, 0))
     return pd.concat(differences, axis=1).sort_index().to_numpy(np.float64)
-
-
-def _median(values: np.ndarray) -> float:
-    known = values[~np.isnan(values)]
-    return quantile(known, 0.5) if len(known) else np.nan
 
 
 def labelled(sweep: Sweep, names: Sequence[str]) -> str:

@@ -35,14 +35,17 @@ class Rule(NamedTuple):
     evidence: str = ""  # the numbers in a sentence, as `markdown.filled` takes it
     equal: str = ""  # when both sides are practically equal, in words
 
-    def about(self, words: dict[str, object]) -> "Rule":
-        """Return the rule with its words in braces filled in; limits are known already.
+    def about(self, words: dict[str, object] | None = None) -> "Rule":
+        """Return the rule with its words in braces filled in, where no judge gives any with "…".
+
+        Limits are known already.
 
         Raises:
             KeyError: If a word is missing.
         """
         limits: dict[str, object] = {name: f"{limit:g}" for name, limit in self.limits.items()}
-        known = collections.ChainMap(limits, words)
+        unknown = collections.defaultdict[str, object](lambda: "…")
+        known = collections.ChainMap(limits, unknown if words is None else words)
         fields = ("claim", "source", "reproduced", "contradicted", "equal")
         return self._replace(**{name: getattr(self, name).format_map(known) for name in fields})
 
@@ -77,7 +80,8 @@ def read_rules(path: Path) -> Rules:
                 f"{name}: must have claim, source, experiments, a kind out of {', '.join(KINDS)}; "
                 f"missing: {sorted(missing)}, unknown: {sorted(unknown)}, kind: {entry.get('kind')}"
             )
-        if (entry["kind"] == OWN) != ("reproduced" in entry):
+        own = "reproduced" in entry
+        if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
             must = f"a rule of kind {OWN}, and no other, says when it is reproduced"
             raise ValueError(f"{name}: {must}")
         words = {"reproduced": "", "contradicted": "", **KINDS[entry["kind"]], **entry}

@@ -1,6 +1,5 @@
 """Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
 
-import collections
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -262,8 +261,7 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
         for rule in registered_rules(registration).values():
             if results.experiment in rule.experiments and rule.name not in known:
                 told = "not among its conditions: " + ", ".join(sorted(missing))
-                unknown = rule.about(collections.defaultdict(lambda: "…"))  # words of a judge
-                yield Hearing(unknown, "", 0.0).made(told, "0", verdict)
+                yield Hearing(rule.about(), "", 0.0).made(told, "0", verdict)
 
 
 def fisher_evidence(one: Proportion, two: Proportion) -> str:

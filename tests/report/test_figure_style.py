@@ -21,7 +21,7 @@ from evoexp.cli import main
 from evoexp.errors import SettingError
 from evoexp.report.figures import end_labels, style
 from evoexp.report.figures.end_labels import MANY, CurveEnd, name_curves, name_ends
-from evoexp.report.figures.style import Look, drawn
+from evoexp.report.figures.style import drawn
 from report_samples import SMALL
 
 NAMES = ["the first of some conditions", "another one", "a third with a long name"]
@@ -94,7 +94,7 @@ def long_titles() -> Figure:
 def at_width(draw: Draw, width: Any = "page") -> Figure:
     """Return a figure as it is laid out for a width."""
     seen: list[Figure] = []
-    drawn(lambda: seen.append(draw()) or seen[0], ("png",), 100, Look(width))
+    drawn(lambda: seen.append(draw()) or seen[0], ("png",), 100, width)
     return seen[0]
 
 
@@ -168,9 +168,9 @@ def test_titles_of_a_page_are_broken_where_they_would_reach_into_the_next_panel(
 
 def test_a_column_is_half_as_wide_and_its_text_is_text_that_can_be_read() -> None:
     for width, pixels in (("page", 720), ("column", 350)):
-        png = drawn(plain, ("png",), 100, Look(width))["png"]
+        png = drawn(plain, ("png",), 100, width)["png"]
         assert Image.open(io.BytesIO(png)).width == pixels
-        svg = drawn(plain, ("svg",), 100, Look(width))["svg"].decode()
+        svg = drawn(plain, ("svg",), 100, width)["svg"].decode()
         texts = set(re.findall(r"<text[^>]*>([^<]*)</text>", svg))
         assert {"instant", "distance [m]", "a curve"} <= texts
         fonts = re.findall(r"font(?:-family)?: ([^;\"]*)", svg)
@@ -204,7 +204,7 @@ def test_a_style_file_changes_figures_and_nothing_that_comes_after(tmp_path: Pat
     path = tmp_path / "thesis.mplstyle"
     path.write_text("font.family: serif\naxes.facecolor: ffeeee\nsvg.hashsalt: mine\n")
     before, styled, again, after = (
-        drawn(plain, ("svg",), 100, Look("page", each))["svg"]
+        drawn(plain, ("svg",), 100, "page", each)["svg"]
         for each in (None, str(path), str(path), None)
     )
     assert b"#ffeeee" in styled == again and b"#ffeeee" not in before == after
@@ -227,7 +227,7 @@ def test_a_style_file_that_is_none_is_refused(tmp_path: Path, text: str, wrong: 
     path.write_text(text)
     must = rf"report\.style: must be a matplotlib style file \(.*{re.escape(wrong)}.*bad\.mplstyle'"
     with pytest.raises(SettingError, match=must):
-        drawn(plain, ("svg",), 100, Look("page", str(path)))
+        drawn(plain, ("svg",), 100, "page", str(path))
 
 
 @pytest.mark.parametrize(
@@ -250,8 +250,8 @@ def test_the_width_is_that_of_the_report(
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(stored))
     widths, blank = list[str](), style.drawn
 
-    def noted(draw: Any, formats: Any, dpi: int, look: Look) -> dict[str, bytes]:
-        widths.append(look.width)
+    def noted(draw: Any, formats: Any, dpi: int, *look: Any) -> dict[str, bytes]:
+        widths.append(look[0])
         return blank(draw, formats, dpi)
 
     monkeypatch.setattr(style, "drawn", noted)

@@ -63,10 +63,7 @@ def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:
 
 
 def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
-    """Name the curves of some axes: many of them at their ends, few in a legend below.
-
-    In a figure for a column there is no room beside the axes: there is a legend, too.
-    """
+    """Name the curves of some axes: many of them at their ends, few in a legend below."""
     curves: list[tuple[Any, str]] = list(zip(*axes.get_legend_handles_labels(), strict=True))
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:
         style.legend_below(figure, [axes], columns)

@@ -1,6 +1,5 @@
 """A sweep at a glance: a quantity over its settings, their effects, and convergence in facets."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -12,7 +11,7 @@ from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.figures.convergence import NAMES, cost_table
 from evoexp.report.figures.end_labels import CurveEnd, name_ends
 from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled
+from evoexp.report.results.swept_settings import Sweep, labelled
 from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import quantile
 
@@ -108,16 +107,6 @@ def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
     return figure
 
 
-def effect_table(rows: Sequence[MainEffect]) -> pd.DataFrame:
-    """Return main effects, one per row; columns of `MainEffect`, the interval as low and high."""
-    found = [
-        (r.base, r.setting, r.first, r.other, r.num_pairs, r.difference, *r.interval, r.better)
-        for r in rows
-    ]
-    names = ["base", "setting", "first", "other", "pairs", "difference", "low", "high", "better"]
-    return pd.DataFrame(found, columns=names)
-
-
 def draw_effects(table: pd.DataFrame) -> Figure:
     """Draw the median differences with their intervals, one panel per swept condition."""
     bases = list(dict.fromkeys(table["base"]))[:MOST_PANELS]
@@ -188,7 +177,7 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
         room = 0.05 * (high - low) or 1.0
         axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=(low - room, high + room))
         axes.set_title("\n".join(word for word in (base, facet) if word))
-        axes.set_xlabel("evaluations" if style.ends_column(axes, axes_of) else "")
+        axes.set_xlabel("evaluations")
         axes.set_ylabel("best cost so far" if style.begins_line(axes) else "")
         axes.xaxis.set_major_locator(style.few_ticks())
         style.shorten_thousands(axes.xaxis)

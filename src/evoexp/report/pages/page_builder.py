@@ -38,11 +38,7 @@ Entry = Mapping[str, Any]
 
 
 def page_of(results: Results, settings: ReportSettings) -> Page:
-    """Return the page that the settings name, filled from results; a sweep has a page of its own.
-
-    A page that shows no motion is given the figure of the scene, with the best motions; claims on
-    conditions that were left out are named as not judged.
-    """
+    """Return the page that the settings name, filled from results; sweeps have their own."""
     chosen = page_registration(settings)
     if sweep := sweep_of(results):
         motions = best_motions(swept.best_condition(sweep, results))

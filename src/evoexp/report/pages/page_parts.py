@@ -207,10 +207,8 @@ class Document(NamedTuple):
 
 
 def provenance(runs: Sequence[tuple[str, int]], seeds: Sequence[int]) -> str:
-    """Return the sentence that tells whose runs something shows; empty without any.
-
-    `runs` are (hash, finished replicates) of every condition, `seeds` those of the conditions.
-    """
+    """Return the sentence that tells whose runs something shows; empty without any."""
+    # `runs` are (hash, finished replicates) of every condition
     counts = sorted({done for _, done in runs})
     if not counts:
         return ""

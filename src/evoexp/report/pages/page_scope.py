@@ -83,11 +83,7 @@ class Scope:
         return known or (self.outer is not None and name in self.outer)
 
     def __getitem__(self, name: str) -> Any:
-        """Return a value; a function of a condition itself where no condition is bound.
-
-        Raises:
-            KeyError: If nothing has this name, or a function lacks an argument.
-        """
+        """Return a value; a function of a condition itself where no condition is bound."""
         if name not in self._values:
             needs = self.functions.needs(name)
             if self.outer is not None and not self._bound & needs:

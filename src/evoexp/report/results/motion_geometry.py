@@ -126,20 +126,15 @@ class BodyDistance:
 
         None: of the closest pair. Where bodies touch the distance is 0.
         """
-        pin.computeDistances(self._model, self._data, self._geometry, self._placements, q)
-        results = list(self._placements.distanceResults)
-        least = min(results if pair is None else [results[pair]], key=lambda r: r.min_distance)
+        robot = self._model, self._data, self._geometry
+        closest = pin.computeDistances(*robot, self._placements, q)
+        least = self._placements.distanceResults[closest if pair is None else pair]
         points = np.array([least.getNearestPoint1(), least.getNearestPoint2()])
         return max(0.0, float(least.min_distance)), points
 
     def __call__(self, q: FloatArray) -> FloatArray:
         """Return the least distance at each configuration (nq, configurations) [rad]."""
-        robot, results = (self._model, self._data, self._geometry), self._placements.distanceResults
-        least = np.empty(q.shape[1])
-        for k, one in enumerate(np.ascontiguousarray(q.T)):
-            closest = pin.computeDistances(*robot, self._placements, one)
-            least[k] = max(0.0, results[closest].min_distance)
-        return least
+        return np.array([self.nearest(each)[0] for each in np.ascontiguousarray(q.T)])
 
 
 def link_distance(assembly: Assembly) -> BodyDistance:

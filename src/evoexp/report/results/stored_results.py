@@ -106,10 +106,7 @@ class ConditionResults:
         return len(self.failures)
 
     def added(self, fixed: int) -> int:
-        """Return how many finished replicates were asked for when results were there already.
-
-        The replicates that the experiment fixes by itself never count.
-        """
+        """Return how many finished replicates were asked for when results were there already."""
         known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
         seen = [plan.num_replicates for plan in self.plans if plan.stored]
         if not seen:
@@ -240,10 +237,7 @@ class Results(NamedTuple):
             yield condition, "" if len(self.main) == 1 else f"_{k + 1}_{slug}"
 
     def beside(self, experiment: str) -> "Results":
-        """Return the stored results of another shipped experiment at the paper's budget.
-
-        Conditions are found by their hashes, those that were never run are missing.
-        """
+        """Return the stored results of another shipped experiment at the paper's budget."""
         rows = [row for row in shipped() if (row.experiment, row.budget) == (experiment, "paper")]
         runs = {row.label: RunDirectory(self.outputs, row.condition_id) for row in rows}
         found = tuple(

@@ -36,13 +36,7 @@ class Rule(NamedTuple):
     equal: str = ""  # when both sides are practically equal, in words
 
     def about(self, words: dict[str, object] | None = None) -> "Rule":
-        """Return the rule with its words in braces filled in, where no judge gives any with "…".
-
-        Limits are known already.
-
-        Raises:
-            KeyError: If a word is missing.
-        """
+        """Return the rule with its words in braces filled in, where no judge gives any with "…"."""
         limits: dict[str, object] = {name: f"{limit:g}" for name, limit in self.limits.items()}
         unknown = collections.defaultdict[str, object](lambda: "…")
         known = collections.ChainMap(limits, unknown if words is None else words)

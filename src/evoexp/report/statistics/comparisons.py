@@ -42,10 +42,7 @@ class Comparison(NamedTuple):
         return self.better.direction if self.p_adjusted < significance else 0
 
     def runs_to_decide(self, significance: float) -> float:
-        """Return how many runs of each would decide it if A12 stays: more than there are.
-
-        The level of a single test is that which Holm leaves it.
-        """
+        """Return how many runs of each would decide it if A12 stays: more than there are."""
         level = significance * (self.better.p_value / self.p_adjusted if self.p_adjusted else 1.0)
         return max(max(self.sizes) + 1.0, runs_for_effect(self.better.a12, level))
 

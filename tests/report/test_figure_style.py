@@ -20,7 +20,7 @@ from PIL import Image
 from evoexp.cli import main
 from evoexp.errors import SettingError
 from evoexp.report.figures import end_labels, style
-from evoexp.report.figures.end_labels import MANY, CurveEnd, name_curves, name_ends
+from evoexp.report.figures.end_labels import MANY, name_curves, name_ends
 from evoexp.report.figures.style import drawn
 from report_samples import SMALL
 
@@ -284,7 +284,7 @@ def test_names_at_the_ends_of_curves_keep_apart() -> None:
     _, (axes,) = style.panels(3.0)
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     heights = [0.5] * 5 + [0.99, np.nan]
-    name_ends(axes, [CurveEnd(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
+    name_ends(axes, [(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
     places = sorted(text.xyann[1] for text in axes.texts)
     assert len(places) == 6 and np.diff(places).min() >= end_labels.APART - 1e-9
     assert np.mean(places[:5]) == pytest.approx(0.5)  # around their curves

@@ -273,16 +273,14 @@ def _panel(
 
 def _key(figure: Figure, table: pd.DataFrame) -> None:
     """Name the elements below the figure."""
-    there = set(table["element"])
     colour = style.arm_colour(0)
-    keys: list[Any] = []
-    if "goal" in there:
-        keys += [Patch(color=colour, label="start"), Patch(color=colour, alpha=0.35, label="goal")]
-    if "obstacle" in there:
-        keys.append(Patch(color=OBSTACLE, alpha=0.4, label="obstacle"))
-    if "object" in there:
-        keys.append(Patch(color=OBJECT, label="carried"))
-    keys.append(style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"))
-    if "target" in there:
-        keys.append(style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"))
-    style.keys_below(figure, keys)
+    keys: dict[str, Any] = {
+        "start": Patch(color=colour, label="start"),
+        "goal": Patch(color=colour, alpha=0.35, label="goal"),
+        "obstacle": Patch(color=OBSTACLE, alpha=0.4, label="obstacle"),
+        "object": Patch(color=OBJECT, label="carried"),
+        "way": style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"),
+        "target": style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"),
+    }
+    there = set(table["element"])
+    style.keys_below(figure, [key for element, key in keys.items() if element in there])

@@ -134,29 +134,26 @@ def _check_keys(field: str, entry: Mapping[str, Any], kind: str) -> None:
 
 def _check(file: PageFile, field: str) -> None:
     """Check all entries of a file: the names that they use, and the entries that pages name."""
-    entries = [
-        each
-        for section in sorted(KEYS.keys() & file.entries)
-        for name, entry in file.entries[section].items()
-        for each in _mappings(f"{field}: {section}.{name}", entry, section)
-    ]
-    bound = {*BOUND, *file.functions}
-    for path, entry in entries:
-        if "each" in entry:
-            each = _EACH.fullmatch(str(entry["each"]))
-            if each is None:
-                raise SettingError(f"{path}.each", "'item in items'", entry["each"])
-            bound |= set(each[1].split(", "))
-        for key in ("given", "arguments", "words"):
-            bound |= {*entry.get(key, ())}
-    for path, entry in entries:
-        for key, name in _names(entry):
-            known = name in bound or is_column(name)
-            for need in file.functions.needs(name) if known else (name,):
-                if need not in bound and not is_column(need):
-                    must = "a value or function"
-                    must += "" if need == name else f" for this argument of {name}"
-                    raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
+    bound, uses = {*BOUND, *file.functions}, list[tuple[str, str, str]]()
+    for section in sorted(KEYS.keys() & file.entries):
+        for title, whole in file.entries[section].items():
+            for path, entry in _mappings(f"{field}: {section}.{title}", whole, section):
+                uses += [(path, key, name) for key, name in _names(entry)]
+                for key in ("given", "arguments", "words"):
+                    bound |= {*entry.get(key, ())}
+                if "each" in entry:
+                    each = _EACH.fullmatch(str(entry["each"]))
+                    if each is None:
+                        raise SettingError(f"{path}.each", "'item in items'", entry["each"])
+                    bound |= set(each[1].split(", "))
+                    uses.append((path, "each", each[2].partition(".")[0]))
+    for path, key, name in uses:
+        known = name in bound or is_column(name)
+        for need in file.functions.needs(name) if known else (name,):
+            if need not in bound and not is_column(need):
+                must = "a value or function"
+                must += "" if need == name else f" for this argument of {name}"
+                raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
     for page, entry in file.entries["pages"].items():
         pages = {*file.entries["pages"], GENERIC}
         named = [("otherwise", "pages", entry.get("otherwise", GENERIC), pages)]
@@ -189,8 +186,6 @@ def _names(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         for path in entry[key] if isinstance(entry.get(key), list) else (entry.get(key),):
             if isinstance(path, str):
                 yield key, _FIRST.split(path.removeprefix("not "))[0]
-    if "each" in entry:
-        yield "each", str(entry["each"]).rpartition(" in ")[2].partition(".")[0]
     for key in _TEXTS:
         yield from ((key, name) for text in _texts(entry.get(key)) for name in names_in(text))
 

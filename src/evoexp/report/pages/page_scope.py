@@ -129,7 +129,7 @@ class Scope:
         """
         if not isinstance(template, list):
             return markdown.filled(str(template), self)
-        parts = ({"text": part} if isinstance(part, str) else part for part in template)
+        parts = (part if isinstance(part, Mapping) else {"text": part} for part in template)
         shown = (part["text"] for part in parts if "when" not in part or self.holds(part["when"]))
         return " ".join(map(self.text, shown))
 

@@ -45,7 +45,10 @@ def store(outputs: Path, experiment: Experiment) -> None:
     """Run and store every replicate of an experiment."""
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs, condition.id)
-        notes = manifest(condition.id) | {"label": label}
+        taken = {
+            o.group: {"name": o.name, "origin": o.origin} for o in experiment.options.get(label, ())
+        }
+        notes = manifest(condition.id) | {"label": label, "options": taken}
         run.create(condition.to_json(), notes, condition.files())
         for replicate in range(condition.num_replicates(experiment.num_replicates)):
             run.write_logs({replicate: run_replicate(condition, replicate).content})

@@ -193,7 +193,7 @@ def test_an_experiment_without_a_page_has_results_pictures_and_parameters(
     stored: Path, blank_figures: None
 ) -> None:
     page = draw(stored, expand(*THREE_ARMS), None)
-    stems = ("convergence", "values", "scene", "stages", "joints", "covers")
+    stems = ("convergence", "values", "scene", "joints", "covers")
     files = {f"{stem}.{kind}" for stem in stems for kind in ("csv", "json", "png", "svg")}
     found, text = set(contents(page)), page.read_text()
     assert files < found

@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,9 +19,9 @@ from PIL import Image
 
 from evoexp.cli import main
 from evoexp.errors import SettingError
-from evoexp.report.figures import end_labels, matrix, style
-from evoexp.report.figures.end_labels import MANY, CurveEnd, name_curves, name_ends
-from evoexp.report.figures.style import Look, drawn
+from evoexp.report.figures import end_labels, style
+from evoexp.report.figures.end_labels import MANY, name_curves, name_ends
+from evoexp.report.figures.style import drawn
 from report_samples import SMALL
 
 NAMES = ["the first of some conditions", "another one", "a third with a long name"]
@@ -95,7 +94,7 @@ def long_titles() -> Figure:
 def at_width(draw: Draw, width: Any = "page") -> Figure:
     """Return a figure as it is laid out for a width."""
     seen: list[Figure] = []
-    drawn(lambda: seen.append(draw()) or seen[0], ("png",), 100, Look(width))
+    drawn(lambda: seen.append(draw()) or seen[0], ("png",), 100, width)
     return seen[0]
 
 
@@ -169,9 +168,9 @@ def test_titles_of_a_page_are_broken_where_they_would_reach_into_the_next_panel(
 
 def test_a_column_is_half_as_wide_and_its_text_is_text_that_can_be_read() -> None:
     for width, pixels in (("page", 720), ("column", 350)):
-        png = drawn(plain, ("png",), 100, Look(width))["png"]
+        png = drawn(plain, ("png",), 100, width)["png"]
         assert Image.open(io.BytesIO(png)).width == pixels
-        svg = drawn(plain, ("svg",), 100, Look(width))["svg"].decode()
+        svg = drawn(plain, ("svg",), 100, width)["svg"].decode()
         texts = set(re.findall(r"<text[^>]*>([^<]*)</text>", svg))
         assert {"instant", "distance [m]", "a curve"} <= texts
         fonts = re.findall(r"font(?:-family)?: ([^;\"]*)", svg)
@@ -201,26 +200,11 @@ def test_a_legend_takes_as_many_columns_as_fit(length: int, columns: int) -> Non
     assert legend.get_window_extent().width <= figure.bbox.width or columns == 1
 
 
-@pytest.mark.parametrize(
-    ("count", "name"), [(3, "c{}"), (9, "05cccfce1d2{}"), (5, "w" * 40 + "{}")]
-)
-def test_names_beside_a_matrix_are_not_cut_off(count: int, name: str) -> None:
-    labels = [name.format(k) for k in range(count)]
-    pairs = [(a, b, 0.6, 0.5, 0.7, 0.2, 20, 20) for a in labels for b in labels if a != b]
-    columns = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "runs", "runs_other"]
-    table = pd.DataFrame(pairs, columns=columns).assign(significance=0.05)
-    figure = at_width(lambda: matrix.draw_matrix(table))
-    for axes in figure.axes:
-        for text in (*axes.get_yticklabels(), *axes.get_xticklabels(), axes.yaxis.label):
-            box = text.get_window_extent()
-            assert box.x0 >= 0.0 and box.x1 <= figure.bbox.width, text.get_text()
-
-
 def test_a_style_file_changes_figures_and_nothing_that_comes_after(tmp_path: Path) -> None:
     path = tmp_path / "thesis.mplstyle"
     path.write_text("font.family: serif\naxes.facecolor: ffeeee\nsvg.hashsalt: mine\n")
     before, styled, again, after = (
-        drawn(plain, ("svg",), 100, Look("page", each))["svg"]
+        drawn(plain, ("svg",), 100, "page", each)["svg"]
         for each in (None, str(path), str(path), None)
     )
     assert b"#ffeeee" in styled == again and b"#ffeeee" not in before == after
@@ -243,7 +227,7 @@ def test_a_style_file_that_is_none_is_refused(tmp_path: Path, text: str, wrong: 
     path.write_text(text)
     must = rf"report\.style: must be a matplotlib style file \(.*{re.escape(wrong)}.*bad\.mplstyle'"
     with pytest.raises(SettingError, match=must):
-        drawn(plain, ("svg",), 100, Look("page", str(path)))
+        drawn(plain, ("svg",), 100, "page", str(path))
 
 
 @pytest.mark.parametrize(
@@ -266,8 +250,8 @@ def test_the_width_is_that_of_the_report(
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(stored))
     widths, blank = list[str](), style.drawn
 
-    def noted(draw: Any, formats: Any, dpi: int, look: Look) -> dict[str, bytes]:
-        widths.append(look.width)
+    def noted(draw: Any, formats: Any, dpi: int, *look: Any) -> dict[str, bytes]:
+        widths.append(look[0])
         return blank(draw, formats, dpi)
 
     monkeypatch.setattr(style, "drawn", noted)
@@ -300,7 +284,7 @@ def test_names_at_the_ends_of_curves_keep_apart() -> None:
     _, (axes,) = style.panels(3.0)
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     heights = [0.5] * 5 + [0.99, np.nan]
-    name_ends(axes, [CurveEnd(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
+    name_ends(axes, [(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
     places = sorted(text.xyann[1] for text in axes.texts)
     assert len(places) == 6 and np.diff(places).min() >= end_labels.APART - 1e-9
     assert np.mean(places[:5]) == pytest.approx(0.5)  # around their curves

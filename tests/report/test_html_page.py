@@ -19,7 +19,6 @@ from evoexp.report.pages.page_parts import (
     Document,
     Figures,
     FigureText,
-    LogText,
     Player,
     RunText,
     Table,
@@ -39,8 +38,8 @@ HOSTILE = (
 HASH = "0123456789ab"
 ID = HASH + "0" * 52
 LOGS = (
-    LogText(0, f"../../runs/{HASH}/replicates/0000.mcap", "162.8, certified"),
-    LogText(1, f"../../runs/{HASH}/replicates/0001.failed.json", "failed"),
+    (0, f"../../runs/{HASH}/replicates/0000.mcap", "162.8, certified"),
+    (1, f"../../runs/{HASH}/replicates/0001.failed.json", "failed"),
 )
 PLAYER = Player("GA", "motion_1.html")
 

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from evoexp.condition import Prepared
 from evoexp.playback.shapes import Outline
 from evoexp.records import FloatArray
-from evoexp.report.figures import motion_scenes, motion_tables, surfaces
+from evoexp.report.figures import motion_scenes, surfaces
 from evoexp.report.figures.style import drawn
 from evoexp.report.results import motion_geometry
 from evoexp.report.results.stored_results import Results
@@ -199,7 +199,7 @@ DRAWN = ("grid", "three arms", "postures")  # in a plane, in a row, in space; ot
 @pytest.mark.parametrize("name", sorted(SAMPLES))
 def test_every_motion_has_its_pictures(name: str) -> None:
     shown, (planner, problem) = recording(name), condition(name).prepare()
-    scenes, joints = motion_tables.scenes_table([(name, shown)]), motion_tables.joints_table(shown)
+    scenes, joints = motion_scenes.scenes_table([(name, shown)]), motion_scenes.joints_table(shown)
     counts, roles = scenes["element"].value_counts(), [shape.role for shape in shown.shapes]
     assert counts["start"] == roles.count("arm")
     assert counts.get("obstacle", 0) == roles.count("obstacle")
@@ -210,11 +210,10 @@ def test_every_motion_has_its_pictures(name: str) -> None:
     assert np.allclose(first, scale * shown.q[:, 0], atol=1e-6)
     pictures = [
         lambda: motion_scenes.draw_scenes(scenes),
-        lambda: motion_scenes.draw_stages(motion_tables.stages_table(shown)),
         lambda: motion_scenes.draw_joints(joints),
     ]
     if covers := planner.covers(problem):
-        table = motion_tables.covers_table([(name, shown, covers)])
+        table = motion_scenes.covers_table([(name, shown, covers)])
         assert (table["element"] == "cover").sum() == len(covers)
         pictures.append(lambda: motion_scenes.draw_covers(table))
     for axes in pictures[0]().axes:  # the whole way is within the picture
@@ -228,7 +227,7 @@ def test_every_motion_has_its_pictures(name: str) -> None:
 def test_covers_hold_the_bodies_that_they_stand_for(name: str) -> None:
     """Each link's middle lies in a cover, unless it stands still or has no body of its own."""
     shown, (planner, problem) = recording(name), condition(name).prepare()
-    table = motion_tables.covers_table([(name, shown, planner.covers(problem))])
+    table = motion_scenes.covers_table([(name, shown, planner.covers(problem))])
     covers, bodies = (table[table["element"] == element] for element in ("cover", "body"))
     assert set(covers["kind"]) <= {"sphere", "capsule"}
     moving = [shape.name for shape in shown.shapes if shape.role == "arm" and shape.frame >= 0]

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from evoexp.report.figures import matrix
 from evoexp.report.pages import generic, pairwise
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -55,26 +54,12 @@ def test_shares_that_differ_are_tested_pair_by_pair(results: Results) -> None:
     assert not pairwise.difference_rows(results._replace(conditions=(some,)), 0.95)
 
 
-def test_the_matrix_shows_each_pair_from_both_sides(
-    results: Results, settings: ReportSettings
-) -> None:
-    drawings = {d.stem: d for d in generic.page(copies(results, 3), settings).drawings}
-    table = drawings["matrix"].table().set_index(["condition", "other"])
-    assert len(table) == 6
-    for (a, b), row in table.iterrows():
-        assert row["a12"] == pytest.approx(1.0 - table.loc[(b, a), "a12"])
-        assert row["lower"] <= row["a12"] <= row["upper"]
-    assert table.loc[("+0", "+2"), "a12"] > 0.5
-    assert len(matrix.draw_matrix(table.reset_index()).axes[0].texts) == 6
-    assert "matrix" not in {d.stem for d in generic.page(copies(results, 2), settings).drawings}
-
-
 def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSettings) -> None:
     page = generic.page(copies(results, 4), settings)
     names = ("best cost", "CPU time, search [s]")  # all took as many evaluations
     headings = [heading for heading, _ in page.comparisons]
     assert headings == [f"{name}: pairs of conditions" for name in names]
-    stems = ["convergence", "values", "matrix", "scene", "stages", "joints", "covers"]
+    stems = ["convergence", "values", "scene", "joints", "covers"]
     assert [drawing.stem for drawing in page.drawings] == stems
     assert page.tables[0].headers == ("condition", "solved", "certified", "required margin kept")
     assert {"best cost", "CPU time of the search"} <= {q.name for q in page.quantities}

@@ -78,10 +78,10 @@ def test_overrides_and_budgets_are_told_apart() -> None:
     assert sorted(overridden(rows.values())) == ["ga.num_generations", "ga.population_size"]
 
 
-def test_options_that_nothing_records_are_those_that_settings_are_most_like() -> None:
+def test_options_that_nothing_records_are_named_as_such() -> None:
     rows = rows_of(composed("experiment=rana_three_arms"))
-    assert rows["robot"].source == "most like conf/robot/three_planar_2r.yaml"
-    assert rows["robot.arms[2].base_position"].unit == "unit"
+    assert rows["robot"].source == parameters.NOT_RECORDED
+    assert rows["robot.arms[2].base_position"].source == parameters.NOT_RECORDED
 
 
 def test_the_option_that_was_taken_is_named_though_another_one_is_alike(tmp_path: Path) -> None:

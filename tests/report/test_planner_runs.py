@@ -66,16 +66,14 @@ def test_labels_that_tell_problem_and_planner_name_both(both: Results) -> None:
 def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Results) -> None:
     labels = ("plain", "with draws", "three arms: three arms")
     other = [replace(c, label=label) for c, label in zip(both.evolved, labels, strict=True)]
-    scenario = both.evolved[0].condition.scenario.component
     assert names(of_results(other)) == [
-        ("via_point_ga", scenario),
-        ("random_search", scenario),
+        ("via_point_ga", "rana_planar"),
+        ("random_search", "rana_planar"),
         ("via_point_ga", "three arms"),
     ]
-    alike = [replace(c, label=label) for c, label in zip(other, "aba", strict=True)]
-    robots = {c.condition.robot.component for c in alike}
-    tails = robots if len(robots) > 1 else {f"{min(robots)} 1", f"{min(robots)} 2"}
-    assert {n for _, n in names(of_results(alike))} == {f"{scenario}, {each}" for each in tails}
+    alike = [replace(c, label=label, options=()) for c, label in zip(other, "aba", strict=True)]
+    scenario = both.evolved[0].condition.scenario.component
+    assert {n for _, n in names(of_results(alike))} == {f"{scenario} 1", f"{scenario} 2"}
 
 
 def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -> None:
@@ -86,9 +84,8 @@ def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -
 
 
 def test_runs_keep_their_labels_seeds_and_effort(results: Results) -> None:
-    problem = results.evolved[0].condition.scenario.component
     for own, condition in zip(of_results(results.evolved), results.evolved, strict=True):
-        assert (own.planner, own.problem.name) == (condition.label, problem)
+        assert (own.planner, own.problem.name) == (condition.label, "rana_planar")
         assert own.replicates == tuple(condition.summaries.index)
         assert np.array_equal(own.spent, condition.column("collision_queries"))
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from evoexp.report.figures.rank_diagrams import (
+from evoexp.report.figures.effort_curves import (
     critical_difference_table,
     draw_critical_difference,
     draw_profiles,

@@ -79,22 +79,23 @@ def test_no_shipped_experiment_is_taken_for_a_sweep() -> None:
 
 
 def test_effects_are_medians_of_pairs(two_settings: Any) -> None:
-    found = {(e.setting, e.other): e for e in main_effects(two_settings, cost, 0.95, 500)}
+    effects = main_effects(two_settings, cost, 0.95, 500)
+    found = {(e.setting, e.other): e for e in effects.itertuples()}
     assert set(found) == {("ga.size", "100"), ("num_elites", "2")}
     by_hand = []
     for elites, seed in itertools.product("02", range(3)):
         one, other = COSTS["20", elites][seed], COSTS["100", elites][seed]
         by_hand.append(0.0 if one == other else other - one)
     size = found["ga.size", "100"]
-    assert (size.num_pairs, size.difference) == (6, np.median(by_hand))
+    assert (size.pairs, size.difference) == (6, np.median(by_hand))
     assert size.better == pytest.approx(np.mean([(d < 0) + 0.5 * (d == 0) for d in by_hand]))
-    assert size.interval.low <= size.difference <= size.interval.high
+    assert size.low <= size.difference <= size.high
 
 
 def test_only_common_seeds_are_paired() -> None:
     sweep = sweep_of(fake([("x=1", [1.0, 2.0]), ("x=2", [5.0, 5.0])], first=1))
-    (effect,) = main_effects(sweep, cost, 0.95, 50)
-    assert (effect.num_pairs, effect.difference, effect.better) == (1, 3.0, 0.0)
+    (effect,) = main_effects(sweep, cost, 0.95, 50).itertuples()
+    assert (effect.pairs, effect.difference, effect.better) == (1, 3.0, 0.0)
 
 
 def test_grids_hold_every_combination(two_settings: Any) -> None:

@@ -214,13 +214,14 @@ def rules_of(tmp_path: Path, kind: str, more: str = "") -> Rules:
 
 def test_a_rule_fills_in_its_words_and_limits(tmp_path: Path) -> None:
     told = rules_of(tmp_path, "own", OWN)["told"]
-    rule, unjudged = told.about(who="7-DOF: ", metric="cycles"), told.unjudged()
+    rule = told.about({"who": "7-DOF: ", "metric": "cycles"})
+    unjudged = told.about()
     assert (rule.claim, unjudged.claim) == ("7-DOF: a claim of cycles", "…a claim of …")
     assert rule.text == "reproduced if cycles at most 2.5 times"
     assert unjudged.text == "reproduced if … at most 2.5 times"
     assert rule.limits["most"] == 2.5
     with pytest.raises(KeyError, match="metric"):
-        told.about(who="")
+        told.about({"who": ""})
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
             ]
             command = f"evoexp report {experiment}"
         except NothingStored:
-            waiting = [r.unjudged() for r in rules.values() if experiment in r.experiments]
+            waiting = [r.about() for r in rules.values() if experiment in r.experiments]
             rows = [
                 (r.name, r.claim, r.source, r.text, "–", "–", "0", "not run")
                 for r in waiting

@@ -1,6 +1,5 @@
 """Convergence: a quantity against generations and evaluations, over replicates."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,13 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report.figures import groups, marks, records, style
+from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.inference import quantiles
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
 REFERENCE = "reference"
-NAMED = 5  # conditions that a panel names beside the first one
+LINE = 0.14  # [inch] of the height of a figure for each of many curves
 DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
@@ -52,43 +52,18 @@ def draw_cost(table: pd.DataFrame) -> Figure:
 
 
 def draw_best(table: pd.DataFrame) -> Figure:
-    """Draw medians of the best cost only, for many conditions at once.
-
-    Of more conditions than colours each panel names some, beside the first one; the others are
-    grey.
-    """
+    """Draw medians of the best cost only, for many conditions at once, named at their ends."""
     best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
-    positions = sorted(best["position"].unique())
-    if len(positions) <= len(style.CONDITION_COLOURS):
-        figure, (axes,) = style.panels(4.4)
-        _best_curves(axes, best, {k: style.condition_colour(k) for k in positions})
-        style.legend_below(figure, [axes], 3)
-        return figure
-    first, *others = positions
-    named = [[first, *others[k : k + NAMED]] for k in range(0, len(others), NAMED)]
-    colours = style.CONDITION_COLOURS
-    figure, panels = style.panels(3.6, len(named), 2, 0.0)
-    for axes, own in zip(panels, named, strict=True):
-        axes.sharex(panels[0])
-        axes.sharey(panels[0])
-        _best_curves(axes, best, dict(zip(own, colours, strict=False)))
-        axes.legend(loc="upper center", bbox_to_anchor=(0.45, -0.16))
-    return figure
-
-
-def _best_curves(axes: Axes, best: pd.DataFrame, named: Mapping[int, str]) -> None:
-    """Draw the curves of all conditions: those with a colour, by position, and the others grey."""
-    across = _across(best)
-    for (position, condition), curve in groups(best, ["position", "condition"]):
-        x, y = curve[across], curve["median"]
-        if position in named:
-            label = f"{condition} ({_counts(curve)})"
-            axes.plot(x, y, color=named[position], label=label, zorder=3)
-        else:
-            axes.plot(x, y, color=style.FAINT, alpha=0.5, linewidth=0.8, zorder=2)
+    across, curves = _across(best), list(groups(best, ["position", "condition"]))
+    figure, (axes,) = style.panels(max(4.4, LINE * len(curves)))
+    for k, ((_, condition), curve) in enumerate(curves):
+        look = style.curve_look(k) | {"linewidth": 1.2}
+        axes.plot(curve[across], curve["median"], label=f"{condition} ({_counts(curve)})", **look)
     limits = (0, max(1, int(best[across].max())))
     axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")
     style.shorten_thousands(axes.xaxis)
+    name_curves(figure, axes, 3)
+    return figure
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
@@ -162,13 +137,13 @@ def _curves(axes: Axes, table: pd.DataFrame) -> None:
     slope = float(steps.iloc[-1] - steps.iloc[0]) / float(steps.index[-1] - steps.index[0])
     offset = float(steps.iloc[0])
 
-    def forward(generation: Any) -> Any:
-        return offset + slope * np.asarray(generation, dtype=np.float64)
-
-    def backward(evaluations: Any) -> Any:
-        return (np.asarray(evaluations, dtype=np.float64) - offset) / slope
-
-    above = axes.secondary_xaxis("top", functions=(forward, backward))
+    above = axes.secondary_xaxis(
+        "top",
+        functions=(
+            lambda generation: offset + slope * np.asarray(generation, dtype=np.float64),
+            lambda evaluations: (np.asarray(evaluations, dtype=np.float64) - offset) / slope,
+        ),
+    )
     above.set_xlabel("evaluations")
     above.xaxis.set_major_locator(style.few_ticks())
 

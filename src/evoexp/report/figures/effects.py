@@ -6,18 +6,22 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
+from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
-from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results.stored_results import Results
 from evoexp.report.statistics.comparisons import Comparison, Values
 from evoexp.report.statistics.inference import quantile
 
+JITTER = 0.16  # [rows] half the width over which points are spread
+POINTS = 50  # up to so many finite values every one is shown
+FENCE = 1.5  # [interquartile ranges] how far whiskers may reach
+POINT: dict[str, Any] = {"ms": 2.6, "mec": "none", "alpha": 0.5}
 WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn
-CLEAR = 0.22  # [-] of an axis: no number stands so near to the word "never"
 DOT: dict[str, Any] = {"color": style.ARM_COLOURS[0], "markersize": 5}
 OPEN: dict[str, Any] = {"markerfacecolor": "white"}  # the look of what is not significant
 
@@ -59,15 +63,11 @@ def draw_values(table: pd.DataFrame) -> Figure:
         axes.margins(x=0.06)
         axes.xaxis.set_major_locator(style.few_ticks())
         style.shorten_thousands(axes.xaxis)
-        if never is not None:  # named on the axis, and parted from the finite values by a line
-            low, high = axes.get_xlim()
-            between = never - 0.5 * BEYOND / (1.0 + BEYOND) * (never - low)
+        if never is not None:  # named above, and parted from the finite values by a line
+            between = never - 0.5 * BEYOND / (1.0 + BEYOND) * (never - axes.get_xlim()[0])
             axes.axvline(between, color=style.FAINT, linewidth=0.7, linestyle=(0, (1, 2)))
-            greatest = never - CLEAR * (never - low)
-            ticks = [tick for tick in axes.get_xticks() if low <= tick <= greatest]
-            words = axes.xaxis.get_major_formatter().format_ticks(ticks)
-            axes.set_xticks([*ticks, never], [*words, "never"])
-            axes.set_xlim(low, high)
+            place: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "fontsize": 6.5}
+            axes.annotate("never", (never, 1.0), ha="center", va="bottom", **place)
     counts = (
         table[table["quantity"] == quantities[0]]
         .groupby("position")
@@ -80,6 +80,44 @@ def draw_values(table: pd.DataFrame) -> Figure:
     panels[0].set_yticks(list(counts.index), names)
     panels[0].set_ylim(len(labels) - 0.4, -0.6)
     return figure
+
+
+def draw_box(
+    axes: Axes, position: float, values: FloatArray, colour: str, never: float | None = None
+) -> None:
+    """Draw median, quartiles and whiskers of values (n,), and points, along the horizontal axis.
+
+    Infinite values, of runs that never got there, are drawn at `never`; None: they are left out.
+    """
+    ordered = np.sort(values[np.isfinite(values) if never is None else values > -np.inf])
+    if not len(ordered):
+        return
+    lower, median, upper = (quantile(ordered, share) for share in (0.25, 0.5, 0.75))
+    within = ordered
+    if upper < np.inf:
+        reach = FENCE * (upper - lower)
+        within = ordered[(ordered >= lower - reach) & (ordered <= upper + reach)]
+    drawn = np.where(np.isfinite(ordered), ordered, never or 0.0)
+    many = np.isfinite(ordered).sum() > POINTS
+    low, high = float(within[0]), float(within[-1])
+    beyond = (ordered < low) | (ordered > high)
+    ends = {"q1": lower, "med": median, "q3": upper, "whislo": low, "whishi": high}
+    box = {name: value if value < np.inf else never for name, value in ends.items()}
+    axes.bxp(
+        [box | {"fliers": drawn[beyond] if many else []}],
+        positions=[position],
+        orientation="horizontal",
+        widths=0.55,
+        manage_ticks=False,
+        boxprops={"color": colour},
+        whiskerprops={"color": colour},
+        capprops={"color": colour},
+        medianprops={"color": colour, "linewidth": 2.0},
+        flierprops={"marker": "o", "mfc": colour, **POINT},
+    )
+    if not many:
+        beside = position + JITTER * (2.0 * ((np.arange(len(drawn)) * 0.618034) % 1.0) - 1.0)
+        axes.plot(drawn, beside, "o", color=colour, **POINT)
 
 
 def effects_table(

@@ -1,6 +1,6 @@
-"""Proven answers over collision queries: shares of targets reached, and the best lengths."""
+"""Planners compared: shares of targets, best lengths, performance profiles, mean ranks."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,20 +13,29 @@ from evoexp.report.figures import style
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.results.planner_runs import PlannerRuns
 from evoexp.report.statistics.inference import quantiles
+from evoexp.report.statistics.problem_ranks import (
+    Standing,
+    alike,
+    critical_difference,
+    effort_ratios,
+    friedman,
+)
 
 POINTS = 200  # along the axis of effort
 MAX_PANELS = 24  # problems that have a panel of their own
 BEFORE = 0.8  # times the effort of the first proven answer is where curves begin
 PER_LINE = 3  # panels side by side
 
+END = 1.15  # times the largest finite ratio is where a performance profile ends
+LINE = 0.24  # [inch] between names of planners
+BAR = 0.09  # [inch] between bars that join planners
+ABOVE = 0.62  # [inch] of the bar of the critical difference and the axis' numbers
+
 NOTE: dict[str, Any] = {"ha": "center", "va": "center", "color": style.NEUTRAL, "fontsize": 7.5}
 
 
 def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> pd.DataFrame:
-    """Return the share of (problem, target, run) that each planner has reached, over effort.
-
-    The axis of efforts (points,) begins before the first answer of these runs unless it is given.
-    """
+    """Return the share of (problem, target, run) that each planner has reached, over effort."""
     reached: dict[str, list[float]] = {}
     for own in runs:
         for longest in own.problem.targets:
@@ -99,60 +108,135 @@ def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
     """Draw the shares of targets reached in one panel per problem."""
     planners, problems = (list(table[name].unique()) for name in ("planner", "problem"))
     shown = problems[:MAX_PANELS]
-    figure, panels = style.panels(1.75, len(shown), PER_LINE, 0.5)
+    figure, panels = style.panels(1.9, len(shown), PER_LINE, 0.4)
     for axes, problem in zip(panels, shown, strict=True):
         own = table[table["problem"] == problem]
         _draw_share_curves(axes, own, planners)
         axes.set_title(style.shortened(problem, 34), fontweight="normal")
         if not (own["share"].astype(float) > 0.0).any():
             axes.text(0.5, 0.5, "no proven answer", transform=axes.transAxes, **NOTE)
-        if style.begins_line(axes):
-            axes.set_ylabel("share reached")
-        else:
-            axes.tick_params(labelleft=False)
-        if style.ends_column(axes, panels):
-            axes.set_xlabel("collision queries")
+        axes.tick_params(labelleft=style.begins_line(axes))
+        axes.set_ylabel("share reached" if style.begins_line(axes) else "")
+        axes.set_xlabel("collision queries")
     style.legend_below(figure, panels, 4)
     return figure
 
 
 def _draw_share_curves(axes: Axes, table: pd.DataFrame, planners: Sequence[str]) -> None:
-    """Draw a curve for each planner that a table has, in the look of its place among all.
-
-    The name of one that was run on fewer problems than others tells on how many targets.
-    """
+    """Draw the curves; the name of one that was run on fewer problems tells on how many targets."""
     most = int(table["targets"].max())
-    for k, planner in enumerate(planners):
-        curve = table[table["planner"] == planner]
-        if not len(curve):
-            continue
-        x, y = (curve[name].astype(float) for name in ("collision_queries", "share"))
-        targets = int(curve["targets"].iloc[0])
-        count = f" ({targets} of {most})" if targets < most else ""
-        axes.step(x, y, where="post", label=f"{planner}{count}", **style.curve_look(k))
+    counts = table.groupby("planner")["targets"].first()
+    names = {name: f"{name} ({n} of {most})" for name, n in counts.items() if n < most}
+    draw_steps(axes, table, "collision_queries", "share", planners, names)
     axes.set(ylim=(0.0, 1.02))
-    style.log_axis(axes, *_ends(table))
 
 
 def draw_lengths(table: pd.DataFrame) -> Figure:
     """Draw the best proven length so far of one problem."""
     figure, (axes,) = style.panels(3.6)
-    for k, planner in enumerate(table["planner"].unique()):
-        curve = table[table["planner"] == planner]
-        shown, look = curve.replace([np.inf], np.nan), style.curve_look(k)
-        x, colour = shown["collision_queries"], look["color"]
-        axes.fill_between(
-            x, shown["lower"], shown["upper"], step="post", color=colour, alpha=0.18, linewidth=0
-        )
-        axes.step(x, shown["median"], where="post", label=planner, **look)
-    axes.set_xlabel("collision queries")
-    style.log_axis(axes, *_ends(table))
-    axes.set_ylabel("best proven length so far [rad, m]")
+    planners = list(table["planner"].unique())
+    for k, planner in enumerate(planners):
+        band = table[table["planner"] == planner].replace([np.inf], np.nan)
+        look: dict[str, Any] = {"color": style.curve_look(k)["color"], "alpha": 0.18}
+        x, low, high = (band[name] for name in ("collision_queries", "lower", "upper"))
+        axes.fill_between(x, low, high, step="post", linewidth=0, **look)
+    draw_steps(axes, table.replace([np.inf], np.nan), "collision_queries", "median", planners)
+    axes.set(xlabel="collision queries", ylabel="best proven length so far [rad, m]")
     name_curves(figure, axes, 4)
     return figure
 
 
-def _ends(table: pd.DataFrame) -> tuple[float, float]:
-    """Return the ends of the axis of effort, also where no run has a proven answer."""
-    first, last = float(table["collision_queries"].min()), float(table["collision_queries"].max())
-    return first, max(last, 1.01 * first)
+def draw_steps(
+    axes: Axes,
+    table: pd.DataFrame,
+    across: str,
+    up: str,
+    planners: Sequence[str],
+    names: Mapping[Any, str] | None = None,
+) -> None:
+    """Draw a curve over a logarithmic axis for each planner that a table has."""
+    for k, planner in enumerate(planners):
+        curve = table[table["planner"] == planner]
+        if len(curve):
+            x, y = curve[across].astype(float), curve[up].astype(float)
+            label = (names or {}).get(planner, planner)
+            axes.step(x, y, where="post", label=label, **style.curve_look(k))
+    first, last = float(table[across].min()), float(table[across].max())
+    style.log_axis(axes, first, max(last, 1.01 * first))
+
+
+def profiles_table(found: Standing) -> pd.DataFrame:
+    """Return the performance profile of each planner, at every ratio at which one rises."""
+    ratios = effort_ratios(found.efforts)
+    steps = np.unique(np.append(ratios[np.isfinite(ratios)], 1.0))
+    axis = np.append(steps, max(END * steps[-1], 2.0))
+    rows = [
+        (planner, x, np.count_nonzero(own <= x) / len(own), len(own))
+        for planner, own in zip(found.planners, ratios.T, strict=True)
+        for x in axis
+    ]
+    return pd.DataFrame(rows, columns=["planner", "ratio", "share", "problems"])
+
+
+def draw_profiles(table: pd.DataFrame) -> Figure:
+    """Draw performance profiles."""
+    figure, (axes,) = style.panels(3.4)
+    draw_steps(axes, table, "ratio", "share", list(table["planner"].unique()))
+    count = int(table["problems"].iloc[0])
+    axes.set(ylim=(0.0, 1.02), ylabel=f"share of {count} problems")
+    axes.set_xlabel("expected running time to a proven answer, times that of the best planner [–]")
+    name_curves(figure, axes, 3)
+    return figure
+
+
+def critical_difference_table(found: Standing, significance: float) -> pd.DataFrame:
+    """Return mean ranks, best first, with the critical difference."""
+    table = pd.DataFrame({"planner": found.planners, "mean_rank": found.mean_ranks})
+    table["problems"] = len(found.problems)
+    table["friedman_p"] = friedman(found.lengths).p_value
+    table["critical_difference"] = critical_difference(
+        len(found.planners), len(found.problems), significance
+    )
+    return table.sort_values("mean_rank", kind="stable", ignore_index=True)
+
+
+def draw_critical_difference(table: pd.DataFrame) -> Figure:
+    """Draw mean ranks on a line; a bar joins planners that do not differ significantly."""
+    ranks, difference = table["mean_rank"].tolist(), float(table["critical_difference"].iloc[0])
+    groups, count = alike(ranks, difference), len(ranks)
+    left = (count + 1) // 2  # planners named on the left
+    foot = BAR * (len(groups) + 1) + LINE * left  # [inch] below the axis
+    figure = style.figure(ABOVE + foot)
+    axes = figure.add_subplot()
+    axes.set(xlim=(1.0 - 0.45 * (count - 1), count + 0.45 * (count - 1)), ylim=(-foot, ABOVE))
+    axes.axis("off")
+    # the axis of mean ranks, and the critical difference above it
+    is_narrow = figure.get_figwidth() < style.WIDTH
+    words: dict[str, Any] = {"fontsize": 6.0 if is_narrow else 7.5}  # [pt]
+    line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0}
+    axes.plot([1.0, count], [0.0, 0.0], **line)
+    for tick in range(1, count + 1):
+        axes.plot([tick, tick], [0.0, 0.06], **line)
+        if tick % 2 or not is_narrow:
+            axes.text(tick, 0.09, str(tick), ha="center", va="bottom", **words)
+    axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", **words)
+    axes.plot([1.0, 1.0 + difference], [0.4, 0.4], **line)
+    for end in (1.0, 1.0 + difference):
+        axes.plot([end, end], [0.36, 0.44], **line)
+    text = f"critical difference {difference:.2f}"
+    axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", **words)
+    # bars that join planners, and their names
+    for k, (first, last) in enumerate(groups):
+        ends = ranks[first] - 0.008 * count, ranks[last] + 0.008 * count
+        y = -BAR * (k + 1)
+        axes.plot(ends, [y, y], color=style.NEUTRAL, linewidth=3.5, solid_capstyle="butt")
+    for k, row in enumerate(table.itertuples()):
+        on_left = k < left
+        y = -BAR * (len(groups) + 1) - LINE * ((k if on_left else count - 1 - k) + 0.5)
+        end = 1.0 - 0.06 * (count - 1) if on_left else count + 0.06 * (count - 1)
+        rank = float(ranks[k])
+        axes.plot([rank, rank, end], [0.0, y, y], color=style.NEUTRAL, linewidth=0.8)
+        name = style.shortened(str(row.planner), 26)
+        text = f"{name}  {rank:.2f} " if on_left else f" {rank:.2f}  {name}"
+        axes.text(end, y, text, ha="right" if on_left else "left", va="center")
+    return figure

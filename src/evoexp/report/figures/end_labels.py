@@ -1,7 +1,7 @@
 """Names of curves at their right ends: a legend of many is looked up again and again."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,31 +19,18 @@ DOTTED = (0, (1, 1.5))  # so that no line to a name is taken for a curve
 BESIDE = 1.06  # [-] of the width of a panel, where names begin
 
 
-class CurveEnd(NamedTuple):
-    """The end of a curve in a panel: its place, its name, its colour."""
-
-    x: float
-    y: float
-    name: str
-    colour: str
+CurveEnd = tuple[float, float, str, str]  # its place in a panel, x and y; its name, its colour
 
 
 def apart(wanted: FloatArray, gap: float) -> FloatArray:
-    """Return places within 0 to 1 with a gap between neighbours, nearest to the wanted ones (n,).
+    """Return places within 0 to 1 with a gap between neighbours, near the wanted ones (n,), sorted.
 
-    They are sorted. Neighbours that are too close become a block around the mean of what they want.
+    Neighbours that are too close stand around the middle of what they want.
     """
-    gap = min(gap, 1.0 / max(len(wanted) - 1, 1))
-    steps = gap * np.arange(len(wanted))
-    blocks: list[list[float]] = []
-    for place in wanted - steps:  # without gaps the places only have to be in order
-        blocks.append([float(place)])
-        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
-            last = blocks.pop()
-            blocks[-1] += last
-    found = np.concatenate([np.full(len(block), np.mean(block)) for block in blocks] or [steps])
-    last_step = steps[-1] if len(steps) else 0.0
-    return np.asarray(np.clip(found, 0.0, 1.0 - last_step) + steps)
+    steps = min(gap, 1.0 / max(len(wanted) - 1, 1)) * np.arange(len(wanted))
+    free = wanted - steps  # without gaps the places only have to be in order
+    up, down = np.maximum.accumulate(free), np.minimum.accumulate(free[::-1])[::-1]
+    return np.asarray(np.clip(0.5 * (up + down), 0.0, 1.0 - steps[-1:].sum()) + steps)
 
 
 def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:
@@ -52,14 +39,14 @@ def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:
     The panel's limits are set; curves that end at infinity get no name.
     """
     low, high = axes.get_ylim()
-    known = sorted((end for end in ends if np.isfinite(end.y)), key=lambda end: end.y)
-    heights = np.clip([(end.y - low) / (high - low) for end in known], 0.0, 1.0)
-    for end, place in zip(known, apart(np.asarray(heights), gap), strict=True):
-        line = {"arrowstyle": "-", "color": end.colour, "lw": 0.8, "shrinkA": 1.0, "shrinkB": 0.0}
+    known = sorted((end for end in ends if np.isfinite(end[1])), key=lambda end: end[1])
+    heights = np.clip([(y - low) / (high - low) for _, y, *_ in known], 0.0, 1.0)
+    for (x, y, name, colour), place in zip(known, apart(np.asarray(heights), gap), strict=True):
+        line = {"arrowstyle": "-", "color": colour, "lw": 0.8, "shrinkA": 1.0, "shrinkB": 0.0}
         look: dict[str, Any] = {"va": "center", "fontsize": 7.0, "color": style.NEUTRAL}
         axes.annotate(
-            style.shortened(end.name, LONGEST),
-            (end.x, end.y),
+            style.shortened(name, LONGEST),
+            (x, y),
             (BESIDE, place),
             "data",
             "axes fraction",
@@ -70,10 +57,7 @@ def name_ends(axes: Axes, ends: Sequence[CurveEnd], gap: float = APART) -> None:
 
 
 def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
-    """Name the curves of some axes: many of them at their ends, few in a legend below.
-
-    In a figure for a column there is no room beside the axes: there is a legend, too.
-    """
+    """Name the curves of some axes: many of them at their ends, few in a legend below."""
     curves: list[tuple[Any, str]] = list(zip(*axes.get_legend_handles_labels(), strict=True))
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:
         style.legend_below(figure, [axes], columns)
@@ -83,7 +67,7 @@ def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
         x, y = (np.asarray(values, dtype=np.float64) for values in curve.get_data())
         x, y = x[np.isfinite(y)], y[np.isfinite(y)]
         if len(y):
-            end = CurveEnd(float(x[-1]), float(y[-1]), name, curve.get_color())
+            end = float(x[-1]), float(y[-1]), name, str(curve.get_color())
             ends.append((float(y.mean()), end))
     ends.sort(key=lambda each: each[0])  # curves of one end are told apart by their means
     gap = LINE / 72.0 / (HIGH * figure.get_figheight())

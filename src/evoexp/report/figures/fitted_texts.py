@@ -17,33 +17,31 @@ TURNED = 60.0  # [deg] of names along an axis that would touch
 
 def fit_texts(figure: Figure) -> bool:
     """Break titles and names of axes of an arranged figure that are too wide; say if any was."""
-    fitted = False
     parts: list[Figure | SubFigure] = [figure, *figure.subfigs]
-    for part in parts:
-        for text in part.texts:
-            fitted |= _break(text, part.bbox.x1 - text.get_window_extent().x0)
+    rooms = [  # texts, and the room that they have [pixel]
+        (text, part.bbox.x1 - text.get_window_extent().x0) for part in parts for text in part.texts
+    ]
     for axes in figure.axes:
-        # titles that would reach into the next panel, or out of the figure
-        titles = {axes.get_title(where) for where in ("left", "center", "right")} - {""}
-        # a title may go up to the next panel beside its own
+        # a title may go up to the next panel beside its own, or to the edge of the figure
         box, ends = axes.get_window_extent(), [figure.bbox.x1]
         for other in figure.axes:
             near = other.get_window_extent()
             if near.x0 >= box.x1 - 1.0 and near.y1 > box.y0 and near.y0 < box.y1:
                 ends.append(near.x0 if other.get_subplotspec() else box.x1)  # bar: numbers above
-        end = min(ends) - GAP
+        titles = {axes.get_title(where) for where in ("left", "center", "right")} - {""}
         for title in axes.get_children():
             if isinstance(title, Text) and title.get_text() in titles:
                 at_left = title.get_horizontalalignment() == "left"
-                fitted |= _break(
-                    title, end - title.get_window_extent().x0 if at_left else box.width
-                )
+                wide = min(ends) - GAP - title.get_window_extent().x0
+                rooms.append((title, wide if at_left else box.width))
+    fitted = [_break(*each) for each in rooms]
+    for axes in figure.axes:
         if axes.name != "3d":
             box = axes.get_window_extent()
-            fitted |= _break(axes.xaxis.label, box.width)
-            fitted |= _break(axes.yaxis.label, box.height, is_upright=True)
-            fitted |= _part_labels(axes.xaxis)
-    return fitted
+            fitted.append(_break(axes.xaxis.label, box.width))
+            fitted.append(_break(axes.yaxis.label, box.height, is_upright=True))
+            fitted.append(_part_labels(axes.xaxis))
+    return any(fitted)
 
 
 def _part_labels(axis: Axis) -> bool:

@@ -1,68 +1,167 @@
-"""Pictures of any motion: the scene with start and goal, stages, joints, and bodies beside covers.
+"""Pictures of any motion: the scene with start and goal, joints, and bodies beside covers.
 
-The functions draw the tables of `motion_tables` and need nothing else.
+Every table of bodies has one row per body and place; the functions that draw need nothing else.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pinocchio as pin
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from evoexp.playback.colours import OBJECT, OBSTACLE
+from evoexp.playback.recording import Recording
+from evoexp.playback.shapes import Outline, Shape
 from evoexp.records import FloatArray
-from evoexp.report.figures import groups, records, style, surfaces
-from evoexp.report.figures.motion_tables import POSE, SIZE
+from evoexp.report.figures import groups, records, rounded, style, surfaces
 
 VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
 OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
 STANDING = {"obstacle": OBSTACLE, "object": OBJECT}  # colours of bodies that are no robot's
 LINE = 0.012  # [-] of the picture's radius: half the width of links without thickness
 FLOOR = 1.1  # [-] of the picture's radius: half the edge of the part of a half-space that is drawn
+NO_LIMIT = 1e6  # [rad, length unit] from here on a joint has no limit
+POSE = ["x", "y", "z", "qx", "qy", "qz", "qw"]
+SIZE = ["size_1", "size_2", "size_3"]
+COLUMNS = ["panel", "title", "element", "name", "arm", "kind", *SIZE, *POSE, "corners"]
+
+
+def scenes_table(shown: Sequence[tuple[str, Recording]]) -> pd.DataFrame:
+    """Return bodies at start and goal, obstacles and ways of tools, a panel per (title, motion)."""
+    tables = []
+    for panel, (title, recording) in enumerate(shown):
+        rows = [
+            *_bodies(recording, 0, "start"),
+            *_bodies(recording, -1, "goal"),
+            *_still(recording),
+            *_ways(recording),
+        ]
+        tables.append(_table(rows, panel, title, recording))
+    return pd.concat(tables, ignore_index=True)
+
+
+def covers_table(shown: Sequence[tuple[str, Recording, Sequence[Any]]]) -> pd.DataFrame:
+    """Return the exact bodies of robots at their start, and the covers that the search tests.
+
+    Those are rows (Pinocchio's joint, start, end, radius).
+    """
+    tables = []
+    for k, (title, recording, covers) in enumerate(shown):
+        bodies = [row for row in _bodies(recording, 0, "body") if row["element"] == "body"]
+        frames = recording.poses.world[0]
+        own = []
+        for joint, start, end, radius in covers:  # spheres, or capsules between two points
+            place = pin.XYZQUATToSE3(frames[joint - 1]) if joint > 0 else pin.SE3.Identity()
+            pose, length = surfaces.capsule(start, end)
+            drawn = Outline("sphere", (float(radius),))
+            if length:
+                drawn = Outline("capsule", (float(radius), length))
+            own.append(_row("cover", "", 1, drawn, np.asarray(pin.SE3ToXYZQUAT(place * pose))))
+        names = f"{title}: {len(bodies)} exact bodies", f"{len(own)} covers that the search tests"
+        tables.append(_table(bodies, 2 * k, names[0], recording))
+        tables.append(_table(own, 2 * k + 1, names[1], recording))
+    return pd.concat(tables, ignore_index=True)
+
+
+def joints_table(recording: Recording) -> pd.DataFrame:
+    """Return all joints over a motion, with the robot's limits, infinite where there is none."""
+    model, tables = recording.parts[0].scene.model, []
+    limits = np.array([model.lowerPositionLimit, model.upperPositionLimit], dtype=np.float64).T
+    limits = np.where(np.abs(limits) < NO_LIMIT, limits, np.copysign(np.inf, limits))
+    for k, joint in enumerate(recording.joints):
+        scale = 1.0 if joint.prismatic else 180.0 / np.pi
+        columns = {"instant": recording.times, "value": scale * recording.q[:, k]}
+        low, high = scale * limits[k]
+        unit = recording.length_unit if joint.prismatic else "deg"
+        tables.append(pd.DataFrame(columns).assign(joint=joint.name, unit=unit, low=low, high=high))
+    return rounded(pd.concat(tables, ignore_index=True))
+
+
+def _table(rows: Iterable[dict[str, Any]], panel: int, title: str, own: Recording) -> pd.DataFrame:
+    table = pd.DataFrame(list(rows)).assign(panel=panel, title=title)
+    table = table.reindex(columns=COLUMNS)
+    return rounded(table).assign(planar=own.view.planar, length_unit=own.length_unit)
+
+
+def _bodies(recording: Recording, tick: int, element: str) -> Iterable[dict[str, Any]]:
+    """Yield the rows of the bodies that move, and of the robot's that stand, at a tick."""
+    for shape in recording.shapes:
+        if shape.role == "obstacle" or (shape.frame < 0 and element == "goal"):
+            continue
+        pose = _pose(recording, shape, tick)
+        name = "object" if shape.role == "object" else element
+        if not (shape.role == "object" and element == "goal"):
+            yield _row(name, shape.name, shape.arm, shape.outline, pose)
+
+
+def _still(recording: Recording) -> Iterable[dict[str, Any]]:
+    """Yield the rows of obstacles and targets."""
+    for shape in recording.shapes:
+        if shape.role == "obstacle":
+            yield _row("obstacle", shape.name, -1, shape.outline, _pose(recording, shape, 0))
+    for target in recording.targets:
+        yield {
+            "element": "target",
+            "name": target.name,
+            "arm": -1,
+            **dict(zip("xyz", target.point, strict=True)),
+        }
+
+
+def _ways(recording: Recording) -> Iterable[dict[str, Any]]:
+    for arm, way in enumerate(recording.traces):
+        for x, y, z in way:
+            yield {"element": "way", "name": "tool", "arm": arm, "x": x, "y": y, "z": z}
+
+
+def _row(element: str, name: str, arm: int, drawn: Outline, pose: FloatArray) -> dict[str, Any]:
+    corners = surfaces.corners_of(drawn)
+    size = (*drawn.size, 0.0, 0.0, 0.0)[:3]
+    text = "" if corners is None else ";".join(" ".join(f"{v:.5g}" for v in c) for c in corners)
+    return {
+        "element": element,
+        "name": name,
+        "arm": arm,
+        "kind": drawn.kind,
+        **dict(zip(SIZE, size, strict=True)),
+        **dict(zip(POSE, pose, strict=True)),
+        "corners": text,
+    }
+
+
+def _pose(recording: Recording, shape: Shape, tick: int) -> FloatArray:
+    """Return the pose of a body in the world at a tick, (7,)."""
+    if shape.frame < 0:
+        return shape.pose
+    frame = pin.XYZQUATToSE3(recording.poses.world[tick, shape.frame])
+    return np.asarray(pin.SE3ToXYZQUAT(frame * pin.XYZQUATToSE3(shape.pose)))
 
 
 def draw_scenes(table: pd.DataFrame) -> Figure:
-    """Draw one panel per motion; with one motion alone it is seen from above, too."""
-    panels = list(groups(table, ["panel", "title"]))
-    planar = bool(table["planar"].all())
-    alone = len(panels) == 1 and not planar
-    count = 2 if alone else len(panels)
-    lines = -(-count // 2)
-    figure = style.figure(3.5 * lines + 0.3)
-    for k, ((_, title), rows) in enumerate(panels):
-        _panel(figure, (lines, min(count, 2), k + 1), title, rows, planar=planar)
-    if alone:
-        (_, title), rows = panels[0]
-        _panel(figure, (1, 2, 2), "from above", rows, planar=True)
-    _key(figure, table)
-    return figure
-
-
-def draw_stages(table: pd.DataFrame) -> Figure:
-    """Draw one panel per instant, three side by side, all of the same scale."""
-    figure = _panels(table, 3, 2.4, lambda panel: table)
+    """Draw one panel per motion."""
+    figure = _panels(table, 3.5, lambda panel: table[table["panel"] == panel])
     _key(figure, table)
     return figure
 
 
 def draw_covers(table: pd.DataFrame) -> Figure:
     """Draw the exact bodies of each robot beside their covers, in the same scale."""
-    return _panels(table, 2, 3.2, lambda panel: table[table["panel"] // 2 == panel // 2])
+    return _panels(table, 3.2, lambda panel: table[table["panel"] // 2 == panel // 2])
 
 
-def _panels(
-    table: pd.DataFrame, per_line: int, height: float, room: Callable[[int], pd.DataFrame]
-) -> Figure:
-    """Draw lines of panels [inch], each as large as the bodies of the rows it has room for."""
+def _panels(table: pd.DataFrame, height: float, room: Callable[[int], pd.DataFrame]) -> Figure:
+    """Draw panels [inch], two side by side, each as large as the bodies of the rows in its room."""
     panels = list(groups(table, ["panel", "title"]))
-    lines, planar = -(-len(panels) // per_line), bool(table["planar"].all())
+    lines, planar = -(-len(panels) // 2), bool(table["planar"].all())
     figure = style.figure(height * lines + 0.3)
     for k, ((panel, title), rows) in enumerate(panels):
-        _panel(figure, (lines, per_line, k + 1), title, rows, planar=planar, room=room(panel))
+        place = lines, min(len(panels), 2), k + 1
+        _panel(figure, place, title, rows, planar=planar, room=room(panel))
     return figure
 
 
@@ -129,10 +228,10 @@ def _panel(
     rows: pd.DataFrame,
     *,
     planar: bool,
-    room: pd.DataFrame | None = None,
+    room: pd.DataFrame,
 ) -> None:
     """Draw a scene as seen along z, or in space, as large as the bodies of some rows."""
-    low, high = _room(rows if room is None else room)
+    low, high = _room(room)
     spans, unit = high - low, rows["length_unit"].iloc[0]
     middle, radius = 0.5 * (low + high), float(np.sqrt((spans**2).sum())) / 2.0
     bodies = [
@@ -174,16 +273,14 @@ def _panel(
 
 def _key(figure: Figure, table: pd.DataFrame) -> None:
     """Name the elements below the figure."""
-    there = set(table["element"])
     colour = style.arm_colour(0)
-    keys: list[Any] = []
-    if "goal" in there:
-        keys += [Patch(color=colour, label="start"), Patch(color=colour, alpha=0.35, label="goal")]
-    if "obstacle" in there:
-        keys.append(Patch(color=OBSTACLE, alpha=0.4, label="obstacle"))
-    if "object" in there:
-        keys.append(Patch(color=OBJECT, label="carried"))
-    keys.append(style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"))
-    if "target" in there:
-        keys.append(style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"))
-    style.keys_below(figure, keys)
+    keys: dict[str, Any] = {
+        "start": Patch(color=colour, label="start"),
+        "goal": Patch(color=colour, alpha=0.35, label="goal"),
+        "obstacle": Patch(color=OBSTACLE, alpha=0.4, label="obstacle"),
+        "object": Patch(color=OBJECT, label="carried"),
+        "way": style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"),
+        "target": style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"),
+    }
+    there = set(table["element"])
+    style.keys_below(figure, [key for element, key in keys.items() if element in there])

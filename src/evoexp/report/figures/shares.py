@@ -7,12 +7,11 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, style
 from evoexp.report.statistics.inference import Proportion
 
 MARGIN = 0.08  # [-] of the panels' span, beyond the intervals
-NEARLY_ALL = 60.0  # [%] a span from which on the panels show all percentages, 0 to 100
+NEARLY_ALL = 60.0  # [%] a span from which on the axis has a number at every quarter
 
 
 def shares_table(
@@ -32,12 +31,14 @@ def shares_table(
 
 
 def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure:
-    """Draw one panel per quantity, one row per condition; panels are equally wide [%]."""
+    """Draw one panel per quantity, one row per condition, in one scale [%]."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}
     figure, panels = style.panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
-    ranges = _ranges(table)
+    known = 100 * table.loc[table["total"] > 0, ["lower", "upper", "printed"]].to_numpy(np.float64)
+    low, high = (np.nanmin(known), np.nanmax(known)) if known.size else (0.0, 100.0)
+    beyond = MARGIN * max(high - low, 1.0)
     for axes, quantity in zip(panels, quantities, strict=True):
         every = table[table["quantity"] == quantity]
         own = every[every["total"] > 0]
@@ -53,29 +54,11 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
         if len(own):
             for printed in own["printed"].dropna().unique():
                 marks.dashed(axes, 100 * printed)
-            axes.set_xlim(*ranges[quantity])
-        whole = len(own) and np.ptp(ranges[quantity]) > 100.0
-        axes.xaxis.set_major_locator(MultipleLocator(25.0) if whole else style.few_ticks())
+        axes.set_xlim(low - beyond, high + beyond)
+        is_wide = high - low >= NEARLY_ALL
+        axes.xaxis.set_major_locator(MultipleLocator(25.0) if is_wide else style.few_ticks())
         axes.set_xlabel(label)
         axes.set_title(quantity, fontsize=7.5)
     panels[0].set_yticks(list(rows_of.values()), [labels[position] for position in rows_of])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     return figure
-
-
-def _ranges(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
-    """Return the range of each quantity's axis [%]; all are equally wide."""
-    found = {}
-    for quantity, rows in groups(table[table["total"] > 0], "quantity"):
-        values: FloatArray = 100 * rows[["lower", "upper", "printed"]].to_numpy()
-        found[str(quantity)] = float(np.nanmin(values)), float(np.nanmax(values))
-    span = max((high - low for low, high in found.values()), default=0.0)
-    beyond = MARGIN * max(span, 1.0)
-    if span >= NEARLY_ALL:
-        return dict.fromkeys(found, (-beyond, 100.0 + beyond))
-    # the middle of a panel's own range is the middle of its axis, but for the ends at 0 and 100
-    ranges = {}
-    for quantity, (low, high) in found.items():
-        first = min(max(0.5 * (low + high - span), 0.0), 100.0 - span)
-        ranges[quantity] = first - beyond, first + span + beyond
-    return ranges

@@ -1,9 +1,13 @@
 """The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
 
+import functools
 import io
-from collections.abc import Callable, Iterable, Sequence
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextvars import ContextVar
-from typing import Any, Literal, NamedTuple
+from importlib import resources
+from logging.handlers import BufferingHandler
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import pandas as pd
@@ -15,8 +19,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from evoexp.errors import SettingError, brief
 from evoexp.report.figures.fitted_texts import fit_texts
-from evoexp.report.figures.style_files import own_style, read_style_file
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -41,14 +45,6 @@ WIDTH = 7.2  # [inch] of a figure over the whole page
 SMALLEST_TEXT = 3.0  # [pt] of a legend whose names are wide
 
 
-class Look(NamedTuple):
-    """How figures are drawn."""
-
-    width: Literal["page", "column"] = "page"  # over the whole page, or over one of two columns
-    # Path of a matplotlib style file, applied over evoexp's own style; None: that alone
-    style: str | None = None
-
-
 class _Scale(NamedTuple):
     """Shares of the sizes of a figure over the whole page: its width, its height, its text."""
 
@@ -62,7 +58,6 @@ _scale: ContextVar[_Scale] = ContextVar("_scale", default=_SCALES["page"])
 _SCALED = ("size", "labelpad", "handlelength", ".major.pad", "_pad", "linewidth")
 """Endings of the names of parameters that are sizes of text, or distances between parts."""
 
-PLAIN = Look()
 _FONT = b"'DejaVu Sans'"  # as matplotlib names it in an SVG
 _FONTS = b"'DejaVu Sans', Verdana, sans-serif"  # Verdana's letters are as wide
 
@@ -75,7 +70,11 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 
 def drawn(
-    draw: Callable[[], Figure], formats: Sequence[str], dpi: int, look: Look = PLAIN
+    draw: Callable[[], Figure],
+    formats: Sequence[str],
+    dpi: int,
+    width: str = "page",
+    style_file: str | None = None,
 ) -> dict[str, bytes]:
     """Draw a figure in evoexp's style, whatever the user's own settings are, as a file per format.
 
@@ -84,15 +83,17 @@ def drawn(
     Raises:
         SettingError: If the style file is none of matplotlib's.
     """
-    scale = _SCALES[look.width]
+    scale = _SCALES[width]
     with mpl.rc_context():
         mpl.rcdefaults()
-        for name, value in own_style().items():
-            is_scaled = isinstance(value, float) and name.endswith(_SCALED)
-            mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
-        if look.style is not None:
-            for name, value in read_style_file(look.style).items():
-                mpl.rcParams[name] = value  # type: ignore[index]
+        scaled = {
+            name: value * scale.text
+            if isinstance(value, float) and name.endswith(_SCALED)
+            else value
+            for name, value in _own_style().items()
+        }
+        theirs = _style_file(style_file) if style_file else {}
+        mpl.rcParams.update(scaled | theirs)  # type: ignore[arg-type]
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         token = _scale.set(scale)
         try:
@@ -105,6 +106,33 @@ def drawn(
     if "svg" in images:
         images["svg"] = images["svg"].replace(_FONT, _FONTS)
     return images
+
+
+@functools.cache
+def _own_style() -> Mapping[str, Any]:
+    """Return the parameters of evoexp's own style."""
+    with resources.as_file(resources.files("evoexp") / "assets/report.mplstyle") as path:
+        own = mpl.rc_params_from_file(path, use_default_template=False)
+    return {str(name): value for name, value in own.items()}
+
+
+def _style_file(path: str) -> dict[str, Any]:
+    """Return the parameters that a matplotlib style file sets, but those that name files' ids."""
+    logger, handler = logging.getLogger("matplotlib"), BufferingHandler(10_000)
+    handler.setLevel(logging.WARNING)  # matplotlib logs what a style file has wrong
+    logger.addHandler(handler)
+    style, reasons = dict[str, Any](), list[str]()
+    try:
+        theirs = mpl.rc_params_from_file(path, use_default_template=False)
+        style = {str(name): value for name, value in theirs.items() if name != "svg.hashsalt"}
+    except (OSError, ValueError) as error:
+        reasons.append(str(error))
+    finally:
+        logger.removeHandler(handler)
+    if lines := [*(record.getMessage() for record in handler.buffer), *reasons]:
+        wrong = brief(lines[0].strip().partition("\n")[0])
+        raise SettingError("report.style", f"a matplotlib style file ({wrong})", path)
+    return style
 
 
 def _images(figure: Figure, formats: Sequence[str], dpi: int) -> dict[str, bytes]:
@@ -152,15 +180,6 @@ def begins_line(axes: Axes) -> bool:
     return place is not None and place.is_first_col()
 
 
-def ends_column(axes: Axes, panels: Sequence[Axes]) -> bool:
-    """Whether no other panel of a grid, filled line by line, stands below a panel."""
-    places = [place for panel in panels if (place := panel.get_subplotspec()) is not None]
-    own = axes.get_subplotspec()
-    return own is not None and not any(
-        place.colspan == own.colspan and place.rowspan.start > own.rowspan.start for place in places
-    )
-
-
 def arm_colour(arm: int) -> str:
     """Return the colour of an arm, counted from 0."""
     return ARM_COLOURS[arm % len(ARM_COLOURS)]
@@ -172,10 +191,7 @@ def condition_colour(position: int) -> str:
 
 
 def curve_look(position: int) -> dict[str, Any]:
-    """Return the look of one of many curves: six colours, then the next line style.
-
-    A later curve is thinner, so that one below it is seen where both are equal.
-    """
+    """Return the look of one of many curves: six colours, then the next line style."""
     line, colour = divmod(position, NUM_CURVE_COLOURS)
     return {
         "color": CONDITION_COLOURS[colour],
@@ -192,11 +208,7 @@ def shortened(text: str, most: int) -> str:
 
 
 def row_colour(position: int, count: int) -> str:
-    """Return the colour of a condition that has a row with its name to itself.
-
-    Where there are more conditions than colours none is repeated, which would join what does not
-    belong together: the first condition has its colour, all others are grey.
-    """
+    """Return the colour of a row; of more conditions than colours only the first has one."""
     if count <= len(CONDITION_COLOURS) or position == 0:
         return condition_colour(position)
     return NEUTRAL
@@ -262,10 +274,7 @@ def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D
 def keys_below(
     figure: Figure | SubFigure, keys: Sequence[Artist], columns: int | None = None
 ) -> None:
-    """Put a legend under the whole figure, in as many columns as are wanted (None: all) and fit.
-
-    Names that are wider than the figure are written smaller.
-    """
+    """Put a legend under the whole figure, in as many columns as are wanted (None: all) and fit."""
     count, look = max(columns or len(keys), 1), dict[str, Any](loc="outside lower center")
     legend = figure.legend(handles=keys, ncols=count, **look)
     size = float(legend.get_texts()[0].get_fontsize()) if keys else SMALLEST_TEXT

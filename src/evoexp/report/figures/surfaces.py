@@ -46,14 +46,17 @@ def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> Flo
         return _hull(corners)
     if kind == "box":
         return _hull(0.5 * size * np.array(list(itertools.product((-1.0, 1.0), repeat=3))))
+    turn = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    rise = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * ALONG + 1)[:, None]
+    around = np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise) + 0.0 * turn
+    ball = np.stack(around, axis=-1).reshape(-1, 3)
     if kind in ("sphere", "ellipsoid"):
-        half = size if kind == "ellipsoid" else np.full(3, size[0])
-        return _turned(*_round_ends(1.0, 0.0)) * half
-    radius, middle = float(size[0]), 0.5 * float(size[1])
+        return _hull(ball * (size if kind == "ellipsoid" else size[0]))
+    up = np.array([0.0, 0.0, 0.5 * float(size[1])])
     if kind == "capsule":
-        return _turned(*_round_ends(radius, middle))
-    tip = radius if kind == "cylinder" else 0.0
-    return _turned(np.array([0.0, tip, radius, 0.0]), np.array([middle, middle, -middle, -middle]))
+        return _hull(np.vstack([size[0] * ball - up, size[0] * ball + up]))
+    circle = size[0] * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(AROUND)])
+    return _hull(np.vstack([circle - up, circle * (kind == "cylinder") + up]))
 
 
 def capsule(start: FloatArray, end: FloatArray) -> tuple[pin.SE3, float]:
@@ -106,27 +109,6 @@ def _hull(points: FloatArray) -> FloatArray:
     inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
     triangles[inward] = triangles[inward, ::-1]
     return np.asarray(triangles)
-
-
-def _round_ends(radius: float, half: float) -> tuple[FloatArray, FloatArray]:
-    """Return radii and heights of a capsule's outline, from its upper end to its lower one."""
-    rise = np.linspace(0.5 * np.pi, 0.0, ALONG + 1)
-    wide, high = radius * np.cos(rise), half + radius * np.sin(rise)
-    return np.concatenate([wide, wide[::-1]]), np.concatenate([high, -high[::-1]])
-
-
-def _turned(radii: FloatArray, heights: FloatArray) -> FloatArray:
-    """Return the triangles of an outline turned around z, given from its upper end on."""
-    turn = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
-    rings = np.stack([x, y, np.outer(heights, np.ones(AROUND + 1))], axis=-1)
-    a, b = rings[:-1, :-1], rings[1:, :-1]
-    c, d = rings[1:, 1:], rings[:-1, 1:]
-    found = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)])
-    found = found.reshape(-1, 3, 3)
-    x, y, z = found.transpose(1, 0, 2)
-    areas = np.cross(y - x, z - x)
-    return np.asarray(found[(areas**2).sum(axis=1) > 0.0])
 
 
 def space(

@@ -1,6 +1,5 @@
 """A sweep at a glance: a quantity over its settings, their effects, and convergence in facets."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -10,14 +9,15 @@ from matplotlib.figure import Figure
 
 from evoexp.report.figures import groups, marks, records, style
 from evoexp.report.figures.convergence import NAMES, cost_table
-from evoexp.report.figures.end_labels import CurveEnd, name_ends
-from evoexp.report.figures.matrix import DARK, LUMINANCE
+from evoexp.report.figures.end_labels import name_ends
 from evoexp.report.results.stored_results import Results
-from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled
+from evoexp.report.results.swept_settings import Sweep, labelled
 from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import quantile
 
 PER_LINE = 3  # panels side by side
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue (ITU-R BT.709)
+DARK = 0.46  # [-] luminance below which a cell is dark
 MOST_PANELS = 18
 SETTLED = 0.05  # [-] of a run, after which the panels show all costs
 ORDINAL, PALEST = "viridis", 0.8  # colours of values that have an order, the palest to be read
@@ -97,7 +97,7 @@ def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
         axes.errorbar(own["column"], own["median"], yerr=errors, capsize=2.0, **look)
         last = own.iloc[-1]
         place = float(last["column"]), float(last["median"])
-        ends.append(CurveEnd(*place, panel, style.condition_colour(k)))
+        ends.append((*place, panel, style.condition_colour(k)))
     ticks = table.drop_duplicates("column").sort_values("column")
     axes.set_xticks(ticks["column"], ticks["x"])
     axes.margins(x=0.05)
@@ -105,16 +105,6 @@ def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
     if any(panels):
         name_ends(axes, ends)
     return figure
-
-
-def effect_table(rows: Sequence[MainEffect]) -> pd.DataFrame:
-    """Return main effects, one per row; columns of `MainEffect`, the interval as low and high."""
-    found = [
-        (r.base, r.setting, r.first, r.other, r.num_pairs, r.difference, *r.interval, r.better)
-        for r in rows
-    ]
-    names = ["base", "setting", "first", "other", "pairs", "difference", "low", "high", "better"]
-    return pd.DataFrame(found, columns=names)
 
 
 def draw_effects(table: pd.DataFrame) -> Figure:
@@ -176,18 +166,14 @@ def draw_convergence(table: pd.DataFrame) -> Figure:
             axes.plot(curve["evaluations"], curve["median"], color=colours[level], linewidth=1.1)
             last = curve.iloc[-1]
             place = float(last["evaluations"]), float(last["median"])
-            ends.append(CurveEnd(*place, str(last["value"]), colours[level]))
-        # costs from the lowest end to the highest one of the settled curves
-        known: list[float] = []
-        for _, curve in groups(of_base, "condition"):
-            medians = curve["median"].to_numpy(np.float64)
-            known += [medians[-1], medians[int(SETTLED * len(medians))]]
-        settled = [value for value in known if np.isfinite(value)]
-        low, high = (min(settled), max(settled)) if settled else (0.0, 1.0)
+            ends.append((*place, str(last["value"]), colours[level]))
+        # costs but for the first ones, which are far above the others
+        settled = of_base[of_base["generation"] >= SETTLED * of_base["generation"].max()]["median"]
+        low, high = (settled.min(), settled.max()) if settled.notna().any() else (0.0, 1.0)
         room = 0.05 * (high - low) or 1.0
         axes.set(xlim=(0.0, float(own["evaluations"].max())), ylim=(low - room, high + room))
         axes.set_title("\n".join(word for word in (base, facet) if word))
-        axes.set_xlabel("evaluations" if style.ends_column(axes, axes_of) else "")
+        axes.set_xlabel("evaluations")
         axes.set_ylabel("best cost so far" if style.begins_line(axes) else "")
         axes.xaxis.set_major_locator(style.few_ticks())
         style.shorten_thousands(axes.xaxis)

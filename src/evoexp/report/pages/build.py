@@ -109,11 +109,11 @@ def stale_files(report: ReportFiles) -> list[Path]:
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     """Return the files of one figure: pictures, data rows, sidecar."""
-    from evoexp.report.figures.style import Look, drawn
+    from evoexp.report.figures.style import drawn
 
     table = drawing.table()
-    look = Look(settings.width, settings.style)
-    images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi, look)
+    look = settings.dpi, settings.width, settings.style
+    images = drawn(lambda: drawing.draw(table), settings.formats, *look)
     pictures = {f"{drawing.stem}.{kind}": image for kind, image in images.items()}
     rows = table.to_csv(index=False, lineterminator="\n").encode()
     sidecar = {

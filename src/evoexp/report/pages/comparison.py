@@ -1,4 +1,7 @@
-"""The page of `evoexp compare`: planners in one currency, by their proven answers alone."""
+"""The page of `evoexp compare`: planners in one currency, by their proven answers alone.
+
+The functions give what the page `comparison` of `page.yaml` names.
+"""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -9,18 +12,17 @@ import pandas as pd
 
 from evoexp.errors import NothingStored
 from evoexp.planners.answers import num_body_tests
-from evoexp.records import FloatArray
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.pages import markdown
 from evoexp.report.pages.page_builder import own_page
 from evoexp.report.pages.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.best_known import shipped_best_known
-from evoexp.report.results.given_data import MARK, GivenData
+from evoexp.report.results.given_data import GivenData
 from evoexp.report.results.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.results.run_measures import search_seconds
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.statistics.comparisons import Comparison, compared
+from evoexp.report.statistics.comparisons import Comparison, adjusted, compare
 from evoexp.report.statistics.inference import (
     Interval,
     Proportion,
@@ -30,7 +32,12 @@ from evoexp.report.statistics.inference import (
     quantile,
     spread,
 )
-from evoexp.report.statistics.problem_ranks import standing
+from evoexp.report.statistics.problem_ranks import (
+    Standing,
+    critical_difference,
+    friedman,
+    standing,
+)
 
 
 class Rated(NamedTuple):
@@ -79,70 +86,38 @@ def page(
     return own_page("comparison", results, settings, runs=runs, given=given)
 
 
-# what the page `comparison` of `page.yaml` names
-
-
 ranks = standing
 compared_conditions = stored_conditions
 
 
-def more_panels(runs: Sequence[PlannerRuns]) -> str:
-    """Tell how many problems have no panel; empty if all have one."""
-    count = len(problem_order(runs))
-    return f" The first {MAX_PANELS} of {count}; the CSV has all." if count > MAX_PANELS else ""
-
-
-def given_words(given: GivenData | None) -> str:
-    """Say whose word the given answers are; empty if none is given."""
-    if given is None:
-        return ""
-    return (
-        f" Planners marked{MARK} were not run here: their answers count as {given.name} "
-        f"(SHA-256 {given.sha256[:12]}…) tells them, the certifier has not seen them, and as seeds "
-        "are not common they are not compared pair by pair."
-    )
-
-
-def unequal(runs: Sequence[PlannerRuns]) -> str:
-    """Warn where planners were run on different problems; empty if all were run on the same."""
-    problems: dict[str, set[str]] = {}
-    for own in runs:
-        problems.setdefault(own.planner, set()).add(own.problem.name)
-    if len({frozenset(names) for names in problems.values()}) == 1:
-        return ""
-    return (
-        " Each planner's curve is over the problems that it was run on, which are not the same for "
-        "all: compare them problem by problem. In brackets: targets of those run on fewer."
-    )
-
-
 def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
     """Return the conditions that have motions, rated by their proven answers."""
-    return [_rated(own, settings) for own in runs]
+    rows = []
+    for own in runs:
+        effort, reached = own.first_reached()
+        levels = settings.confidence, settings.num_resamples
+        row = Rated(
+            condition=own.label,
+            planner=own.planner,
+            problem=own.problem.name,
+            runs=len(own.replicates),
+            proven=int(reached.sum()),
+            first_own=np.nan,
+            queries=expected_effort(effort, reached),
+            interval=expected_interval(effort, reached, *levels),
+            lengths=spread(own.best_lengths),
+            straight=own.problem.straight,
+            best_known=own.problem.best_known,
+            unit=own.problem.unit,
+            refuted=own.condition.verdicts.solved_refuted if own.condition else 0,
+            judged=own.condition.verdicts.judged if own.condition else 0,
+        )
+        rows.append(row if own.condition is None else _with_coins(row, own, own.condition))
+    return rows
 
 
-def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
-    condition = own.condition
-    effort, reached = own.first_reached()
-    verdicts = condition.verdicts if condition else None
-    row = Rated(
-        condition=own.label,
-        planner=own.planner,
-        problem=own.problem.name,
-        runs=len(own.replicates),
-        proven=int(reached.sum()),
-        first_own=np.nan,
-        queries=expected_effort(effort, reached),
-        interval=expected_interval(effort, reached, settings.confidence, settings.num_resamples),
-        lengths=spread(own.best_lengths),
-        straight=own.problem.straight,
-        best_known=own.problem.best_known,
-        unit=own.problem.unit,
-        refuted=verdicts.solved_refuted if verdicts else 0,
-        judged=verdicts.judged if verdicts else 0,
-    )
-    if condition is None:
-        return row
+def _with_coins(row: Rated, own: PlannerRuns, condition: ConditionResults) -> Rated:
+    """Return a row with what only runs tell that were run here."""
     solved = own.table[own.table["solved"].astype(bool)]
     first = solved.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
     spent = {"evaluations": condition.column("evaluations"), "cpu_s": search_seconds(condition)}
@@ -212,20 +187,33 @@ def effort_text(queries: float) -> str:
 def compared_lengths(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare the planners of each problem."""
-    stored = [(own, own.condition) for own in runs if own.condition is not None]
-    by_label = {own.label: own for own, _ in stored}
-    pairs = [
-        (first, second)
-        for (a, first), (b, second) in itertools.combinations(stored, 2)
+    """Compare the planners of each problem, those that were run here."""
+    rows = [
+        compare(f"{a.label} – {b.label}", a.best_lengths, b.best_lengths, True, settings.confidence)
+        for a, b in itertools.combinations([own for own in runs if own.condition is not None], 2)
         if a.problem == b.problem
     ]
+    return (("best proven length", tuple(adjusted(rows))),) if rows else ()
 
-    def lengths(condition: ConditionResults) -> FloatArray:
-        return by_label[condition.label].best_lengths
 
-    rows = compared(pairs, lengths, settings, named=lambda a, b: f"{a.label} – {b.label}")
-    return (("best proven length", rows),) if rows else ()
+def rank_rows(ranks: Standing) -> list[tuple[str, ...]]:
+    """Return mean ranks, best first; none where there is but one planner, or one problem."""
+    if not ranks.can_be_profiled:
+        return []
+    lengths = ranks.lengths
+    best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
+    return [
+        (
+            planner,
+            f"{ranks.mean_ranks[k]:.2f}",
+            markdown.share(int(best[:, k].sum()), len(lengths)),
+            markdown.share(int(np.isfinite(lengths[:, k]).sum()), len(lengths)),
+            markdown.share(int(np.isfinite(ranks.efforts[:, k]).sum()), len(lengths)),
+        )
+        for k, planner in sorted(
+            enumerate(ranks.planners), key=lambda each: ranks.mean_ranks[each[0]]
+        )
+    ]
 
 
 def as_csv(rows: Sequence[Rated]) -> bytes:
@@ -260,5 +248,23 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "ranked_conditions": lambda runs, ranks: stored_conditions(
         own for own in runs if own.problem.name in ranks.problems
     ),
-    "one_problem": lambda runs: len(problem_order(runs)) == 1,
+    "num_problems": lambda runs: len(problem_order(runs)),
+    "one_problem": lambda num_problems: num_problems == 1,
+    "hidden_problems": lambda num_problems: num_problems > MAX_PANELS,  # without a panel
+    # planners were run on different problems
+    "unequal": lambda runs: (
+        len({frozenset(b.problem.name for b in runs if b.planner == a.planner) for a in runs}) > 1
+    ),
+    "left_out": lambda ranks: ", ".join(ranks.left_out),
+    "outsiders": lambda ranks: ", ".join(ranks.outsiders),
+    "friedman_test": lambda ranks: friedman(ranks.lengths),
+    "ranks_differ": lambda ranks, settings: (
+        ranks.can_be_tested and friedman(ranks.lengths).p_value < settings.significance
+    ),
+    "ranks_are_alike": lambda ranks, ranks_differ: ranks.can_be_tested and not ranks_differ,
+    "nemenyi": lambda ranks, settings: critical_difference(
+        len(ranks.planners), len(ranks.problems), settings.significance
+    ),
+    # problems that no planner has a proven answer on
+    "never_proven": lambda ranks: int(np.isinf(ranks.efforts).all(axis=1).sum()),
 }

@@ -140,10 +140,7 @@ def written(template: str, runs: Mapping[str, str] | None = None, **values: Any)
 
 
 def inline(text: str, hashes: frozenset[str] = frozenset()) -> Markup:
-    """Return anybody's text as HTML: words between grave accents as code, all else as it is.
-
-    Codes that are one of the hashes link to the place of their run.
-    """
+    """Return anybody's text as HTML: words between grave accents as code, all else as it is."""
 
     def linked(code: re.Match[str]) -> str:
         return f'<a href="#run-{code[1]}">{code[0]}</a>' if code[1] in hashes else code[0]

@@ -10,7 +10,6 @@ from evoexp.report.pages.page_parts import (
     Document,
     Figures,
     FigureText,
-    LogText,
     Page,
     Player,
     RunText,
@@ -27,10 +26,6 @@ from evoexp.report.statistics.inference import Proportion
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
 LONGEST_NAME = 40  # letters of a table's heading in the name of its file
-PARTS = (
-    "In brackets: the conditions that have a value, where not all have it. A planner alone stands "
-    "for it on all problems, a problem alone for all of its planners."
-)
 BETWEEN = " · "  # the parts of a label of a problem and a planner
 CLAIMS, FAILURES = "Claims", "Failures"  # headings
 
@@ -100,16 +95,13 @@ def _run(c: ConditionResults) -> RunText:
         return Path("../..", *path.parts[-4:]).as_posix()  # runs/<hash>/replicates/<file>
 
     words = {True: ", certified", False: ", refuted"}
-    results = {
-        int(k): f"{markdown.number(float(cost))}{words.get(certified, '')}"
-        for k, cost, certified in zip(
-            c.summaries.index, c.column("best_cost"), c.column("certified"), strict=True
-        )
-    }
-    done = (LogText(k, address(c.run.log_path(k)), text) for k, text in results.items())
-    failed = (LogText(k, address(c.run.failure_path(k)), "failed") for k in c.failures)
-    logs = tuple(sorted((*done, *failed)))
-    return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, logs)
+    logs = [(k, address(c.run.failure_path(k)), "failed") for k in c.failures]
+    for k, cost, certified in zip(
+        map(int, c.summaries.index), c.column("best_cost"), c.column("certified"), strict=True
+    ):
+        result = f"{markdown.number(float(cost))}{words.get(certified, '')}"
+        logs.append((k, address(c.run.log_path(k)), result))
+    return RunText(c.label, c.condition.id, c.done, c.failed, c.is_reference, tuple(sorted(logs)))
 
 
 def _provenance(conditions: Sequence[ConditionResults]) -> str:
@@ -219,45 +211,18 @@ def _parameters(results: Results) -> Table:
         for name in ordered
         for parameter, labels in by_name[name].items()
     ]
-    return _table("parameters", rows)._replace(note=PARTS * have_two_parts(every))
-
-
-def have_two_parts(labels: Sequence[str]) -> bool:
-    """Whether all labels are of a problem and a planner, and some share one."""
-    parts = [label.split(BETWEEN) for label in labels]
-    names = {part for own in parts for part in own}
-    return all(len(own) == 2 for own in parts) and len(names) < 2 * len(parts)
+    return _table("parameters", rows)
 
 
 def in_few_words(labels: Sequence[str], every: Sequence[str]) -> str:
-    """Return some of every label of a page; a part of them stands for all labels that have it.
+    """Return some of every label of a page; a part stands for all labels that have it.
 
-    "RRT" for "box · RRT, cage · RRT" if no other label ends so, "box" if these are all of its
-    labels, "GA, RRT on box, cage" or "GA, RRT except on shelf" for parts of them; the labels
-    themselves where they have not two parts.
+    "RRT" for "box · RRT, cage · RRT" if no other label has this part.
     """
-    if not have_two_parts(every):
-        return ", ".join(labels)
-    parts = [(label.split(BETWEEN)[0], label.split(BETWEEN)[1]) for label in every]
-    chosen = {own for own, label in zip(parts, every, strict=True) if label in set(labels)}
-    turned, chosen_turned = [own[::-1] for own in parts], {own[::-1] for own in chosen}
-    found = _grouped(chosen, parts), _grouped(chosen_turned, turned)
-    return min((", ".join(labels), *found), key=len)
-
-
-def _grouped(chosen: set[tuple[str, str]], parts: Sequence[tuple[str, str]]) -> str:
-    """Return pairs by their second parts, those together that are chosen of the same first ones."""
-    groups: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
-    for second in dict.fromkeys(own[1] for own in parts):
-        own = [pair for pair in parts if pair[1] == second]
-        in_it = tuple(first for first, _ in own if (first, second) in chosen)
-        out = tuple(first for first, _ in own if (first, second) not in chosen)
-        if in_it:
-            groups.setdefault((in_it, out), []).append(second)
-    words = []
-    for (in_it, out), names in groups.items():
-        where = (
-            f" except on {', '.join(out)}" if len(out) < len(in_it) else f" on {', '.join(in_it)}"
-        )
-        words.append(", ".join(names) + where * bool(out))
-    return "; ".join(words)
+    words, rest = list[str](), list(labels)
+    for part in dict.fromkeys(part for label in labels for part in label.split(BETWEEN)):
+        having = [label for label in every if part in label.split(BETWEEN)]
+        if len(having) > 1 and set(having) <= set(labels) and set(having) & set(rest):
+            words.append(part)
+            rest = [label for label in rest if label not in having]
+    return ", ".join((*words, *rest))

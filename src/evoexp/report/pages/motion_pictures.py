@@ -1,5 +1,6 @@
 """Pictures of the motions that any planner found: scene, stages, joints, covers."""
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -27,30 +28,29 @@ def players_of(drawings: Iterable[Drawing], experiment: str) -> dict[tuple[str, 
     players = dict[tuple[str, int], Player]()
     for c, k in {run.key: run for drawing in drawings for run in drawing.plays}.values():
         title = JOIN.join(dict.fromkeys(word for word in (experiment, c.label) if word))
-        try:
-            motion = record(c.condition, c.solutions[k], Heading(title, k))
-        except NoMotion:
-            continue
-        words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
-        file = f"motion_{c.condition.id[:12]}_{k:04d}.html"
-        players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
+        if motion := _recorded(c, k, title):
+            words = f"{c.label}, replicate {k}: {VERDICTS[motion.verdict.certified]}"
+            file = f"motion_{c.condition.id[:12]}_{k:04d}.html"
+            players[c.condition.id, k] = Player(words, file, player_page.page([motion]))
     return players
+
+
+def _recorded(c: ConditionResults, replicate: int, title: str) -> Recording | None:
+    """Return the motion of a replicate; None if its solution is none."""
+    try:
+        return record(c.condition, c.solutions[replicate], Heading(title, replicate))
+    except NoMotion:
+        return None
 
 
 def best_motions(results: Results) -> list[ShownMotion]:
     """Return the motions of the conditions with the least costs that have one, at most `MOST`."""
-    found = list[ShownMotion]()
-    for condition in sorted(results.with_data, key=_best_cost):
-        if len(found) == MOST:
-            break
-        replicate = condition.best_replicate
-        heading = Heading(condition.label, replicate)
-        try:
-            motion = record(condition.condition, condition.solutions[replicate], heading)
-        except NoMotion:
-            continue
-        found.append(ShownMotion(condition, motion))
-    return sorted(found, key=lambda each: results.with_data.index(each.condition))
+    motions = (
+        (c, _recorded(c, c.best_replicate, c.label))
+        for c in sorted(results.with_data, key=_best_cost)
+    )
+    shown = itertools.islice((ShownMotion(c, own) for c, own in motions if own), MOST)
+    return sorted(shown, key=lambda each: results.with_data.index(each.condition))
 
 
 def motions(best_motions: Sequence[ShownMotion]) -> dict[str, Sequence[Any]]:

@@ -38,11 +38,7 @@ Entry = Mapping[str, Any]
 
 
 def page_of(results: Results, settings: ReportSettings) -> Page:
-    """Return the page that the settings name, filled from results; a sweep has a page of its own.
-
-    A page that shows no motion is given the figure of the scene, with the best motions; claims on
-    conditions that were left out are named as not judged.
-    """
+    """Return the page that the settings name, filled from results; sweeps have their own."""
     chosen = page_registration(settings)
     if sweep := sweep_of(results):
         motions = best_motions(swept.best_condition(sweep, results))
@@ -191,10 +187,7 @@ class PageBuilder:
                 for name, value in zip(names, item if len(names) > 1 else (item,), strict=True):
                     inner = inner.inner(**{name: value})
                 scopes.append(inner)
-        if "when" not in entry:
-            return iter(scopes)
-        name = entry["when"].removeprefix("not ")
-        return (each for each in scopes if bool(each.value(name)) == (name == entry["when"]))
+        return (each for each in scopes if "when" not in entry or each.holds(entry["when"]))
 
     def figures(self, names: Sequence[str | Sequence[str]]) -> Iterator[Drawing]:
         """Yield the figures in order; of a list of them those of each item together."""

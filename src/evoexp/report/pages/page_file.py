@@ -42,7 +42,7 @@ _NAMED = (
     *("fits", "when", "among", "row", "rows", "values", "judge", "families", "conditions"),
     *("plays", "shows"),
 )
-_TEXTS = ("title", "caption", "finding", "text", "stem", "note", "cells")
+_TEXTS = ("title", "introduction", "caption", "finding", "text", "stem", "note", "cells")
 BOUND = (
     *("results", "settings", "rules", "paper", "page", "condition", "controls", "compared"),
     *("shown", "of", "names"),  # in figures
@@ -134,45 +134,38 @@ def _check_keys(field: str, entry: Mapping[str, Any], kind: str) -> None:
 
 def _check(file: PageFile, field: str) -> None:
     """Check all entries of a file: the names that they use, and the entries that pages name."""
-    entries = [
-        each
-        for section in sorted(KEYS.keys() & file.entries)
-        for name, entry in file.entries[section].items()
-        for each in _mappings(f"{field}: {section}.{name}", entry, section)
-    ]
-    bound = {*BOUND, *file.functions}
-    for path, entry in entries:
-        if "each" in entry:
-            each = _EACH.fullmatch(str(entry["each"]))
-            if each is None:
-                raise SettingError(f"{path}.each", "'item in items'", entry["each"])
-            bound |= set(each[1].split(", "))
-        for key in ("given", "arguments", "words"):
-            bound |= {*entry.get(key, ())}
-    for path, entry in entries:
-        for key, name in _names(entry):
-            known = name in bound or is_column(name)
-            for need in file.functions.needs(name) if known else (name,):
-                if need not in bound and not is_column(need):
-                    must = "a value or function"
-                    must += "" if need == name else f" for this argument of {name}"
-                    raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
+    bound, uses = {*BOUND, *file.functions}, list[tuple[str, str, str]]()
+    for section in sorted(KEYS.keys() & file.entries):
+        for title, whole in file.entries[section].items():
+            for path, entry in _mappings(f"{field}: {section}.{title}", whole, section):
+                uses += [(path, key, name) for key, name in _names(entry)]
+                for key in ("given", "arguments", "words"):
+                    bound |= {*entry.get(key, ())}
+                if "each" in entry:
+                    each = _EACH.fullmatch(str(entry["each"]))
+                    if each is None:
+                        raise SettingError(f"{path}.each", "'item in items'", entry["each"])
+                    bound |= set(each[1].split(", "))
+                    uses.append((path, "each", each[2].partition(".")[0]))
+    for path, key, name in uses:
+        known = name in bound or is_column(name)
+        for need in file.functions.needs(name) if known else (name,):
+            if need not in bound and not is_column(need):
+                must = "a value or function"
+                must += "" if need == name else f" for this argument of {name}"
+                raise SettingError(f"{path}.{key}", must, need, nearest(need, bound))
     for page, entry in file.entries["pages"].items():
+        pages = {*file.entries["pages"], GENERIC}
+        named = [("otherwise", "pages", entry.get("otherwise", GENERIC), pages)]
         for section in ("tables", "checks", "figures"):
-            known_here = {*file.entries[section], *(file.shared if section == "figures" else ())}
+            choices = {*file.entries[section], *(file.shared if section == "figures" else ())}
             for each in entry.get(section, ()):
-                for name in [each] if isinstance(each, str) else each:
-                    if name not in known_here:
-                        where, must = (
-                            f"pages.{page}.{section}",
-                            f"one of the {section} of this file",
-                        )
-                        hint = nearest(name, known_here)
-                        raise SettingError(f"{field}: {where}", must, name, hint)
-        other = entry.get("otherwise", GENERIC)
-        if other not in {*file.entries["pages"], GENERIC}:
-            must, hint = "a page of this file", nearest(other, file.entries["pages"])
-            raise SettingError(f"{field}: pages.{page}.otherwise", must, other, hint)
+                names = [each] if isinstance(each, str) else each
+                named += [(section, section, name, choices) for name in names]
+        for key, kind, name, choices in named:
+            if name not in choices:
+                must, hint = f"one of the {kind} of this file", nearest(name, choices)
+                raise SettingError(f"{field}: pages.{page}.{key}", must, name, hint)
 
 
 def _mappings(path: str, entry: Any, kind: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -193,9 +186,15 @@ def _names(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         for path in entry[key] if isinstance(entry.get(key), list) else (entry.get(key),):
             if isinstance(path, str):
                 yield key, _FIRST.split(path.removeprefix("not "))[0]
-    if "each" in entry:
-        yield "each", str(entry["each"]).rpartition(" in ")[2].partition(".")[0]
     for key in _TEXTS:
-        for text in entry[key] if key == "cells" and key in entry else (entry.get(key),):
-            if isinstance(text, str):
-                yield from ((key, name) for name in names_in(text))
+        yield from ((key, name) for text in _texts(entry.get(key)) for name in names_in(text))
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield the texts in the parts of a text, and their conditions as words in braces."""
+    if isinstance(value, str):
+        yield value
+    for part in value if isinstance(value, list) else ():
+        if isinstance(part, Mapping):
+            yield "{" + str(part.get("when", "")).removeprefix("not ") + "}"
+        yield from _texts(part["text"] if isinstance(part, Mapping) else part)

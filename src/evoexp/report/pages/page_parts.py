@@ -158,14 +158,6 @@ class Figures(NamedTuple):
     heading: str = "Figures"
 
 
-class LogText(NamedTuple):
-    """A replicate of a stored run: where its log is, or why there is none."""
-
-    replicate: int  # its index
-    file: str  # the log, or the file that tells why it failed, relative to the page
-    result: str  # best cost and exact verdict, or "failed"
-
-
 class RunText(NamedTuple):
     """A stored run that the page shows."""
 
@@ -174,7 +166,9 @@ class RunText(NamedTuple):
     done: int  # finished replicates
     failed: int  # failed replicates
     is_reference: bool  # whether it is a reference, which has no motion to view
-    logs: tuple[LogText, ...] = ()  # of every finished or failed replicate, in order
+    # Of every finished or failed replicate, in order: its index; the address of its log, or of the
+    # file that tells why it failed; best cost and exact verdict, or "failed"
+    logs: tuple[tuple[int, str, str], ...] = ()
 
     @property
     def hash12(self) -> str:
@@ -213,10 +207,8 @@ class Document(NamedTuple):
 
 
 def provenance(runs: Sequence[tuple[str, int]], seeds: Sequence[int]) -> str:
-    """Return the sentence that tells whose runs something shows; empty without any.
-
-    `runs` are (hash, finished replicates) of every condition, `seeds` those of the conditions.
-    """
+    """Return the sentence that tells whose runs something shows; empty without any."""
+    # `runs` are (hash, finished replicates) of every condition
     counts = sorted({done for _, done in runs})
     if not counts:
         return ""

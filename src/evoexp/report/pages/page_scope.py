@@ -83,11 +83,7 @@ class Scope:
         return known or (self.outer is not None and name in self.outer)
 
     def __getitem__(self, name: str) -> Any:
-        """Return a value; a function of a condition itself where no condition is bound.
-
-        Raises:
-            KeyError: If nothing has this name, or a function lacks an argument.
-        """
+        """Return a value; a function of a condition itself where no condition is bound."""
         if name not in self._values:
             needs = self.functions.needs(name)
             if self.outer is not None and not self._bound & needs:
@@ -121,9 +117,21 @@ class Scope:
         """Return the value of a dotted name: `results.main`, `collision.blind`."""
         return markdown.Sentence(self).get_field(path, (), self)[0]
 
+    def holds(self, condition: str) -> bool:
+        """Return whether `name` is true, or `not name` is false."""
+        name = condition.removeprefix("not ")
+        return bool(self.value(name)) == (name == condition)
+
     def text(self, template: object) -> str:
-        """Return a text with its words in braces filled in, see `markdown.filled`."""
-        return markdown.filled(str(template), self)
+        """Return a text with its words in braces filled in, see `markdown.filled`.
+
+        Of a list all parts that are texts, or mappings of a `text` and of a condition that holds.
+        """
+        if not isinstance(template, list):
+            return markdown.filled(str(template), self)
+        parts = (part if isinstance(part, Mapping) else {"text": part} for part in template)
+        shown = (part["text"] for part in parts if "when" not in part or self.holds(part["when"]))
+        return " ".join(map(self.text, shown))
 
 
 def names_in(template: object) -> Iterator[str]:

@@ -13,7 +13,6 @@ from evoexp.report.statistics.comparisons import (
     Comparison,
     Family,
     FamilyComparison,
-    Values,
     by_column,
     rows_by_name,
 )
@@ -44,6 +43,11 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "main": lambda results: results.main,  # without controls and references
     "first": lambda results: results.with_data[0],
     "unit": lambda first: first.length_unit,  # of the first condition's scene
+    "scenes_differ": lambda results: len({(c.robot, c.scenario) for c in results.with_data}) > 1,
+    # some values of a figure are infinite
+    "censored": lambda quantities, results: any(
+        np.isposinf(of(c)).any() for of in quantities.values() for c in results.with_data
+    ),
     "several": lambda results: len(results.with_data) > 1,  # there is something to compare
     "are_few": lambda results: len(results.evolved) <= FEW,
     "whole": lambda conditions: (Family.of(conditions),),  # the first one against all others
@@ -54,16 +58,6 @@ PAGE_VALUES: dict[str, Callable[..., Any]] = {
     "significance": lambda settings: settings.significance,
     "samples": lambda settings: settings.samples_per_segment,
 }
-
-
-def scenes(results: Results) -> str:
-    """Warn where conditions differ in robot or scenario; empty if they do not."""
-    if len({(c.robot, c.scenario) for c in results.with_data}) < 2:
-        return ""
-    return (
-        "The conditions differ in robot or scenario: their costs are compared as numbers, whatever "
-        "they measure."
-    )
 
 
 def terms(results: Results) -> Iterator[Quantity]:
@@ -77,17 +71,6 @@ def terms(results: Results) -> Iterator[Quantity]:
         elif "distance" in term or "clearance" in term:
             unit = results.with_data[0].length_unit or "–"
         yield quantity(results, name, unit, by_column(column))
-
-
-def censored(quantities: Mapping[str, Values], results: Results) -> str:
-    """Explain infinite values of a figure; empty if there are none."""
-    every = (of(c) for of in quantities.values() for c in results.with_data)
-    if not any(np.isposinf(values).any() for values in every):
-        return ""
-    return (
-        ' A run that never gets there counts as infinite ("never"), so that boxes are of all runs; '
-        "beside: runs that get there, of all."
-    )
 
 
 def effect_rows(

@@ -10,7 +10,6 @@ from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Comparison, Values, by_column, compared
-from evoexp.report.statistics.comparisons import adjusted as adjusted_rows
 from evoexp.report.statistics.inference import Proportion, fisher_exact, holm, newcombe
 
 MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
@@ -86,21 +85,6 @@ def difference_rows(results: Results, confidence: float) -> list[tuple[str, ...]
             tests = markdown.p_value(p), markdown.p_value(adjusted)
             rows.append((name, _named(a, b), points, *tests))
     return rows
-
-
-def compared_pairs(
-    results: Results, settings: ReportSettings, differing: dict[str, Values]
-) -> list[tuple[tuple[str, str], Comparison]]:
-    """Return (labels, comparison of best costs) of all pairs of three conditions or more."""
-    if len(results.evolved) < 3 or "best cost" not in differing:
-        return []
-    every = [
-        ((a.label, b.label), row)
-        for a, b in itertools.combinations(results.evolved, 2)
-        for row in compared([(a, b)], differing["best cost"], settings)
-    ]
-    tested = adjusted_rows([row for _, row in every])
-    return [(labels, row) for (labels, _), row in zip(every, tested, strict=True)]
 
 
 def _named(first: ConditionResults, second: ConditionResults) -> str:

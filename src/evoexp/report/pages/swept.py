@@ -4,14 +4,17 @@ What does not depend on the sweep, the scene and the motion, is shown once, of t
 The functions give what the page `sweep` of `page.yaml` names.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
+from typing import Any
 
-from evoexp.report.figures import sweeps
+import pandas as pd
+
+from evoexp.report.figures import records, sweeps
 from evoexp.report.pages import markdown
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results.run_measures import certified, search_seconds, success
 from evoexp.report.results.stored_results import ConditionResults, Results
-from evoexp.report.results.swept_settings import MainEffect, Sweep, labelled, main_effects
+from evoexp.report.results.swept_settings import Sweep, labelled, main_effects
 from evoexp.report.statistics.comparisons import Values, by_column
 from evoexp.report.statistics.inference import Proportion, spread
 
@@ -40,8 +43,8 @@ def curves_are_few(swept_conditions: list[ConditionResults]) -> bool:
     return 0 < len(swept_conditions) <= MOST_CURVES
 
 
-def effects(sweep: Sweep, settings: ReportSettings) -> Iterator[MainEffect]:
-    """Yield the effect of each value of each setting on the best cost."""
+def effects(sweep: Sweep, settings: ReportSettings) -> pd.DataFrame:
+    """Return the effect of each value of each setting on the best cost."""
     cost = by_column("best_cost")
     return main_effects(sweep, cost, settings.confidence, settings.num_resamples)
 
@@ -68,9 +71,9 @@ def combination_headers(sweep: Sweep) -> tuple[str, ...]:
     return (*of_base, *sweep.settings, "hash", "n", *SHARES, *MEASURES)
 
 
-def effect_headers(effects: Sequence[MainEffect]) -> tuple[str, ...]:
+def effect_headers(effects: pd.DataFrame) -> tuple[str, ...]:
     """Return the headers of the table of effects."""
-    of_base = ("condition",) if any(each.base for each in effects) else ()
+    of_base = ("condition",) if effects["base"].any() else ()
     return (*of_base, "setting", "value", "pairs", "change of the best cost", "better in")
 
 
@@ -90,17 +93,16 @@ def combinations(sweep: Sweep, confidence: float) -> Iterator[tuple[object, ...]
         )
 
 
-def effect_rows_by_value(effects: Sequence[MainEffect]) -> Iterator[tuple[object, ...]]:
+def effect_rows_by_value(effects: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     """Yield a row per value that is compared with the first one of its setting."""
-    number = markdown.number
-    for each in effects:
-        low, high = map(number, each.interval)
+    for each in records(effects):
+        difference, low, high = map(markdown.number, (each.difference, each.low, each.high))
         yield (
-            *((each.base,) if any(e.base for e in effects) else ()),
+            *((each.base,) if effects["base"].any() else ()),
             each.setting,
             f"{each.first} → {each.other}",
-            each.num_pairs,
-            f"{number(each.difference)} [{low}, {high}]",
+            each.pairs,
+            f"{difference} [{low}, {high}]",
             f"{100.0 * each.better:.0f} %",
         )
 
@@ -109,3 +111,6 @@ def _more(count: int) -> str:
     """Tell how many panels are left out; empty if none is."""
     most = sweeps.MOST_PANELS
     return f" The first {most} of {count} panels; the data have all." if count > most else ""
+
+
+PAGE_VALUES: dict[str, Callable[..., Any]] = {"effect_table": lambda effects: effects}

@@ -7,31 +7,28 @@ with it all shares of targets reached. So the lengths stand in a file of their o
 `planner_runs.problem_key`:
 
     "0123456789ab": {problem: "box_panda", length: 3.77, run: "4da9210db51b", replicate: 3}
-
-Run and replicate are those that found it.
 """
 
-import math
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated
 
 import yaml
+from pydantic import Field
 
 import evoexp
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
+from evoexp.validation import NonNegativeCount, Positive, Settings, construct
 
-_HASH = re.compile("[0-9a-f]{12}")
 
-
-class BestKnown(NamedTuple):
+class BestKnown(Settings):
     """The shortest proven answer known of a problem."""
 
     problem: str  # its name, for readers
-    length: float  # of the joints' path [rad, m]
-    run: str  # hash of the run that found it, 12 hex digits
-    replicate: int  # of that run
+    length: Positive  # of the joints' path [rad, m]
+    run: Annotated[str, Field(pattern="^[0-9a-f]{12}$")]  # hash of the run that found it
+    replicate: NonNegativeCount  # of that run
 
 
 def shipped_best_known() -> dict[str, BestKnown]:
@@ -44,6 +41,7 @@ def read_best_known(path: str | Path) -> dict[str, BestKnown]:
 
     Raises:
         SettingError: If something in it cannot be.
+        UnknownSetting: If an entry has another key.
         OSError: If it cannot be read.
     """
     return parsed(read_bounded(path), Path(path).name)
@@ -52,24 +50,15 @@ def read_best_known(path: str | Path) -> dict[str, BestKnown]:
 def parsed(content: bytes, name: str) -> dict[str, BestKnown]:
     """Return a file's content by the keys of problems."""
     try:
-        found = yaml.safe_load(content) or {}
+        entries = yaml.safe_load(content) or {}
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise SettingError(name, "YAML", str(error).splitlines()[0]) from None
-    if not isinstance(found, dict):
-        raise SettingError(name, "a mapping of keys of problems", found)
-    known = {}
-    for key, entry in found.items():
-        if not isinstance(key, str) or not _HASH.fullmatch(key):
+    if not isinstance(entries, dict):
+        raise SettingError(name, "a mapping of keys of problems", entries)
+    for key, entry in entries.items():
+        if not isinstance(key, str) or not re.fullmatch("[0-9a-f]{12}", key):
             raise SettingError(name, "keys of 12 hex digits in quotation marks", key)
-        where = f"{name}, {key}"
-        if not isinstance(entry, dict) or set(entry) != set(BestKnown._fields):
-            raise SettingError(where, f"a mapping of {', '.join(BestKnown._fields)}", entry)
-        length, run, replicate = entry["length"], entry["run"], entry["replicate"]
-        if type(length) not in (int, float) or not 0.0 < length < math.inf:
-            raise SettingError(f"{where}, length", "a number above 0", length)
-        if not isinstance(run, str) or not _HASH.fullmatch(run):
-            raise SettingError(f"{where}, run", "12 hex digits in quotation marks", run)
-        if type(replicate) is not int or replicate < 0:
-            raise SettingError(f"{where}, replicate", "a whole number, at least 0", replicate)
-        known[key] = BestKnown(str(entry["problem"]), float(length), run, replicate)
-    return known
+        if not isinstance(entry, dict):
+            must = f"a mapping of {', '.join(BestKnown.model_fields)}"
+            raise SettingError(f"{name}, {key}", must, entry)
+    return {key: construct(BestKnown, entry, f"{name}, {key}") for key, entry in entries.items()}

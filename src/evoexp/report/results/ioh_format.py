@@ -10,6 +10,7 @@ them, also where that is another run's, and with them runs without an answer.
 """
 
 import json
+import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -30,10 +31,8 @@ def ioh_files(runs: Sequence[PlannerRuns]) -> dict[str, bytes]:
     folders = _slugs(dict.fromkeys(own.planner for own in runs))
     names, dimensions = _slugs(problems), {name: _dimension(runs, name) for name in problems}
     # for no answer stands a power of ten above all lengths
-    longest = max((float(own.table["length"].max()) for own in runs if len(own.table)), default=0.0)
-    nothing = NO_ANSWER
-    while nothing <= longest:
-        nothing *= 10.0
+    longest = max((float(own.table["length"].max()) for own in runs if len(own.table)), default=1.0)
+    nothing = max(NO_ANSWER, 10.0 ** (math.floor(math.log10(longest)) + 1))
     cells: dict[tuple[str, str], list[PlannerRuns]] = {}
     for own in runs:
         cells.setdefault((own.planner, own.problem.name), []).append(own)
@@ -101,15 +100,12 @@ def _dimension(runs: Sequence[PlannerRuns], problem: str) -> int:
 
 def _slugs(names: Iterable[str]) -> dict[str, str]:
     """Return a name for files of each name, all different, also where case does not count."""
-    found: dict[str, str] = {}
-    taken = set[str]()
+    slugs: dict[str, str] = {}
     for name in names:
-        plain = re.sub(r"[^A-Za-z0-9.+*-]+", "_", name).strip("._") or "unnamed"
-        plain = plain.replace("*", "star")
-        slug, number = plain, 1
-        while slug.lower() in taken:
-            number += 1
-            slug = f"{plain}_{number}"
-        taken.add(slug.lower())
-        found[name] = slug
-    return found
+        plain = re.sub(r"[^A-Za-z0-9.+-]+", "_", name.replace("*", "star")).strip("._") or "unnamed"
+        slug = plain
+        while slug.lower() in {taken.lower() for taken in slugs.values()}:
+            slug = f"{plain}_{len(slugs) + 1}"
+            plain = slug
+        slugs[name] = slug
+    return slugs

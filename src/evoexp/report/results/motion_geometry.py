@@ -126,20 +126,15 @@ class BodyDistance:
 
         None: of the closest pair. Where bodies touch the distance is 0.
         """
-        pin.computeDistances(self._model, self._data, self._geometry, self._placements, q)
-        results = list(self._placements.distanceResults)
-        least = min(results if pair is None else [results[pair]], key=lambda r: r.min_distance)
+        robot = self._model, self._data, self._geometry
+        closest = pin.computeDistances(*robot, self._placements, q)
+        least = self._placements.distanceResults[closest if pair is None else pair]
         points = np.array([least.getNearestPoint1(), least.getNearestPoint2()])
         return max(0.0, float(least.min_distance)), points
 
     def __call__(self, q: FloatArray) -> FloatArray:
         """Return the least distance at each configuration (nq, configurations) [rad]."""
-        robot, results = (self._model, self._data, self._geometry), self._placements.distanceResults
-        least = np.empty(q.shape[1])
-        for k, one in enumerate(np.ascontiguousarray(q.T)):
-            closest = pin.computeDistances(*robot, self._placements, one)
-            least[k] = max(0.0, results[closest].min_distance)
-        return least
+        return np.array([self.nearest(each)[0] for each in np.ascontiguousarray(q.T)])
 
 
 def link_distance(assembly: Assembly) -> BodyDistance:
@@ -213,32 +208,29 @@ def extremes(
 
     `sampled` gives a replicate's motion, (nq, instants).
     """
-    found: list[Extremes] = []
+    least: list[tuple[FloatArray, FloatArray]] = []  # of each quantity, and of its negative
     for replicate in replicates:
         q = sampled(replicate)
-        own = [Extremes(values, values, q, q) for values in (measure(q) for measure in measures)]
-        found = [_both(*each) for each in zip(found, own, strict=True)] if found else own
-    return tuple(found)
+        own = [(sign * values, q) for values in (m(q) for m in measures) for sign in (1.0, -1.0)]
+        least = [_least(*each) for each in zip(least, own, strict=True)] if least else own
+    pairs = zip(least[::2], least[1::2], strict=True)
+    return tuple(Extremes(low, -high, at_low, at_high) for (low, at_low), (high, at_high) in pairs)
 
 
-def _both(first: Extremes, later: Extremes) -> Extremes:
-    """Return the extremes of two, with the instants of the longer one."""
-    length = max(len(first.lowest), len(later.lowest))
-    own, other = (
-        Extremes(
-            np.pad(each.lowest, (0, length - len(each.lowest)), constant_values=np.inf),
-            np.pad(each.highest, (0, length - len(each.lowest)), constant_values=-np.inf),
-            *(np.pad(q, ((0, 0), (0, length - len(each.lowest)))) for q in each[2:]),
+def _least(
+    *both: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lesser of two values at each instant, with its configurations."""
+    length = max(len(values) for values, _ in both)
+    (first, q), (later, q_later) = (
+        (
+            np.pad(values, (0, length - len(values)), constant_values=np.inf),
+            np.pad(q, ((0, 0), (0, length - len(values)))),
         )
-        for each in (first, later)
+        for values, q in both
     )
-    lower, higher = other.lowest < own.lowest, other.highest > own.highest
-    return Extremes(
-        np.where(lower, other.lowest, own.lowest),
-        np.where(higher, other.highest, own.highest),
-        np.where(lower, other.at_lowest, own.at_lowest),
-        np.where(higher, other.at_highest, own.at_highest),
-    )
+    lower = later < first
+    return np.where(lower, later, first), np.where(lower, q_later, q)
 
 
 def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:

@@ -1,8 +1,7 @@
 """Parameters of conditions with unit and source, as the comments of their option files state them.
 
 An experiment records the option that each group of a condition was taken from; a setting that
-differs from its option is an override. Logs without that record have each component compared with
-the shipped options of its group, and the table names the one that it is most like.
+differs from its option is an override. Without that record a setting has no source.
 """
 
 import functools
@@ -21,6 +20,7 @@ from evoexp.validation import TARGET
 
 OVERRIDE = "override"
 OF_FILE = "content of a file"
+NOT_RECORDED = "its option is not recorded"
 _CAPS = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}
 _COMMENT = re.compile(r"#\s*(?:\[(?P<unit>[^\]]*)\])?\s*(?P<source>.*)")
 _REFERENCE = re.compile(r"\$\{(\w+)\}")
@@ -147,10 +147,8 @@ def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
 
 def _component(group: str, config: dict[str, Any], taken: dict[str, Option]) -> Iterator[Parameter]:
     """Yield the settings of one component, and of the groups that its option takes in."""
-    if group in taken:
-        where, entries = taken[group].source, _entries(group, "", taken)
-    else:
-        where, entries = _most_like(group, config)
+    where = taken[group].source if group in taken else NOT_RECORDED
+    entries = _entries(group, "", taken)
     otherwise = OVERRIDE if entries else where  # of a setting that the option does not have
     yield Parameter(group, f"{config[TARGET]}, revision {config.get('revision')}", "", where)
     for key, value in config.items():
@@ -185,23 +183,6 @@ def _setting(
         items = {path.split("]")[0] for path in entries if path.startswith(f"{key}[")}
         if isinstance(value, list) and len(items) > len(value):  # a list cut short
             yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
-
-
-def _most_like(group: str, config: dict[str, Any]) -> tuple[str, dict[str, Entry]]:
-    """Name the shipped option that agrees with a component in most settings, with its entries."""
-    leaves = dict(_flat(config, ""))
-    found: list[tuple[int, str, dict[str, Entry]]] = []
-    for path in sorted((config_directory() / group).glob("*.yaml")):
-        entries = option(path)
-        if TARGET not in entries or entries[TARGET].value != config[TARGET]:
-            continue
-        agreeing = sum(_same(leaves[key], entries[key].value) for key in leaves.keys() & entries)
-        lacking = entries.keys() - leaves.keys()
-        lacking_values = [key for key in lacking if not _REFERENCE.match(str(entries[key].value))]
-        where = f"most like conf/{group}/{path.name}"
-        found.append((agreeing - len(lacking_values), where, entries))
-    _, where, entries = max(found, key=lambda each: each[0], default=(0, OVERRIDE, {}))
-    return where, entries
 
 
 def _flat(value: Any, prefix: str) -> Iterator[tuple[str, Any]]:

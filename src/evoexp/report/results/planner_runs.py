@@ -137,26 +137,20 @@ def of_results(
 def problem_names(conditions: Sequence[ConditionResults]) -> dict[Hashable, str]:
     """Return a name for each problem: what the labels of its conditions, and no others, share.
 
-    Where its labels share nothing: the name of the scenario's option that was taken, or of its
-    component; and with it the robot's, where two problems have one name.
+    Where its labels share nothing, or there is but one: the name of the scenario's option that was
+    taken, or of its component; with a number where several have one name.
     """
     groups = _by_task(conditions)
     parts = {task: [_parts(c) for c in own] for task, own in groups.items()}
     names: dict[Hashable, str] = {}
     for task, own in parts.items():
-        others = {
-            part for other in groups if other != task for each in parts[other] for part in each
-        }
-        shared = [part for part in own[0] if all(part in each for each in own)]
-        names[task] = ", ".join(dict.fromkeys(part for part in shared if part not in others))
-        is_planner = len(conditions) == 1  # the label of one condition names either
-        if not names[task] or is_planner:
-            names[task] = _option(groups[task][0], "scenario")
-    every = list(names.values())
-    for task, name in names.items():
-        if every.count(name) > 1:
-            names[task] = f"{name}, {_option(groups[task][0], 'robot')}"
-    # a number behind those that are still not the only ones of their kind
+        others = {p for other in groups if other != task for each in parts[other] for p in each}
+        shared = [p for p in own[0] if all(p in each for each in own) and p not in others]
+        names[task] = ", ".join(dict.fromkeys(shared)) if len(conditions) > 1 else ""
+        if not names[task]:
+            c = groups[task][0]
+            taken = [option.name for option in c.options if option.group == "scenario"]
+            names[task] = taken[0] if taken else str(c.scenario.component)
     every, seen = list(names.values()), Counter[str]()
     for task, name in names.items():
         seen[name] += 1
@@ -174,27 +168,29 @@ def planner_names(
     beside the problem's, if each such name stands for one component and one of them at least occurs
     on two problems; else it is the component, with a number where its settings differ.
     """
-    groups = _by_task(conditions)
-    if len(groups) == 1:
+    if len(_by_task(conditions)) == 1:
         return {c.label: c.label for c in conditions}
     everywhere = set.intersection(*(set(_parts(c)) for c in conditions))
     rest: dict[str, str] = {}
     for c in conditions:
         problem = set(problems[_task(c)].split(", ")) | everywhere
         rest[c.label] = ", ".join(p for p in _parts(c) if p not in problem)
-    every = [(_task(c), rest[c.label]) for c in conditions]
+    every = {(_task(c), rest[c.label]) for c in conditions}
     kinds = {(rest[c.label], c.condition.planner.component) for c in conditions}
-    num_names = len({name for _, name in every})
-    unique = len(set(every)) == len(every) and len(kinds) == num_names
-    if unique and all(rest.values()) and num_names < len(every):
+    num_names = len(set(rest.values()))
+    unique = len(every) == len(conditions) and len(kinds) == num_names
+    if unique and all(rest.values()) and num_names < len(conditions):
         return rest
-    planners: list[Any] = list(dict.fromkeys(c.condition.planner for c in conditions))
+    planners: dict[str, list[Any]] = {}  # component → its settings
+    for c in conditions:
+        same = planners.setdefault(c.condition.planner.component, [])
+        if c.condition.planner not in same:
+            same.append(c.condition.planner)
     names = {}
     for c in conditions:
-        name = c.condition.planner.component
-        same = [planner for planner in planners if planner.component == name]
+        same = planners[c.condition.planner.component]
         number = f" {same.index(c.condition.planner) + 1}" if len(same) > 1 else ""
-        names[c.label] = f"{name}{number}"
+        names[c.label] = f"{c.condition.planner.component}{number}"
     return names
 
 
@@ -210,10 +206,3 @@ def _by_task(
     conditions: Sequence[ConditionResults],
 ) -> dict[Hashable, tuple[ConditionResults, ...]]:
     return {_task(own[0]): own for own in grouped(conditions, _task)}
-
-
-def _option(c: ConditionResults, group: str) -> str:
-    """Return the name of the option that was taken of a group; else that of the component."""
-    part: Any = getattr(c.condition, group)
-    taken = [option.name for option in c.options if option.group == group]
-    return taken[0] if taken else str(part.component)

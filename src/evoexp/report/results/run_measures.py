@@ -64,10 +64,7 @@ def grouped(
 
 
 def first_feasible(condition: ConditionResults) -> FloatArray:
-    """Return the first generation that has a feasible individual, (done,); inf: none has.
-
-    A run without one is not left out: it took longer than every run that has one.
-    """
+    """Return the first generation that has a feasible individual, (done,); inf: none has."""
     found = condition.column("first_feasible_generation")
     return np.where(np.isnan(found), np.inf, found)
 

@@ -1,6 +1,7 @@
 """Stored results of the conditions that a report is asked for."""
 
 import functools
+import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -105,10 +106,7 @@ class ConditionResults:
         return len(self.failures)
 
     def added(self, fixed: int) -> int:
-        """Return how many finished replicates were asked for when results were there already.
-
-        The replicates that the experiment fixes by itself never count.
-        """
+        """Return how many finished replicates were asked for when results were there already."""
         known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
         seen = [plan.num_replicates for plan in self.plans if plan.stored]
         if not seen:
@@ -123,20 +121,14 @@ class ConditionResults:
     @property
     def verdicts(self) -> Verdicts:
         """Count of the exact verdicts."""
-        motions = self.summaries[
-            self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
-        ]
-        certified, margin = motions["certified"], motions["certified_margin"]
-        refuted = certified.eq(False).fillna(False)
-        return Verdicts(
-            len(motions),
-            int(certified.eq(True).sum()),
-            int(refuted.sum()),
-            int(certified.isna().sum()),
-            int((refuted & motions["solved"]).sum()),
-            int(margin.eq(True).sum()),
-            int((margin.eq(False).fillna(False) & certified.eq(True).fillna(False)).sum()),
+        known = self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
+        motions = self.summaries[known]
+        certified, refuted, margin, broken = (
+            motions[name].eq(value).fillna(False)
+            for name, value in itertools.product(("certified", "certified_margin"), (True, False))
         )
+        rows = certified, refuted, motions["certified"].isna(), refuted & motions["solved"]
+        return Verdicts(len(motions), *(int(r.sum()) for r in (*rows, margin, broken & certified)))
 
     @property
     def best_replicate(self) -> int:
@@ -245,10 +237,7 @@ class Results(NamedTuple):
             yield condition, "" if len(self.main) == 1 else f"_{k + 1}_{slug}"
 
     def beside(self, experiment: str) -> "Results":
-        """Return the stored results of another shipped experiment at the paper's budget.
-
-        Conditions are found by their hashes, those that were never run are missing.
-        """
+        """Return the stored results of another shipped experiment at the paper's budget."""
         rows = [row for row in shipped() if (row.experiment, row.budget) == (experiment, "paper")]
         runs = {row.label: RunDirectory(self.outputs, row.condition_id) for row in rows}
         found = tuple(

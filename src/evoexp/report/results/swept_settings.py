@@ -5,7 +5,7 @@
 
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ import pandas as pd
 
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics.comparisons import Values
-from evoexp.report.statistics.inference import BOOTSTRAP_SEED, Interval, percentiles, quantile
+from evoexp.report.statistics.inference import BOOTSTRAP_SEED, percentiles, quantile
 
 JOIN = " · "  # between the parts of a label
 _SETTING = re.compile(r"([\w.@/-]+)=(.*)")
@@ -48,19 +48,6 @@ class Sweep(NamedTuple):
             return tuple(found)
 
 
-class MainEffect(NamedTuple):
-    """One value of a setting against its first one, all other settings and seeds being equal."""
-
-    base: str  # the condition that was swept
-    setting: str  # name of the setting
-    first: str  # the first value
-    other: str  # the value that is compared with it
-    num_pairs: int  # pairs of runs
-    difference: float  # median of the other's cost minus the first's
-    interval: Interval  # of it, by resampling seeds
-    better: float  # share of pairs in which the other one's cost is lower; ties count half
-
-
 def sweep_of(results: Results) -> Sweep | None:
     """Return the sweep that these results are; None if they are none."""
     swept, names = list[Swept](), set[tuple[str, ...]]()
@@ -83,8 +70,14 @@ def sweep_of(results: Results) -> Sweep | None:
 
 def main_effects(
     sweep: Sweep, values: Values, confidence: float, num_resamples: int
-) -> Iterator[MainEffect]:
-    """Yield the effect of each value of each setting; lower values, (done,), are better."""
+) -> pd.DataFrame:
+    """Return each value of a setting against its first one, all else and seeds being equal.
+
+    Columns base (the swept condition), setting, first, other (its values), pairs (of runs),
+    difference (median of the other's minus the first's), low, high (its interval, by resampling
+    seeds), better (share of pairs in which the other is lower; ties count half).
+    """
+    rows = []
     for base, (k, setting) in itertools.product(sweep.bases, enumerate(sweep.settings)):
         first, *others = sweep.levels(k)
         for other in others:
@@ -93,11 +86,14 @@ def main_effects(
                 continue
             rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
             drawn = rng.integers(0, len(pairs), (num_resamples, len(pairs)))
-            interval = percentiles(np.array([_median(pairs[rows]) for rows in drawn]), confidence)
+            medians = np.array([quantile(pairs[seeds].ravel(), 0.5) for seeds in drawn])
             known = pairs[~np.isnan(pairs)]
             better = float((known < 0.0).mean() + 0.5 * (known == 0.0).mean())
-            names = base, setting, first, other
-            yield MainEffect(*names, len(known), _median(pairs), interval, better)
+            ends = percentiles(medians, confidence)
+            numbers = len(known), quantile(known, 0.5), *ends, better
+            rows.append((base, setting, first, other, *numbers))
+    names = ["base", "setting", "first", "other", "pairs", "difference", "low", "high", "better"]
+    return pd.DataFrame(rows, columns=names)
 
 
 def _pairs(
@@ -124,11 +120,6 @@ def _pairs(
     if not differences:
         return np.empty((0, 0))
     return pd.concat(differences, axis=1).sort_index().to_numpy(np.float64)
-
-
-def _median(values: np.ndarray) -> float:
-    known = values[~np.isnan(values)]
-    return quantile(known, 0.5) if len(known) else np.nan
 
 
 def labelled(sweep: Sweep, names: Sequence[str]) -> str:

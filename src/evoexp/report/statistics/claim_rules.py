@@ -35,23 +35,13 @@ class Rule(NamedTuple):
     evidence: str = ""  # the numbers in a sentence, as `markdown.filled` takes it
     equal: str = ""  # when both sides are practically equal, in words
 
-    def about(self, **words: object) -> "Rule":
-        """Return the rule with its words in braces filled in; limits are known already.
-
-        Raises:
-            KeyError: If a word is missing.
-        """
-        return self._filled(words)
-
-    def unjudged(self) -> "Rule":
-        """Return the rule with its limits filled in, and "…" for words that a judge would give."""
-        return self._filled(collections.defaultdict(lambda: "…"))
-
-    def _filled(self, words: dict[str, object]) -> "Rule":
-        for name, limit in self.limits.items():
-            words.setdefault(name, f"{limit:g}")
+    def about(self, words: dict[str, object] | None = None) -> "Rule":
+        """Return the rule with its words in braces filled in, where no judge gives any with "…"."""
+        limits: dict[str, object] = {name: f"{limit:g}" for name, limit in self.limits.items()}
+        unknown = collections.defaultdict[str, object](lambda: "…")
+        known = collections.ChainMap(limits, unknown if words is None else words)
         fields = ("claim", "source", "reproduced", "contradicted", "equal")
-        return self._replace(**{name: getattr(self, name).format_map(words) for name in fields})
+        return self._replace(**{name: getattr(self, name).format_map(known) for name in fields})
 
     @property
     def text(self) -> str:
@@ -88,14 +78,11 @@ def read_rules(path: Path) -> Rules:
         if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
             must = f"a rule of kind {OWN}, and no other, says when it is reproduced"
             raise ValueError(f"{name}: {must}")
-        words = {"reproduced": "", "contradicted": "", **KINDS[entry["kind"]]}
+        words = {"reproduced": "", "contradicted": "", **KINDS[entry["kind"]], **entry}
         least = {"equal": words.pop("least")} if "least" in words else {}
-        data = {
-            "source": str(entry["source"]),
-            "limits": MappingProxyType({**least, **entry.get("limits", {})}),
-            "experiments": tuple(entry["experiments"]),
-        }
-        rules[name] = Rule(name=name, **{**words, **entry, **data})
+        words["source"], words["experiments"] = str(entry["source"]), tuple(entry["experiments"])
+        words["limits"] = MappingProxyType(least | entry.get("limits", {}))
+        rules[name] = Rule(name=name, **words)
     return MappingProxyType(rules)
 
 

@@ -42,10 +42,7 @@ class Comparison(NamedTuple):
         return self.better.direction if self.p_adjusted < significance else 0
 
     def runs_to_decide(self, significance: float) -> float:
-        """Return how many runs of each would decide it if A12 stays: more than there are.
-
-        The level of a single test is that which Holm leaves it.
-        """
+        """Return how many runs of each would decide it if A12 stays: more than there are."""
         level = significance * (self.better.p_value / self.p_adjusted if self.p_adjusted else 1.0)
         return max(max(self.sizes) + 1.0, runs_for_effect(self.better.a12, level))
 
@@ -84,12 +81,10 @@ def compare_families(
     families: Iterable[Family], measures: Iterable[Measure], settings: ReportSettings
 ) -> tuple[FamilyComparison, ...]:
     """Compare every family in every quantity."""
-    found, own = [], tuple(families)
-    for measure, family in itertools.product(measures, own):
-        rows = (_row(measure, pair, pair[1].label, settings) for pair in family.pairs)
-        known = adjusted(row for row in rows if row is not None)
-        found.append(FamilyComparison(measure, family, tuple(known)))
-    return tuple(found)
+    return tuple(
+        FamilyComparison(measure, family, _compared(family.pairs, measure, settings))
+        for measure, family in itertools.product(measures, tuple(families))
+    )
 
 
 def headed(found: Iterable[FamilyComparison]) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
@@ -138,9 +133,13 @@ def compared_with_controls(
     for first, second in itertools.product(results.evolved, repeat=2):
         is_pair = not first.is_control and second.is_control
         if is_pair and beside(first.condition, second.condition):
-            rows = [_row(each, (first, second), each.name, settings) for each in measures]
-            if known := [row for row in rows if row is not None]:
-                yield f"{first.label} against {second.label}", tuple(adjusted(known))
+            rows = [
+                row._replace(quantity=each.name)
+                for each in measures
+                for row in _compared([(first, second)], each, settings)
+            ]
+            if rows:
+                yield f"{first.label} against {second.label}", tuple(adjusted(rows))
 
 
 def beside(first: Condition, control: Condition) -> bool:
@@ -160,14 +159,19 @@ def compared(
 
     Pairs without runs of both are left out. `named` gives the name of a pair's row.
     """
-    measure = Measure("", values, lower_is_better=lower_is_better)
-    rows = (_row(measure, pair, named(*pair), settings) for pair in pairs)
-    return tuple(adjusted(row for row in rows if row is not None))
+    return _compared(pairs, Measure("", values, "", lower_is_better), settings, named)
 
 
-def _row(measure: Measure, pair: Pair, name: str, settings: ReportSettings) -> Comparison | None:
-    """Compare the runs of a pair that have a quantity; None where one condition has no such run."""
-    x, y = (own[~np.isnan(own)] for own in map(measure.values, pair))
-    if not len(x) or not len(y):
-        return None
-    return compare(name, x, y, measure.lower_is_better, settings.confidence)
+def _compared(
+    pairs: Iterable[Pair],
+    measure: Measure,
+    settings: ReportSettings,
+    named: Callable[[ConditionResults, ConditionResults], str] = lambda first, second: second.label,
+) -> tuple[Comparison, ...]:
+    rows = []
+    for pair in pairs:
+        x, y = (own[~np.isnan(own)] for own in map(measure.values, pair))
+        if len(x) and len(y):
+            name = named(*pair)
+            rows.append(compare(name, x, y, measure.lower_is_better, settings.confidence))
+    return tuple(adjusted(rows))

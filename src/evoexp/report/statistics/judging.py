@@ -37,10 +37,7 @@ class Hearing(NamedTuple):
     significance: float  # below this adjusted p-value a difference counts
 
     def every(self, evidence: Evidence, holds: int, done: int, planned: int) -> Claim:
-        """Judge a claim about every run.
-
-        One counter-example contradicts; all planned runs are needed to reproduce.
-        """
+        """Judge a claim about every run."""
         size = self._share("share of runs", holds, done, 1.0)
         return self._claim("every", evidence, done, 0 < planned <= done, holds < done, size)
 
@@ -64,10 +61,7 @@ class Hearing(NamedTuple):
         return heard._claim("better", told.replace("{}", words), *judged)
 
     def better_than_all(self, evidence: Evidence, rows: Sequence[Comparison]) -> Claim:
-        """Judge a claim that a condition is better than each of several others.
-
-        One that is significantly better contradicts; all must be significantly worse to reproduce.
-        """
+        """Judge a claim that a condition is better than each of several others."""
         says = {row.says(self.significance) for row in rows}
         undecided = [row for row in rows if not row.says(self.significance)]
         would_do = max((row.runs_to_decide(self.significance) for row in undecided), default=None)
@@ -75,12 +69,7 @@ class Hearing(NamedTuple):
         return self._claim("better than all", evidence, *judged)
 
     def best(self, evidence: Evidence, rows: Sequence[Comparison], best_median: bool) -> Claim:
-        """Judge a claim that one of several settings is the best.
-
-        One that is significantly better contradicts; it is reproduced if it has the best median and
-        one other setting at least is significantly worse: neighbours of a best setting are about as
-        good, so not all need be.
-        """
+        """Judge a claim that one of several settings is the best."""
         says = {row.says(self.significance) for row in rows}
         holds, size = best_median and 1 in says, self._effect(rows)
         return self._claim("best", evidence, _runs(rows), holds, -1 in says, size)
@@ -212,13 +201,9 @@ class Judge(NamedTuple):
         return proportion.with_interval(self.level, decimals)
 
     def on(self, name: str, **words: object) -> Hearing:
-        """Open the hearing of a claim, with the words in braces of its texts.
-
-        Raises:
-            KeyError: If there is no such rule, or a word is missing.
-        """
+        """Open the hearing of a claim, with the words in braces of its texts."""
         # a rule that compares names its own word where it is judged
-        rule = self.rules[name].about(**{"word": "{word}", **words})
+        rule = self.rules[name].about({"word": "{word}", **words})
         return Hearing(rule, self.reason, self.settings.significance)
 
 
@@ -261,7 +246,7 @@ def left_out(results: Results, judged: Sequence[Claim]) -> Iterator[Claim]:
         for rule in registered_rules(registration).values():
             if results.experiment in rule.experiments and rule.name not in known:
                 told = "not among its conditions: " + ", ".join(sorted(missing))
-                yield Hearing(rule.unjudged(), "", 0.0).made(told, "0", verdict)
+                yield Hearing(rule.about(), "", 0.0).made(told, "0", verdict)
 
 
 def fisher_evidence(one: Proportion, two: Proportion) -> str:

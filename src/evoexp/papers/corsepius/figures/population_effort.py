@@ -13,7 +13,7 @@ from matplotlib.ticker import NullFormatter, NullLocator
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.report.figures import groups, marks, style
-from evoexp.report.figures.boxes import JITTER
+from evoexp.report.figures.effects import JITTER
 from evoexp.report.results.run_measures import solved
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics import inference

@@ -70,11 +70,11 @@ def paths_table(
     return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
 
 
-def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, colour: str) -> None:
+def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], colour: str) -> None:
     """Draw the paths of an arm in a plane or in space, the best path with its start and goal."""
     for (series, _), path in groups(rows, ["series", "replicate"]):
         points = [path[name].to_numpy() for name in columns]
-        if series == best:
+        if series.startswith("best"):
             axes.plot(*points, color=colour, linewidth=1.8, marker="o", markersize=2.6, zorder=4)
             axes.plot(*(p[:1] for p in points), "s", markersize=6.5, **WHITE)
             axes.plot(*(p[-1:] for p in points), "*", markersize=10.5, **WHITE)
@@ -82,12 +82,6 @@ def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, col
             axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
         else:
             axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
-
-
-def stage_title(rows: pd.DataFrame, whole: bool) -> str:
-    """Return the title of the panel of one stage of a motion, or of the whole motion."""
-    instants = f"instants {rows['first'].iloc[0]}–{rows['last'].iloc[0]}"
-    return f"all {instants}" if whole else instants
 
 
 def path_keys(table: pd.DataFrame) -> list[Line2D]:

@@ -6,7 +6,6 @@ from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
-import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -234,29 +233,9 @@ def operational_axes(axes: Axes, unit: str) -> None:
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
 
 
-def draw_arm(
-    axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False
-) -> None:
-    """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
-    x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
-    colour = arm_colour(arm)
-    line: dict[str, Any] = (
-        {"linestyle": (0, (2, 1)), "linewidth": 2} if dashed else {"linewidth": 3}
-    )
-    axes.plot(x, y, color=colour, alpha=alpha, zorder=3 + dashed, **line)
-    joints: dict[str, Any] = {"color": "white", "markeredgecolor": colour, "ms": 5}
-    axes.plot(x[:-1], y[:-1], "o", alpha=alpha, zorder=4, **joints)
-    axes.plot(x[-1], y[-1], "o", color=colour, alpha=alpha, markersize=4, zorder=4)
-
-
 def key(label: str, **look: Any) -> Line2D:
     """Return an entry of a legend: a line or marker that is drawn nowhere else."""
     return Line2D([], [], label=label, **look)
-
-
-def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D]:
-    """Return entries of a legend for arms, counted from 0: "arm 1" in the arm's colour, …."""
-    return [key(f"{name} {int(k) + 1}", color=arm_colour(int(k)), **look) for k in arms]
 
 
 def keys_below(

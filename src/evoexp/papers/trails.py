@@ -17,6 +17,7 @@ from evoexp.records import FloatArray
 from evoexp.report.figures import groups, style, surfaces
 
 DASHES: Any = (0, (2, 1))
+DASHED: dict[str, Any] = {"linestyle": DASHES}
 WAY: dict[str, Any] = {"linestyle": ":", "linewidth": 0.9}
 WIDE, THIN = 2.4, 0.9  # [pt] of the last posture, and of those before
 
@@ -54,7 +55,7 @@ def draw_trail(axes: Any, links: pd.DataFrame, colour: str, names: str = "xy") -
         else:
             look = {"linewidth": THIN, "alpha": 0.15 + 0.45 * (instant - first) / (last - first)}
             draw_chain(axes, posture, colour, names, joints=False, **look | {"zorder": 2})
-    tips = links[links["link"] == links["link"].max()]
+    tips = links.groupby("instant").last()
     axes.plot(*(tips[f"{name}_end"] for name in names), color=colour, zorder=3, **WAY)
 
 
@@ -111,5 +112,6 @@ def space(
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    look = {"view": (22.0, -55.0), "zoom": 0.95, "label_pads": (-7, -7, -7), "ticks": (2, 4)} | look
+    usual: dict[str, Any] = {"view": (22.0, -55.0), "zoom": 0.95, "label_pads": (-7, -7, -7)}
+    look = usual | {"ticks": (2, 4)} | look
     return surfaces.space(figure, place, low, high, pad, unit, pale=True, **look)

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from evoexp.playback import colours
 from evoexp.report.figures.fitted_texts import fit_texts
 from evoexp.report.figures.style_files import own_style, read_style_file
 
-ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
+ARM_COLOURS, arm_colour = colours.ARM_COLOURS, colours.arm_colour
 CONDITION_COLOURS = (
     "#332288",
     "#CC6677",
@@ -158,11 +159,6 @@ def ends_column(axes: Axes, panels: Sequence[Axes]) -> bool:
     return own is not None and not any(
         place.colspan == own.colspan and place.rowspan.start > own.rowspan.start for place in places
     )
-
-
-def arm_colour(arm: int) -> str:
-    """Return the colour of an arm, counted from 0."""
-    return ARM_COLOURS[arm % len(ARM_COLOURS)]
 
 
 def condition_colour(position: int) -> str:

@@ -33,16 +33,13 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
         q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
         word = "certified" if verdict["certified"] else "not certified"
         told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
-        robot = c.robot
-        scenario = c.scenario
-        model = c.problem(Problem).scene.model
+        robot, scenario, model = c.robot, c.scenario, c.problem(Problem).scene.model
+        data = model.createData()
         arms = []  # joints and end of both postures, (4, 2): x, and height
         for posture in q[-2:]:
-            data = model.createData()
             pin.forwardKinematics(model, data, posture)
-            points = [data.oMi[k].translation for k in range(3, model.njoints)]
-            tip = np.array([robot.link_lengths[-1], 0.0, 0.0])
-            points.append(data.oMi[model.njoints - 1].act(tip))
+            tip = data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0]))
+            points = [*(data.oMi[k].translation for k in range(3, model.njoints)), tip]
             arms.append([(float(x), float(z)) for x, _, z in points])
         reach, above = scenario.docking.target
         kinds = [
@@ -98,9 +95,8 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
     axes.annotate("F", (x, z), tail, arrowprops=ARROW, ha="center", fontsize=7.5)
     axes.axhline(0.0, linewidth=1.0, **MARK)
     unit = rows["unit"].iloc[0]
-    axes.set(
-        xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]", adjustable="datalim", aspect="equal"
-    )
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.1)
 
 

@@ -116,7 +116,7 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     # ways of both kinds of runs, crosses where they are stuck
     for row in records(obstacles):
-        solids.draw_outline(above, row, style.FAINT, 0.35)
+        solids.draw_solid(above, row, style.FAINT, 0.35)
     looks = {
         STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
         HELPED: (style.arm_colour(0), "with a sub-goal"),
@@ -131,11 +131,9 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
     along.set(
-        xlabel="posture of the path",
-        ylabel=f"distance to the goal [{unit}]",
-        title="b  distance along the paths",
-        ylim=(0.0, None),
+        xlabel="posture of the path", ylabel=f"distance to the goal [{unit}]", ylim=(0.0, None)
     )
+    along.set_title("b  distance along the paths")
     _draw_landscape(figure, land, cells)
     # the least cost in boxes around the posture that is stuck
     look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
@@ -143,12 +141,8 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     escape.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     escape.set_xscale("log", base=2)
     escape.xaxis.set_major_formatter("{x:g}")
-    escape.set(
-        xlabel="half the edge of the box [scopes]",
-        ylabel="least cost found in it [-]",
-        title="d  random postures around it",
-        ylim=(0.0, None),
-    )
+    escape.set(xlabel="half the edge of the box [scopes]", ylabel="least cost found in it [-]")
+    escape.set(ylim=(0.0, None), title="d  random postures around it")
     keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
     style.keys_below(figure, keys)
     return figure

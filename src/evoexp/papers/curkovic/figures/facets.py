@@ -63,22 +63,13 @@ def facet_table(results: Results, threshold: float) -> pd.DataFrame:
             first = measures.generations_to(c, threshold)
             rows = c.generations.groupby("index")
             index = np.unique(c.generations["index"].to_numpy(np.float64))
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "panel": panel,
-                        "title": title,
-                        "position": names.setdefault(name, len(names)),
-                        "name": name,
-                        "generation": index,
-                        "evaluations": _medians(rows, "evaluations"),
-                        "median": _medians(rows, "best_cost"),
-                        "reached": (first <= index[:, None]).mean(axis=1),
-                        "reaching": int(np.isfinite(first).sum()),
-                        "runs": c.done,
-                    }
-                )
-            )
+            columns: dict[str, Any] = {"panel": panel, "title": title}
+            columns |= {"position": names.setdefault(name, len(names)), "name": name}
+            columns |= {"generation": index, "evaluations": _medians(rows, "evaluations")}
+            columns |= {"median": _medians(rows, "best_cost")}
+            columns |= {"reached": (first <= index[:, None]).mean(axis=1)}
+            columns |= {"reaching": int(np.isfinite(first).sum()), "runs": c.done}
+            parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
 
 

@@ -31,18 +31,15 @@ LINES: dict[str, dict[str, Any]] = {
 
 def costs_table(results: Results, threshold: float) -> pd.DataFrame:
     """Return every run's best cost."""
-    parts = [
-        pd.DataFrame(
-            {
-                "position": position,
-                "condition": c.label,
-                "replicate": c.summaries.index,
-                "cost": c.column("best_cost"),
-                "refuted": measures.refuted(c) == 1.0,
-            }
-        )
-        for position, c in enumerate(results.with_data)
-    ]
+    parts = []
+    for position, c in enumerate(results.with_data):
+        columns: dict[str, Any] = {
+            "position": position,
+            "condition": c.label,
+            "replicate": c.summaries.index,
+        }
+        columns |= {"cost": c.column("best_cost"), "refuted": measures.refuted(c) == 1.0}
+        parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
 
 
@@ -94,30 +91,19 @@ def methods_table(results: Results, bound: float, threshold: float) -> pd.DataFr
     for position, c in enumerate(results.with_data):
         costs = c.generations.pivot(index="index", columns="replicate", values="best_cost")
         finite = costs.replace([np.inf], np.nan)
-        curve = pd.DataFrame(
-            {
-                "series": CURVE,
-                "generation": finite.index.to_numpy(),
-                "value": finite.mean(axis=1).to_numpy(),
-                "deviation": finite.std(axis=1, ddof=1).to_numpy(),
-                "replicates": finite.notna().sum(axis=1).to_numpy(),
-            }
-        )
-        final = pd.DataFrame(
-            {
-                "series": FINAL,
-                "replicate": c.summaries.index,
-                "value": c.column("best_cost"),
-                "refuted": measures.refuted(c) == 1.0,
-            }
-        )
-        own: dict[str, Any] = {
-            "position": position,
-            "method": c.label,
-            "panel": panels.get(c.label, len(PAIRS)),
-            "hall": bool(c.planner.ga.hall_depth),
+        curve: dict[str, Any] = {"series": CURVE, "generation": finite.index.to_numpy()}
+        curve |= {"value": finite.mean(axis=1).to_numpy()}
+        curve |= {"deviation": finite.std(axis=1, ddof=1).to_numpy()}
+        curve |= {"replicates": finite.notna().sum(axis=1).to_numpy()}
+        final: dict[str, Any] = {
+            "series": FINAL,
+            "replicate": c.summaries.index,
+            "value": c.column("best_cost"),
         }
-        parts += [part.assign(**own) for part in (curve, final)]
+        final |= {"refuted": measures.refuted(c) == 1.0}
+        own: dict[str, Any] = {"position": position, "method": c.label}
+        own |= {"panel": panels.get(c.label, len(PAIRS)), "hall": bool(c.planner.ga.hall_depth)}
+        parts += [pd.DataFrame(part).assign(**own) for part in (curve, final)]
     lines = pd.DataFrame({"series": [BOUND, THRESHOLD], "value": [bound, threshold]})
     table = pd.concat([*parts, lines], ignore_index=True)
     return table[ORDER].astype({"value": "float64", "deviation": "float64"})

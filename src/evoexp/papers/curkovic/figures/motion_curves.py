@@ -28,59 +28,50 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
     prepared = condition.prepared
     motion = link_motions.executed(prepared, condition.solutions[condition.best_replicate])
     found, limits = link_motions.sampled(motion, SAMPLES), link_motions.speed_limits(prepared)
-    parts = [
-        pd.DataFrame(
-            {
-                "robot": robot,
-                "link": link,
-                "instant": found.instants,
-                "angle_deg": found.links[:, robot, link],
-                "turn_deg": np.abs(found.speeds[:, robot, link]),
-                "limit_deg": limit,
-            }
-        )
-        for (robot, link), limit in np.ndenumerate(limits)
-    ]
-    table = rounded(pd.concat(parts, ignore_index=True))
-    table.insert(3, "at_configuration", table["instant"] == table["instant"].round())
-    return table
+    parts = []
+    for (robot, link), limit in np.ndenumerate(limits):
+        columns: dict[str, Any] = {"robot": robot, "link": link, "instant": found.instants}
+        columns |= {"at_configuration": found.instants == found.instants.round()}
+        columns |= {"angle_deg": found.links[:, robot, link]}
+        columns |= {"turn_deg": np.abs(found.speeds[:, robot, link]), "limit_deg": limit}
+        parts.append(pd.DataFrame(columns))
+    return rounded(pd.concat(parts, ignore_index=True))
 
 
 def draw_joints(table: pd.DataFrame) -> Figure:
     """Draw link angles in their range, and beside them turns per sampling step with limits."""
-    robots = sorted(table["robot"].unique())
-    figure = style.figure(1.9 * len(robots) + 1.0)
-    panels = figure.subplots(len(robots), 2, sharex=True, squeeze=False)
-    for (angles, turns), robot in zip(panels, robots, strict=True):
-        own, colour = table[table["robot"] == robot], style.arm_colour(int(robot))
-        low, high = float(own["angle_deg"].min()), float(own["angle_deg"].max())
+    red: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 0.9, "zorder": 1}
+    limit_look = red | {"linestyle": ":", "linewidth": 1.2}
+    figure, panels = style.panels(1.9, 2 * table["robot"].nunique(), 2, 1.0)
+    for (robot, own), angles, turns in zip(
+        groups(table, "robot"), panels[::2], panels[1::2], strict=True
+    ):
+        colour = style.arm_colour(int(robot))
         for edge in (0.0, HALF_TURN):
-            angles.axhline(edge, color=style.FORBIDDEN, linewidth=0.9, zorder=1)
-        ends = min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0
-        angles.set(ylim=ends, yticks=[0, 60, 120, 180])
+            angles.axhline(edge, **red)
         for link, rows in groups(own, "link"):
-            kind = KINDS[int(link)]
-            angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
-            turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
+            kind, x = KINDS[int(link)], rows["instant"]
+            angles.plot(x, rows["angle_deg"], color=colour, linestyle=kind)
+            turns.plot(x, rows["turn_deg"], color=colour, linestyle=kind)
             at = rows[rows["at_configuration"]]
             angles.plot(at["instant"], at["angle_deg"], "o", color=colour, **style.DOTS)
             limit = float(rows["limit_deg"].iloc[0])
-            turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
-            told = f"link {int(link) + 1}: {limit:.1f}°"
-            marks.beside(turns, limit, told, va="bottom" if link else "top")  # they may be close
+            turns.axhline(limit, **limit_look)
+            text = f"link {int(link) + 1}: {limit:.1f}°"
+            marks.beside(turns, limit, text, va="bottom" if link else "top")  # they may be close
         turns.set_ylim(bottom=0.0)
-        angles.set_ylabel(f"robot {robot + 1}: link angle [deg]")
+        angles.set(yticks=[0, 60, 120, 180], ylabel=f"robot {robot + 1}: link angle [deg]")
         turns.set_ylabel("turn per step [deg]")
-    panels[0, 0].set_title("a  link angles from +x")
-    panels[0, 1].set_title("b  turns per sampling step")
-    for axes in panels[-1]:
+    panels[0].set_title("a  link angles from +x")
+    panels[1].set_title("b  turns per sampling step")
+    for axes in panels[-2:]:
         axes.set_xlabel("sampling step (whole numbers: configurations)")
-    grey, red = style.NEUTRAL, style.FORBIDDEN
+    grey = style.NEUTRAL
     keys = [
         *(style.key(f"link {k + 1}", color=grey, linestyle=kind) for k, kind in enumerate(KINDS)),
         style.key("configurations", color=grey, marker="o", mec="white", linestyle="none", ms=5),
-        style.key("range [0, 180°]", color=red, linewidth=0.9),
-        style.key("limit of a link, Eq. 2", color=red, linewidth=1.2, linestyle=":"),
+        style.key("range [0, 180°]", **red),
+        style.key("limit of a link, Eq. 2", **limit_look),
     ]
     style.keys_below(figure, keys)
     return figure

@@ -133,7 +133,7 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
 def draw_tools(table: pd.DataFrame) -> Figure:
     """Draw the paths with circles at the configurations, a panel per collision substeps."""
     tests, unit = list(groups(table, "collision_substeps"))[::-1], table["length_unit"].iloc[0]
-    looks = {
+    looks: dict[float, dict[str, Any]] = {
         radius: {"color": style.condition_colour(k)}
         for k, radius in enumerate(sorted(table["tcp_radius"].unique()))
     }

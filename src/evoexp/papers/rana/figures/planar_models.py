@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
@@ -88,22 +87,25 @@ def via_points_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_via_points(table: pd.DataFrame) -> Figure:
     """Draw via-points in the arms' configuration planes, every fifth numbered by its instant."""
-    figure, planes = configuration_planes(table, 3.6)
+    arms = list(groups(table, "arm"))
+    figure, panels = style.panels(3.6, len(arms))
     first, last = dict.fromkeys(table["stage"])
     looks: dict[str, dict[str, Any]] = {
         first: {"color": style.FAINT, "linewidth": 0.9, "marker": "s", "markersize": 3},
         last: {"color": style.NEUTRAL, "linewidth": 0.9, "marker": "o", "markersize": 4},
     }
-    for axes, arm, rows in planes:
+    for axes, (arm, rows) in zip(panels, arms, strict=True):
         for stage, look in looks.items():
             colour = {"color": style.arm_colour(arm)} if stage == last else {}
             own = rows[rows["stage"] == stage]
             axes.plot(*(own[name] for name in ANGLES), **look | colour)
         for row in records(own[(own["instant"] % NUMBERED == 0) | (own.index == own.index[-1])]):
             number: dict[str, Any] = {"fontsize": 7, "zorder": 6, "path_effects": marks.HALO}
-            marks.write(
-                axes, str(row.instant), (row.joint_1_deg, row.joint_2_deg), (0, 6), **number
-            )
+            place = row.joint_1_deg, row.joint_2_deg
+            marks.write(axes, str(row.instant), place, (0, 6), **number)
+        x, y = (f"{style.joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
+        axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
+        axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
         axes.margins(0.1)
     keys = [
         style.key(first, **looks[first]),
@@ -111,19 +113,6 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
     ]
     style.keys_below(figure, keys)
     return figure
-
-
-def configuration_planes(
-    table: pd.DataFrame, height: float
-) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
-    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm)."""
-    by_arm = list(groups(table, "arm"))
-    figure, panels = style.panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
-    for axes, (arm, _) in zip(panels, by_arm, strict=True):
-        x, y = (f"{style.joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
-        axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
-        axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
-    return figure, [(axes, *own) for axes, own in zip(panels, by_arm, strict=True)]
 
 
 def circles_table(condition: ConditionResults) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
 from evoexp.papers.rana import motions
-from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
+from evoexp.papers.rana.figures.planar_models import ANGLES, path_table
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, rounded, style
@@ -92,12 +92,7 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_paths(table: pd.DataFrame) -> Figure:
     """Draw the paths in the arms' configuration planes."""
-    figure, planes = configuration_planes(table, 3.7)
-    for axes, arm, rows in planes:
-        motions.draw_paths(axes, rows, ANGLES, style.arm_colour(arm))
-        axes.margins(0.08)
-    style.keys_below(figure, motions.path_keys(table))
-    return figure
+    return motions.draw_paths(table, ANGLES)
 
 
 def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
@@ -122,7 +117,10 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
     series[HIGHEST] = [found.at_highest for found in ranges]
     parts = []
     for name, places in series.items():
-        columns = {"series": name, "instant": np.arange(places[0].shape[1]) / samples}
+        columns: dict[str, Any] = {
+            "series": name,
+            "instant": np.arange(places[0].shape[1]) / samples,
+        }
         for q, (column, (exactly, _)) in zip(places, measures.items(), strict=True):
             columns[column] = exactly(q)
         parts.append(pd.DataFrame(columns))
@@ -168,7 +166,11 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
                 touching = own[own["refuted_at"].notna()].set_index("refuted_at")["clearance"]
                 series |= {CLOSEST: free, REFUTED: touching}
             for name, values in series.items():
-                columns = {"measure": measure, "series": name, "instant": values.index}
+                columns: dict[str, Any] = {
+                    "measure": measure,
+                    "series": name,
+                    "instant": values.index,
+                }
                 rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
                 parts.append(rows.assign(kind=kind, safety_distance=margin))
     table = rounded(pd.concat(parts, ignore_index=True))

@@ -33,9 +33,8 @@ def arm_table(condition: ConditionResults) -> pd.DataFrame:
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
     rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
     added = rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
-    added = added.assign(
-        element="sphere", radius=problem.sphere_radius, length_unit=first["length_unit"].iloc[0]
-    )
+    look: dict[str, Any] = {"radius": problem.sphere_radius, "length_unit": condition.length_unit}
+    added = added.assign(element="sphere", **look)
     return pd.concat([first, added], ignore_index=True)
 
 
@@ -83,7 +82,7 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     above.set_title("b  from above, with each arm's reach")
     turn = np.linspace(0.0, 2.0 * np.pi, 121)
     for (arm, instant), links in groups(table, ["arm", "instant"]):
-        colour, look = style.arm_colour(arm), {"linestyle": trails.DASHES if instant else "-"}
+        colour, look = style.arm_colour(arm), trails.DASHED if instant else {}
         for place, names in ((axes, "xyz"), (above, "xy")):
             trails.draw_chain(place, links, colour, names, **look)
             trails.draw_base(place, links, names)
@@ -128,29 +127,12 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_configuration_space(table: pd.DataFrame) -> Figure:
     """Draw the paths through the first three joint angles of every arm."""
-    figure, by_arm = style.figure(4.0), list(groups(table, "arm"))
-    for k, (arm, rows) in enumerate(by_arm):
-        axes: Any = figure.add_subplot(1, len(by_arm), k + 1, projection="3d")
-        columns = [f"joint_{j}_deg" for j in (1, 2, 3)]
-        motions.draw_paths(axes, rows, columns, style.arm_colour(arm))
-        _label(axes, [f"{style.joint_symbol(arm, j)} [deg]" for j in range(3)])
-        axes.set_title(f"arm {arm + 1}")
-    style.keys_below(figure, motions.path_keys(table))
-    return figure
+    return motions.draw_paths(table, [f"joint_{j}_deg" for j in (1, 2, 3)])
 
 
 def draw_operational_space(table: pd.DataFrame) -> Figure:
     """Draw the paths of the tips of all arms."""
-    figure = style.figure(4.2, 5.6)
-    axes: Any = figure.add_subplot(projection="3d")
-    for arm, rows in groups(table, "arm"):
-        motions.draw_paths(axes, rows, ["x", "y", "z"], style.arm_colour(arm))
-    _label(axes, [f"{name} [{table['length_unit'].iloc[0]}]" for name in "xyz"])
-    spans = np.ptp(table[["x", "y", "z"]].to_numpy(), axis=0)
-    axes.set_box_aspect(np.maximum(spans, 0.15 * spans.max()), zoom=1.0)
-    keys = [*trails.arm_keys(set(table["arm"])), *motions.path_keys(table)]
-    style.keys_below(figure, keys, 4)
-    return figure
+    return motions.draw_paths(table, ["x", "y", "z"], together=True)
 
 
 def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
@@ -161,21 +143,8 @@ def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     tips = {arm: end for arm, _, _, end in places}  # the last link's end stays
     frames = []
     for arm, (first, stop) in enumerate(problem.arm_slices):
-        columns = {
-            "arm": arm,
-            "instant": np.arange(q.shape[1]),
-            **dict(zip("xyz", tips[arm].T, strict=True)),
-            **{f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)},
-        }
+        columns: dict[str, Any] = {"arm": arm, "instant": np.arange(q.shape[1])}
+        columns |= dict(zip("xyz", tips[arm].T, strict=True))
+        columns |= {f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)}
         frames.append(pd.DataFrame(columns))
     return pd.concat(frames, ignore_index=True)
-
-
-def _label(axes: Any, labels: list[str]) -> None:
-    axes.tick_params(labelsize=6, pad=-1)
-    for axis, label in zip((axes.xaxis, axes.yaxis, axes.zaxis), labels, strict=True):
-        axis.set_label_text(label)
-        axis.labelpad = -2
-        axis.set_major_locator(style.few_ticks())
-    axes.view_init(elev=24.0, azim=-50.0)
-    axes.set_box_aspect(None, zoom=0.82)

@@ -40,7 +40,9 @@ def draw_chain(
         axes.plot(*points, "o", alpha=look.get("alpha"), zorder=look["zorder"] + 1, **dots)
 
 
-def draw_trail(axes: Any, links: pd.DataFrame, colour: str, names: str = "xy") -> None:
+def draw_trail(
+    axes: Any, links: pd.DataFrame, colour: str, names: str = "xy", label: str | None = None
+) -> None:
     """Draw postures of an arm: the first dashed, later ones stronger, the last one wide; its tip.
 
     Links have an instant each.
@@ -48,7 +50,7 @@ def draw_trail(axes: Any, links: pd.DataFrame, colour: str, names: str = "xy") -
     first, last = links["instant"].min(), links["instant"].max()
     for instant, posture in groups(links, "instant"):
         if instant == last:
-            draw_chain(axes, posture, colour, names)
+            draw_chain(axes, posture, colour, names, label=label)
         elif instant == first:
             look: dict[str, Any] = {"linewidth": 1.4, "linestyle": DASHES, "zorder": 3}
             draw_chain(axes, posture, colour, names, joints=False, **look)

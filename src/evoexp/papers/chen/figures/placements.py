@@ -1,5 +1,6 @@
 """Docking postures: fitness, gaps, postures, landscapes of E (Chen & Zalzala 1995, Figs. 3–9)."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -126,7 +127,7 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
     """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles."""
     rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
-        scenario: Any = case.conditions[0].scenario
+        scenario, robot = case.conditions[0].scenario, case.conditions[0].robot
         own: list[tuple[Any, ...]] = [
             ("obstacle", "", *place, *place, float(getattr(obstacle, "radius", 0.0)))
             for obstacle, place in zip(
@@ -141,25 +142,19 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
         shown = case.optimal_angles, best, case.printed.angles
         for posture, angles in zip(POSTURE_LOOKS, shown, strict=True):
             found = {} if angles is None else case.measured(angles)
-            if found.get("branch", -1.0) >= 0.0:
-                own += _links(case, posture, found)
+            if found.get("branch", -1.0) < 0.0:
+                continue
+            length, height = 0.5 * np.array(robot.platform_size)
+            turns = np.cumsum([np.radians(found[f"theta_{k}_deg"]) for k in (1, 2, 3)])
+            steps = np.array([np.cos(turns), np.sin(turns)]) * np.array(robot.link_lengths)
+            joints = np.cumsum([(found["platform_x"], 0.0), *steps.T], axis=0)
+            x, y = joints[0]
+            own.append(("platform", posture, x - length, y - height, x + length, y + height, 0.0))
+            ends = enumerate(pairwise(joints), 1)
+            own += [("link", posture, *start, *end, float(k)) for k, (start, end) in ends]
         rows += [(panel, case.name, *row) for row in own]
     names = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
     return rounded(pd.DataFrame(rows, columns=names))
-
-
-def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any, ...]]:
-    """Return the platform and the links of a posture, of which the terms are given."""
-    robot: Any = case.conditions[0].robot
-    length, height = 0.5 * np.array(robot.platform_size)
-    angles = np.cumsum([np.radians(found[f"theta_{k}_deg"]) for k in (1, 2, 3)])
-    steps = np.array([np.cos(angles), np.sin(angles)]) * np.array(robot.link_lengths)
-    joints = np.cumsum([(found["platform_x"], 0.0), *steps.T], axis=0)
-    x, y = joints[0]
-    return [
-        ("platform", posture, x - length, y - height, x + length, y + height, 0.0),
-        *(("link", posture, *joints[k], *joints[k + 1], k + 1.0) for k in range(len(joints) - 1)),
-    ]
 
 
 def draw_postures(table: pd.DataFrame) -> Figure:

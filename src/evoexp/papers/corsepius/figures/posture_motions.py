@@ -124,10 +124,8 @@ def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any
 
 def _points(rows: pd.DataFrame) -> FloatArray:
     """Return points that a panel has to hold."""
-    links, goal = (rows[rows["element"] == element] for element in (LINK, GOAL))
-    solid = rows[rows["element"].isin([OBSTACLE, HELD])]
-    parts = (part.to_numpy(dtype=np.float64) for part in (links[PLACE], links[PATH], goal[PLACE]))
-    return np.vstack([*parts, solids.corners(solid)])
+    links, goal, *solid = (rows[rows["element"] == e] for e in (LINK, GOAL, OBSTACLE, HELD))
+    return np.vstack([links[PLACE], links[PATH], goal[PLACE], *map(solids.corners, solid)])
 
 
 def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:

@@ -59,9 +59,18 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
     failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
-    rows += _cells(stuck, failed[-1], a, b)
+    end = failed[-1]
+    # the cost over two joints, the others as at the end of the run that is stuck
+    low, high = _box(problem, end, AROUND)
+    q = np.repeat(end[:, None], CELLS * CELLS, axis=1)
+    ranges = [np.linspace(low[k], high[k], CELLS) for k in (a, b)]
+    q[a], q[b] = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
+    same = {"element": CELL, "scope_deg": problem.scope[a] / DEGREE}
+    same |= {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE}
+    cells = zip(q[a] / DEGREE, q[b] / DEGREE, _cost(stuck, q), strict=True)
+    rows += [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
     # the least cost of random postures in boxes around that posture, and its own cost
-    rng, end = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED)), failed[-1]
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     (own,) = _cost(stuck, end[:, None])
     for n, half in enumerate(BOXES):
         low, high = _box(problem, end, half)
@@ -85,19 +94,6 @@ def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
     planner, problem = condition.prepared
     cost = planner.cost(problem, q).cost
     return np.where(np.isinf(cost), np.nan, cost)
-
-
-def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
-    """Return the cost over two joints, the others as at the end of the run that is stuck."""
-    problem = measures.problem(condition)
-    low, high = _box(problem, end, AROUND)
-    ranges = [np.linspace(low[k], high[k], CELLS) for k in (a, b)]
-    q = np.repeat(end[:, None], CELLS * CELLS, axis=1)
-    q[a], q[b] = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
-    ends = {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE}
-    same = {"element": CELL, "scope_deg": problem.scope[a] / DEGREE} | ends
-    cells = zip(q[a] / DEGREE, q[b] / DEGREE, _cost(condition, q), strict=True)
-    return [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
 
 
 def _box(problem: Problem, q: FloatArray, scopes: float) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, Patch, Rectangle
+from matplotlib.patches import Ellipse
 
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers import trails
@@ -67,9 +67,22 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
     """Return scenes, postures and contacts."""
     parts = []
     for panel, one in enumerate(shown):
-        unit = one.condition.length_unit
-        rows = [*_scene(one.condition), *_postures(one)]
-        parts += [(panel, one.title, *row, unit) for row in rows]
+        scenario, unit = one.condition.scenario, one.condition.length_unit
+        table = scenario.obstacle_table()
+        angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
+        ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)
+        targets = zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True)
+        left, right, bottom, top = scenario.box
+        scene: list[tuple[Any, ...]] = [
+            *(
+                (ELLIPSE, f"obstacle_{k}", *center, *center, *size, float(angle))
+                for k, (center, size, angle) in enumerate(ellipses, 1)
+            ),
+            (BOX, "box", left, bottom, right, top, *NO_SIZE),
+            *((TARGET, name, *point, *point, *NO_SIZE) for name, point in targets),
+        ]
+        rows = [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in scene]
+        parts += [(panel, one.title, *row, unit) for row in (*rows, *_postures(one))]
     return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
@@ -83,54 +96,17 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
     figure = style.figure(height + (3.6 if moving else 0.0) + 1.0)
     places = figure.subplots(1 + moving, len(panels), squeeze=False, width_ratios=ratios)
     for views, rows in zip(places.T, panels, strict=True):
-        contacts = rows[rows["element"] == CONTACT]
         for axes in views:
             style.operational_axes(axes, rows["length_unit"].iloc[0])
             _draw_scene(axes, rows)
             _draw_postures(axes, rows)
-            marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9)
         shown = rows[rows["element"].isin([BOX, TARGET])]
         limits = trails.room(rows), trails.room(shown, share=AROUND)
         titles = rows["title"].iloc[0], "around the box"
         for axes, title, (low, high) in zip(views, titles, limits, strict=False):
             axes.set(title=title, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    moved = sorted(set(table.loc[table["element"] == LINK, "sub_path"]) - {0})
-    point: dict[str, Any] = {"linestyle": "none", "color": "black", "mec": "white", "ms": 9}
-    keys = [
-        style.key("start posture", color=style.NEUTRAL, linewidth=trails.WIDE),
-        *(
-            style.key(f"SP{k}, to posture {'AB'[k - 1]}", color=_colour(k), linewidth=trails.WIDE)
-            for k in moved
-        ),
-        Patch(facecolor=style.FAINT, label="ellipses"),
-        style.key("inside of the box", color=style.FAINT, **INSIDE),
-        *(style.key(name, marker=MARKERS[name], **point) for name in TARGETS),
-    ]
-    if (table["element"] == CONTACT).any():
-        cross: dict[str, Any] = {"color": style.FORBIDDEN, "mec": "white"}
-        keys.append(style.key("posture in contact, never tested", color=style.FORBIDDEN, **TOUCH))
-        keys.append(marks.point_key("first contact of a sub-path", "X", 9, **cross))
-    style.keys_below(figure, keys, 3)
+    style.legend_below(figure, places.flat, 3)
     return figure
-
-
-def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
-    """Return the rows of ellipses, box and targets."""
-    scenario = condition.scenario
-    table = scenario.obstacle_table()
-    angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
-    ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)
-    targets = zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True)
-    left, right, bottom, top = scenario.box
-    rows: list[tuple[Any, ...]] = [
-        *(
-            (ELLIPSE, f"obstacle_{k}", *center, *center, *size, float(angle))
-            for k, (center, size, angle) in enumerate(ellipses, 1)
-        ),
-        (BOX, "box", left, bottom, right, top, *NO_SIZE),
-        *((TARGET, name, *point, *point, *NO_SIZE) for name, point in targets),
-    ]
-    return [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in rows]
 
 
 def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
@@ -166,39 +142,42 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw ellipses, box and targets."""
     for row in records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
-        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
+        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2, "label": "ellipses"}
         axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
     for row in records(rows[rows["element"] == BOX]):
-        size = row.x_end - row.x, row.y_end - row.y
-        edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
-        axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
+        x, y = (
+            [row.x, row.x_end, row.x_end, row.x, row.x],
+            [row.y, row.y, row.y_end, row.y_end, row.y],
+        )
+        axes.plot(x, y, color=style.FAINT, label="inside of the box", zorder=1, **INSIDE)
     for row in records(rows[rows["element"] == TARGET]):
-        wide = 8 if row.name == "via point" else 11
         point: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
-        axes.plot(row.x, row.y, MARKERS[row.name], ms=wide, **point)
+        axes.plot(row.x, row.y, MARKERS[row.name], ms=10, label=row.name, **point)
 
 
 def _draw_postures(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw the start in black, each sub-path in a colour of its own, ends with their names."""
-    links, touching = (rows[rows["element"] == element] for element in (LINK, TOUCHING))
-    for _, posture in groups(touching, "instant"):
-        trails.draw_chain(axes, posture, style.FORBIDDEN, joints=False, zorder=6, **TOUCH)
-    for sub_path, own in groups(links[links["sub_path"] > 0], "sub_path"):
-        trails.draw_trail(axes, own, _colour(sub_path))
+    links, touching, contacts = (
+        rows[rows["element"] == element] for element in (LINK, TOUCHING, CONTACT)
+    )
     for sub_path, own in groups(links, "sub_path"):
-        end = own[own["instant"] == own["instant"].max()]
-        if sub_path == 0:
-            trails.draw_chain(axes, end, style.NEUTRAL)
-            trails.draw_base(axes, end)
+        end, colour = own[own["instant"] == own["instant"].max()], style.NEUTRAL
         name, place, side = PLACES[sub_path]
-        look: dict[str, Any] = {"ha": side, "zorder": 10, "color": _colour(sub_path)}
+        if sub_path == 0:
+            trails.draw_chain(axes, end, colour, label="start posture")
+            trails.draw_base(axes, end)
+        else:
+            colour = style.arm_colour(sub_path - 1)
+            trails.draw_trail(axes, own, colour, label=f"SP{sub_path}, to posture {name}")
+        look: dict[str, Any] = {"ha": side, "zorder": 10, "color": colour}
         tip = end[["x_end", "y_end"]].iloc[-1]
         marks.write(axes, name, tip, place, path_effects=marks.HALO, **look)
-
-
-def _colour(sub_path: int) -> str:
-    """Return the colour of a sub-path; that of the start for 0."""
-    return style.arm_colour(sub_path - 1) if sub_path else style.NEUTRAL
+    for _, posture in groups(touching, "instant"):
+        label = "posture in contact, never tested"
+        trails.draw_chain(axes, posture, style.FORBIDDEN, joints=False, label=label, **TOUCH)
+    if len(contacts):
+        cross: dict[str, Any] = {"linestyle": "none", "label": "first contact of a sub-path"}
+        marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9, **cross)
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {

@@ -64,7 +64,7 @@ def draw_history(table: pd.DataFrame) -> Figure:
         numbered = enumerate(phases, 1)
         panels = [(table["phase"] == name, f"{k}  {name}", DISTANCE) for k, name in numbered]
     figure, places = style.panels(height, len(panels), PER_LINE, 0.8)
-    far = table.loc[table["quantity"] == DISTANCE, ["lower", "upper"]].to_numpy()
+    far = table.loc[table["quantity"] == DISTANCE, ["lower", "upper", "tolerance"]].to_numpy()
     far = far[far > VISIBLE]
     for axes, (chosen, title, quantity) in zip(places, panels, strict=True):
         rows = table[chosen & (table["quantity"] == quantity)]

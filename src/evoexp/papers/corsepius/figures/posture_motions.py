@@ -78,7 +78,8 @@ def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
     goal = style.key("goal", color="none", marker="*", mec=style.NEUTRAL, mfc="white", ms=9)
-    style.keys_below(figure, [*trails.trail_keys([0], "posture")[1:], goal])
+    tool = style.key("way of the tool", color=style.arm_colour(1), linewidth=1.0)
+    style.keys_below(figure, [*trails.trail_keys([])[:-1], tool, goal])
     return figure
 
 

@@ -91,7 +91,7 @@ def test_postures_end_at_the_target(cases: list[Case]) -> None:
     table = placements.postures_table(cases)
     tips = table[(table["element"] == "link") & (table["size"] == 3.0)][["x_end", "y_end"]]
     np.testing.assert_allclose(tips, [[5.0, 1.4]] * len(tips), atol=1e-9)
-    assert set(table["posture"]) == {"", *placements.POSTURE_NAMES}
+    assert set(table["posture"]) == {"", *placements.POSTURE_LOOKS}
     assert len(table[table["element"] == "obstacle"]) == 2
 
 

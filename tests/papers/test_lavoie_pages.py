@@ -17,13 +17,7 @@ from evoexp.report.results import motion_geometry, run_measures
 from evoexp.report.results.stored_results import ConditionResults, gather
 from evoexp.report.statistics.inference import Proportion
 from references.link_crossings_numpy import squared_distance
-from report_samples import (
-    can_be_drawn,
-    page_settings,
-    smoke_experiment,
-    smoke_results,
-    store,
-)
+from report_samples import can_be_drawn, page_settings, smoke_experiment, smoke_results, store
 
 LINK, ELLIPSE, BOX = reaching_motions.LINK, reaching_motions.ELLIPSE, reaching_motions.BOX
 TARGET, CONTACT = reaching_motions.TARGET, reaching_motions.CONTACT

@@ -76,12 +76,6 @@ def test_distances_of_bodies_are_those_of_links(one: Prepared, solution: FloatAr
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_arms_are_those_of_the_collision_model(linear: Prepared) -> None:
-    for found, own in zip(link_motions.arms(linear), linear.problem.collision.arms, strict=True):
-        assert found.base == pytest.approx(own.base, abs=1e-12)
-        assert found.lengths == pytest.approx(own.lengths, rel=1e-12)
-
-
 def test_a_contact_lies_on_both_bodies(linear: Prepared) -> None:
     planner, problem = linear
     line = link_motions.straight(linear)

@@ -202,7 +202,7 @@ def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ..
         turned = world[:, shape.frame, 3:5] if shape.frame >= 0 else np.zeros(1)
         flat &= bool(np.ptp(heights) == 0.0 and np.abs(turned).max() == 0.0)
     for shape in shapes:
-        if shape.role != "arm" and 0.0 < shape.outline.reach < FAR * room:
+        if shape.role != "arm" and 0.0 < shape.outline.half.max() < FAR * room:
             ways.append(_corners(shape, world))
     ways += [place.point[None] for place in places]
     low, high = (bound(np.concatenate(ways), axis=0) for bound in (np.min, np.max))
@@ -211,14 +211,6 @@ def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ..
 
 def _corners(shape: Shape, world: FloatArray) -> FloatArray:
     """Return points of a body at all ticks, (points, 3): its ends, its edges, its semi-axes."""
-    outline, turn = shape.outline, pin.XYZQUATToSE3(shape.pose)
-    half = np.full(3, outline.size[0]) if outline.size else np.full(3, outline.reach)
-    if outline.kind == "box":
-        half = 0.5 * np.array(outline.size)
-    elif outline.kind == "ellipsoid":
-        half = np.array(outline.size)
-    elif len(outline.size) == 2:
-        half[2] = 0.5 * outline.size[1] + (outline.size[0] if outline.kind == "capsule" else 0.0)
-    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-    corners = np.array([turn * (sign * half) for sign in signs])
+    turn, half = pin.XYZQUATToSE3(shape.pose), shape.outline.half
+    corners = np.array([turn * (np.array(sign) * half) for sign in product((-1.0, 1.0), repeat=3)])
     return points(world, shape.frame, corners).reshape(-1, 3)

@@ -30,17 +30,15 @@ class Outline(NamedTuple):
         return self.kind == "capsule" and self.size[0] == 0.0
 
     @property
-    def reach(self) -> float:
-        """Greatest distance of a point from the frame's origin; 0 for a half-space."""
+    def half(self) -> FloatArray:
+        """Half the edges of a box around the shape and its frame, (3,); 0 for a half-space."""
         if self.points is not None:
-            return float(np.sqrt((self.points**2).sum(axis=1).max()))
-        if self.kind == "box":
-            return 0.5 * float(np.sqrt(np.square(self.size).sum()))
-        if self.kind == "capsule":
-            return self.size[0] + 0.5 * self.size[1]
-        if self.kind in ("cylinder", "cone"):
-            return float(np.hypot(self.size[0], 0.5 * self.size[1]))
-        return max(self.size, default=0.0)
+            return np.full(3, np.sqrt((self.points**2).sum(axis=1).max()))
+        if self.kind in ("box", "ellipsoid"):
+            return np.array(self.size) * (0.5 if self.kind == "box" else 1.0)
+        radius, length = (*self.size, 0.0, 0.0)[:2]
+        round_end = radius if self.kind in ("sphere", "capsule") else 0.0
+        return np.array([radius, radius, 0.5 * length + round_end])
 
 
 class Shape(NamedTuple):

@@ -55,7 +55,7 @@ class Share(NamedTuple):
 
     value: float  # (nothing − elites) / (nothing − hall); NaN where the hall gains nothing
     interval: Interval  # over resampled seeds; NaN where the hall's gain cannot be told from none
-    n: tuple[int, int, int]  # runs of nothing, elites and hall that count
+    n: tuple[int, ...]  # runs of nothing, elites and hall that count
 
 
 def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
@@ -65,22 +65,26 @@ def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
         ga = condition.planner.ga
         return ga.mutation_direction, ga.mutation_rate, ga.mutation_decay
 
+    def treatment(condition: ConditionResults) -> str:
+        ga = condition.planner.ga
+        if not ga.hall_depth:
+            return "elites" if ga.num_elites else "nothing"
+        return "other" if ga.hall_frozen or ga.hall_memory is not None else str(ga.hall_distinct)
+
     found = []
     for own in grouped(conditions, key):
-        plain = [c for c in own if not c.planner.ga.hall_depth]
-        nothing = [c for c in plain if not c.planner.ga.num_elites]
-        elites = [c for c in plain if c.planner.ga.num_elites]
-        elites.sort(key=lambda c: int(c.planner.ga.num_elites))
-        halls = [c for c in own if c.planner.ga.hall_depth]
-        usual = [
-            c for c in halls if not c.planner.ga.hall_frozen and c.planner.ga.hall_memory is None
-        ]
-        genomes = [c for c in usual if c.planner.ga.hall_distinct == "genome"]
-        indices = [c for c in usual if c.planner.ga.hall_distinct == "index"]
-        if nothing and elites and genomes:
-            name, by_index = genomes[0].label.rpartition(", ")[0], next(iter(indices), None)
-            kept = nothing[0], tuple(elites), genomes[0], by_index
-            found.append(Corner(name, *kept, tuple(c for c in halls if c not in usual)))
+        by: dict[str, list[ConditionResults]] = {}
+        for c in own:
+            by.setdefault(treatment(c), []).append(c)
+        if {"nothing", "elites", "genome"} <= by.keys():
+            elites = tuple(sorted(by["elites"], key=lambda c: int(c.planner.ga.num_elites)))
+            nothing, hall, index = (
+                by["nothing"][0],
+                by["genome"][0],
+                [*by.get("index", ()), None][0],
+            )
+            name, others = hall.label.rpartition(", ")[0], tuple(by.get("other", ()))
+            found.append(Corner(name, nothing, elites, hall, index, others))
     return tuple(found)
 
 
@@ -97,8 +101,6 @@ def share(
     no gain by the hall, the gain cannot be told from none, and there is no interval.
     """
     three = (corner.nothing, elites, hall)
-    values = [of_all_runs(measure, c) for c in three]
-    n = tuple(measure.runs(c) for c in three)
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     count = min(c.done for c in three)
     draws = rng.integers(0, count, (settings.num_resamples, count))
@@ -109,9 +111,9 @@ def share(
     if np.mean(~gains) <= tail:
         shares = _shares(nothing[gains], some[gains], full[gains])
         interval = Interval(quantile(shares, tail), quantile(shares, 1.0 - tail))
-    one = np.array(values)[:, None]
-    value = float(_shares(*one)[0]) if values[2] < values[0] else np.nan
-    return Share(value, interval, (n[0], n[1], n[2]))
+    values = np.array([of_all_runs(measure, c) for c in three])[:, None]
+    value = float(_shares(*values)[0]) if values[2] < values[0] else np.nan
+    return Share(value, interval, tuple(measure.runs(c) for c in three))
 
 
 def medians(column: Callable[[ConditionResults], FloatArray]) -> Statistic:

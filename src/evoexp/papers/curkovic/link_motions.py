@@ -34,15 +34,7 @@ class SampledMotion(NamedTuple):
 
 def arms(prepared: Prepared) -> tuple[Arm, ...]:
     """Return base and link lengths of every robot."""
-    assembly = prepared.problem.assembly
-    placed = motion_geometry.joint_positions(assembly, np.zeros((assembly.model.nq, 1)))
-    bases = {robot: start[0] for robot, link, start, _ in placed if link == 0}
-    found = []
-    for robot, (x, y, _) in bases.items():
-        links = [link for link in assembly.links if link.arm == robot][:2]
-        one, two = (float(np.sqrt(np.sum((k.end - k.start) ** 2))) for k in links)
-        found.append(Arm((float(x), float(y)), (one, two)))
-    return tuple(found)
+    return tuple(Arm((x, y), (one, two)) for x, y, one, two in prepared.problem.arms.tolist())
 
 
 def executed(prepared: Prepared, solution: FloatArray) -> Motion:
@@ -51,10 +43,7 @@ def executed(prepared: Prepared, solution: FloatArray) -> Motion:
     Straight lines or cubic curves lead from configuration to configuration, robot by robot.
     """
     polynomials = prepared.planner.motion(prepared.problem, solution).polynomials.copy()
-    links = polynomials.reshape(
-        *polynomials.shape[:2], -1, 2
-    )  # joints turn against the link before
-    links[..., 1] += links[..., 0]
+    polynomials[..., 1::2] += polynomials[..., ::2]  # joints turn against the link before
     return cubic_motion(polynomials)
 
 

@@ -9,10 +9,9 @@ from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import BoolArray, FloatArray
 from evoexp.report.pages.page_parts import PlayedRun
-from evoexp.report.results.run_measures import counted, search_seconds, solved
+from evoexp.report.results.run_measures import counted, search_seconds, solved, summed, touches
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import inference
-from evoexp.report.statistics.comparisons import Values
 from evoexp.report.statistics.inference import Proportion, quantile
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
@@ -68,8 +67,7 @@ def refuted(condition: ConditionResults) -> FloatArray:
 
     NaN where nothing is solved.
     """
-    found = condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=np.float64)
-    return np.where(solved(condition), found, np.nan)
+    return np.where(solved(condition), touches(condition), np.nan)
 
 
 def free_by_envelope(condition: ConditionResults) -> BoolArray:
@@ -89,19 +87,9 @@ def free_by_envelope(condition: ConditionResults) -> BoolArray:
     )
 
 
-def _over_robots(name: str) -> Values:
-    """Return the function that sums a term of each run's answer over the robots, (done,)."""
-
-    def total(condition: ConditionResults) -> FloatArray:
-        columns = [str(each) for each in condition.summaries if str(each).startswith(name)]
-        return np.asarray(np.sum([condition.column(each) for each in columns], axis=0))
-
-    return total
-
-
-tip_path = _over_robots("term_tip_path_robot_")  # C2 [m]
-rotation = _over_robots("term_rotation_robot_")  # C3 [rad]
-unevenness = _over_robots("term_tip_unevenness_robot_")  # C4 [m]
+tip_path = summed("term_tip_path_robot_")  # C2 [m], over the robots
+rotation = summed("term_rotation_robot_")  # C3 [rad]
+unevenness = summed("term_tip_unevenness_robot_")  # C4 [m]
 
 
 def certified_cost(condition: ConditionResults) -> FloatArray:
@@ -127,13 +115,9 @@ class Defects(NamedTuple):
 
 def defects(condition: ConditionResults) -> Defects:
     """Count the solved motions that have each of the known defects."""
-    columns = [str(name) for name in condition.summaries if "term_out_of_range" in str(name)]
-    beyond = [np.zeros(condition.done), *(condition.column(name) for name in columns)]
-    having = (
-        refuted(condition) == 1.0,
-        np.max(beyond, axis=0) > ROUNDING,
-        times_over_limit(condition) > 1.0,
-    )
+    beyond = [condition.column(str(c)) for c in condition.summaries if "out_of_range" in str(c)]
+    leaves = np.max([np.zeros(condition.done), *beyond], axis=0) > ROUNDING
+    having = touches(condition), leaves, times_over_limit(condition) > 1.0
     return Defects(*(counted(each[solved(condition)]) for each in having))
 
 

@@ -112,7 +112,7 @@ def no_start_needed(judge: Judge, condition: ConditionResults) -> Claim | None:
 
 def free_of_collision(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that accepted motions touch nothing."""
-    refuted = run_measures.counted(measures.touches(condition)[run_measures.solved(condition)])
+    refuted = run_measures.counted(run_measures.touches(condition)[run_measures.solved(condition)])
     free = run_measures.certified(condition).having
     planned = condition.planned if condition.solved == condition.done else 0
     evidence = f"{markdown.share(free, refuted.total)} certified; refuted {judge.share(refuted, 1)}"

@@ -89,11 +89,6 @@ def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> l
     return [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
 
 
-def touches(condition: ConditionResults) -> np.ndarray:
-    """Return whether the exact verdict refutes each run's motion, (done,)."""
-    return condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=bool)
-
-
 class RefutedMotions(NamedTuple):
     """Counts of a condition's accepted motions that touch an obstacle."""
 
@@ -110,8 +105,7 @@ def refuted(condition: ConditionResults) -> RefutedMotions:
         for instant, _ in contacts(condition, replicate, verdict):
             touching[row, int(instant >= 1.0)] = True
     paths = touching[run_measures.solved(condition)]
-    counted = run_measures.counted
-    return RefutedMotions(counted(paths.any(axis=1)), *map(counted, paths.T))
+    return RefutedMotions(*map(run_measures.counted, (paths.any(axis=1), *paths.T)))
 
 
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
@@ -143,21 +137,17 @@ def weak_evidence(results: Results, confidence: float) -> Iterator[tuple[str, st
     if is_other or paths_differ(results):
         return
     for own in run_measures.grouped(results.with_data, run_measures.num_joints):
-        for one in (one for one in printed(own[0]) if one.bound == BOUND):
-            theirs = one.proportion
+        for theirs in (one.proportion for one in printed(own[0]) if one.bound == BOUND):
             intervals = {c.label: newcombe(below(c, BOUND), theirs, confidence) for c in own}
             same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
-            what = (
+            yield (
                 f"{own[0].label} and others: whose errors below {BOUND:g} cannot be told from the "
-                f"printed {100 * theirs.share:.1f} %"
-            )
-            text = (
+                f"printed {100 * theirs.share:.1f} %",
                 f"{len(same)} of {len(own)}{': ' if same else ''}{', '.join(same)} (0 within "
                 f"Newcombe's {100 * confidence:g} % interval of the difference; at most "
                 f"{max(c.done for c in own)} runs each). Agreement with Fig. 3 is weak evidence "
-                "for a setting as long as others agree as well"
+                "for a setting as long as others agree as well",
             )
-            yield (what, text)
 
 
 def paths_differ(results: Results) -> bool:
@@ -199,8 +189,7 @@ def literal_start(condition: ConditionResults) -> str:
     The words vertically and horizontally are not swapped then. Empty if nothing is shifted. The
     arm's collision model judges the start among the obstacles of the literal reading.
     """
-    scenario = condition.scenario
-    problem = condition.problem(Problem)
+    scenario, problem = condition.scenario, condition.problem(Problem)
     dx, dy = scenario.obstacle_shift
     if dx == dy:
         return ""

@@ -10,7 +10,7 @@ from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray, generations
 from evoexp.report.pages import markdown
-from evoexp.report.results.run_measures import grouped
+from evoexp.report.results.run_measures import grouped, summed
 from evoexp.report.results.stored_results import ConditionResults, Results
 from evoexp.report.statistics import comparisons
 from evoexp.report.statistics.comparisons import Comparison, FamilyComparison
@@ -26,15 +26,8 @@ PAIRS = 2000  # drawn of each generation
 COST = comparisons.by_column("best_cost")
 
 
-def unevenness(condition: ConditionResults) -> FloatArray:
-    """Return C3 + C4 + … of each run's best: sums of |step − mean step| (Eqs. 4, 5), (done,) [deg].
-
-    NaN where the planner has no such terms.
-    """
-    columns = [name for name in condition.summaries if str(name).startswith(UNEVENNESS)]
-    if not columns:
-        return np.full(condition.done, np.nan)
-    return np.asarray(np.sum([condition.column(str(name)) for name in columns], axis=0))
+# C3 + C4 + … of each run's best: sums of |step − mean step| (Eqs. 4, 5), (done,) [deg]
+unevenness = summed(UNEVENNESS)
 
 
 def evolution_told(

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import obstacle_pairs
+from evoexp.papers import trails
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, style
@@ -70,24 +72,44 @@ def paths_table(
     return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
 
 
-def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, colour: str) -> None:
-    """Draw the paths of an arm in a plane or in space, the best path with its start and goal."""
-    for (series, _), path in groups(rows, ["series", "replicate"]):
-        points = [path[name].to_numpy() for name in columns]
-        if series == best:
-            axes.plot(*points, color=colour, linewidth=1.8, marker="o", markersize=2.6, zorder=4)
-            axes.plot(*(p[:1] for p in points), "s", markersize=6.5, **WHITE)
-            axes.plot(*(p[-1:] for p in points), "*", markersize=10.5, **WHITE)
-        elif series == STRAIGHT:
-            axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
+def draw_paths(table: pd.DataFrame, columns: list[str], *, together: bool = False) -> Figure:
+    """Draw the paths of arms in the plane, or in space, of some columns; each arm in a panel.
+
+    Together they stand in one panel, which is that of the operational space.
+    """
+    arms, is_solid = list(groups(table, "arm")), len(columns) == 3
+    figure = style.figure(4.0, 5.6 if together else style.WIDTH)
+    for k, (arm, rows) in enumerate(arms):
+        colour = style.arm_colour(arm)
+        if k == 0 or not together:
+            place = (1, 1 if together else len(arms), k + 1)
+            axes: Any = figure.add_subplot(*place, projection="3d" if is_solid else None)
+        for (series, _), path in groups(rows, ["series", "replicate"]):
+            points = [path[name].to_numpy() for name in columns]
+            if series.startswith("best"):
+                axes.plot(*points, color=colour, linewidth=1.8, marker="o", ms=2.6, zorder=4)
+                axes.plot(*(p[:1] for p in points), "s", markersize=6.5, **WHITE)
+                axes.plot(*(p[-1:] for p in points), "*", markersize=10.5, **WHITE)
+            elif series == STRAIGHT:
+                axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
+            else:
+                axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
+        labels = [f"{style.joint_symbol(arm, joint)} [deg]" for joint in range(len(columns))]
+        if together:
+            labels = [f"{name} [{table['length_unit'].iloc[0]}]" for name in columns]
+        for name, label in zip("xyz", labels, strict=False):
+            getattr(axes, f"set_{name}label")(label, labelpad=-2 if is_solid else None)
+            getattr(axes, f"{name}axis").set_major_locator(style.few_ticks())
+        axes.set_title("" if together else f"arm {arm + 1}")
+        if is_solid:
+            axes.tick_params(labelsize=6, pad=-1)
+            axes.view_init(elev=24.0, azim=-50.0)
+            axes.set_box_aspect(None, zoom=0.85)
         else:
-            axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
-
-
-def stage_title(rows: pd.DataFrame, whole: bool) -> str:
-    """Return the title of the panel of one stage of a motion, or of the whole motion."""
-    instants = f"instants {rows['first'].iloc[0]}–{rows['last'].iloc[0]}"
-    return f"all {instants}" if whole else instants
+            axes.set_aspect("equal", adjustable="datalim")  # lengths are Euclidean in degrees
+    keys = [*trails.arm_keys(set(table["arm"])), *path_keys(table)]
+    style.keys_below(figure, keys if together else path_keys(table), 4)
+    return figure
 
 
 def path_keys(table: pd.DataFrame) -> list[Line2D]:
@@ -115,23 +137,16 @@ def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, f
 def approaches(condition: ConditionResults) -> pd.DataFrame:
     """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
 
-    Where all pairs are of one kind, the verdicts of the runs have said it. `refuted_at` is NaN
-    where they touch nowhere; `kept` says whether the required distance is.
+    `refuted_at` is NaN where they touch nowhere; `kept` says whether the required distance is.
     """
-    rows, kinds = [], kinds_of_pairs(condition)
-    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
-    if len(kinds) == 1 and condition.summaries["certified"].notna().all():
-        told: dict[str, Any] = {"kind": next(iter(kinds))}
-        told["replicate"] = condition.summaries.index.to_numpy(np.int64)
-        told |= {name: condition.column(name) for name in names[2:-1]}
-        told["kept"] = condition.summaries["certified_margin"].eq(True).fillna(False).to_numpy(bool)
-        return pd.DataFrame(told)
-    for name, (kept, margin) in kinds.items():
+    rows = []
+    for name, (kept, margin) in kinds_of_pairs(condition).items():
         bodies = problem(condition).scene.of_pairs(kept)
         for k in condition.solutions:
             verdict = certify(bodies, condition.motion(k), margin)
             where = verdict.clearance, verdict.clearance_at, verdict.refuted_at
             rows.append((name, k, *where, verdict.margin_status == "certified"))
+    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
     return pd.DataFrame(rows, columns=names)
 
 

@@ -10,7 +10,6 @@ from logging.handlers import BufferingHandler
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
-import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -20,9 +19,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from evoexp.errors import SettingError, brief
+from evoexp.playback import colours
 from evoexp.report.figures.fitted_texts import fit_texts
 
-ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
+ARM_COLOURS, arm_colour = colours.ARM_COLOURS, colours.arm_colour
 CONDITION_COLOURS = (
     "#332288",
     "#CC6677",
@@ -180,9 +180,13 @@ def begins_line(axes: Axes) -> bool:
     return place is not None and place.is_first_col()
 
 
-def arm_colour(arm: int) -> str:
-    """Return the colour of an arm, counted from 0."""
-    return ARM_COLOURS[arm % len(ARM_COLOURS)]
+def ends_column(axes: Axes, panels: Sequence[Axes]) -> bool:
+    """Whether no other panel of a grid, filled line by line, stands below a panel."""
+    places = [place for panel in panels if (place := panel.get_subplotspec()) is not None]
+    own = axes.get_subplotspec()
+    return own is not None and not any(
+        place.colspan == own.colspan and place.rowspan.start > own.rowspan.start for place in places
+    )
 
 
 def condition_colour(position: int) -> str:
@@ -246,29 +250,9 @@ def operational_axes(axes: Axes, unit: str) -> None:
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
 
 
-def draw_arm(
-    axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False
-) -> None:
-    """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
-    x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
-    colour = arm_colour(arm)
-    line: dict[str, Any] = (
-        {"linestyle": (0, (2, 1)), "linewidth": 2} if dashed else {"linewidth": 3}
-    )
-    axes.plot(x, y, color=colour, alpha=alpha, zorder=3 + dashed, **line)
-    joints: dict[str, Any] = {"color": "white", "markeredgecolor": colour, "ms": 5}
-    axes.plot(x[:-1], y[:-1], "o", alpha=alpha, zorder=4, **joints)
-    axes.plot(x[-1], y[-1], "o", color=colour, alpha=alpha, markersize=4, zorder=4)
-
-
 def key(label: str, **look: Any) -> Line2D:
     """Return an entry of a legend: a line or marker that is drawn nowhere else."""
     return Line2D([], [], label=label, **look)
-
-
-def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D]:
-    """Return entries of a legend for arms, counted from 0: "arm 1" in the arm's colour, …."""
-    return [key(f"{name} {int(k) + 1}", color=arm_colour(int(k)), **look) for k in arms]
 
 
 def keys_below(

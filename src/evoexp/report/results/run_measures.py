@@ -80,6 +80,22 @@ def certified(condition: ConditionResults) -> Proportion:
     return counted(free[solved(condition)])
 
 
+def touches(condition: ConditionResults) -> BoolArray:
+    """Return whether the exact verdict refutes each run's motion, (done,)."""
+    return condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=bool)
+
+
+def summed(prefix: str) -> Values:
+    """Return the function that sums all columns of a run with a prefix, (done,); NaN if none."""
+
+    def total(condition: ConditionResults) -> FloatArray:
+        names = [str(name) for name in condition.summaries if str(name).startswith(prefix)]
+        columns = [condition.column(name) for name in names] or [np.full(condition.done, np.nan)]
+        return np.asarray(np.sum(columns, axis=0))
+
+    return total
+
+
 def where_solved(values: Values) -> Values:
     """Return values of runs, (done,), that are infinite where a run is not solved."""
     return lambda condition: np.where(solved(condition), values(condition), np.inf)

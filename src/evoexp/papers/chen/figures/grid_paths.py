@@ -150,7 +150,9 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
     rows: list[tuple[object, ...]] = []
     for group in found:
         for position, c in enumerate(group.conditions):
-            columns = {"best so far": "best_cost"} | ({} if position else {AVERAGE: "mean_cost"})
+            columns: dict[str, Any] = {"best so far": "best_cost"} | (
+                {} if position else {AVERAGE: "mean_cost"}
+            )
             for name, column in columns.items():
                 for generation, own in c.generations.groupby("index"):
                     median, lower, upper, _ = spread(own[column].to_numpy(dtype=np.float64))
@@ -167,19 +169,18 @@ def draw_costs(table: pd.DataFrame) -> Figure:
     """Draw one panel per weighting."""
     figure, panels = style.panels(2.7, table["panel"].nunique())
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
-        evolved, known = rows[rows["position"] >= 0], rows[rows["position"] < 0]
-        for (position, quantity), line in groups(evolved, ["position", "quantity"]):
+        for (position, quantity), line in groups(rows, ["position", "quantity"]):
             label, x, median = str(line["condition"].iloc[0]), line["generation"], line["median"]
             colour = style.condition_colour(int(position))
-            look: dict[str, Any] = {"label": label}
-            if quantity == AVERAGE:
+            if position < 0:
+                look: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0, "label": label}
+                axes.axhline(median.iloc[0], linestyle=":" if quantity == KNOWN else "-.", **look)
+            elif quantity == AVERAGE:
                 look = {"label": f"{label}, average", "linestyle": "--", "linewidth": 0.9}
+                axes.plot(x, median, color=colour, **look)
             else:
                 marks.band(axes, x, line["lower"], line["upper"], colour)
-            axes.plot(x, median, color=colour, **look)
-        for (kind, line), pattern in zip(groups(known, "quantity"), (":", "-."), strict=False):
-            at = float(line["median"].iloc[0])
-            axes.axhline(at, color=style.NEUTRAL, linewidth=1.0, linestyle=pattern, label=str(kind))
+                axes.plot(x, median, color=colour, label=label)
         axes.set(title=str(name), xlabel="generation")
     panels[0].set_ylabel("cost C(P)")
     style.legend_below(figure, [panels[0]], 3)
@@ -188,20 +189,18 @@ def draw_costs(table: pd.DataFrame) -> Figure:
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
     """Return every run's gap to the best path known."""
-    parts = [
-        pd.DataFrame(
-            {
+    parts = []
+    for group in found:
+        for position, c in enumerate(group.conditions):
+            columns: dict[str, Any] = {
                 "panel": group.title,
                 "position": position,
                 "condition": _name(c, group),
-                "replicate": c.summaries.index,
-                "gap_percent": above_known(c, group.optimum),
-                "bound_percent": 100.0 * (group.bound / group.optimum - 1.0),
             }
-        )
-        for group in found
-        for position, c in enumerate(group.conditions)
-    ]
+            columns |= {"replicate": c.summaries.index}
+            columns |= {"gap_percent": above_known(c, group.optimum)}
+            columns |= {"bound_percent": 100.0 * (group.bound / group.optimum - 1.0)}
+            parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -212,15 +211,12 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
     limits = min(float(table["bound_percent"].min()), -0.03 * most), most  # of all panels
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (position, kind), own in groups(rows, ["position", "condition"]):
-            values = np.sort(own["gap_percent"].to_numpy())
-            x, steps = [min(values[0], 0.0), *values], np.arange(len(values) + 1) / len(values)
-            colour = style.condition_colour(int(position))
-            axes.step(x, 100.0 * steps, where="post", color=colour, label=str(kind))
+            axes.ecdf(own["gap_percent"], color=style.condition_colour(int(position)), label=kind)
         look: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0}
         axes.axvline(0.0, linestyle=":", label=KNOWN, **look)
         axes.axvline(rows["bound_percent"].iloc[0], linestyle="-.", label=BOUND, **look)
         axes.set(title=str(name), xlabel="cost above best known [%]", xlim=limits)
-    panels[0].set_ylabel("share of runs [%]")
+    panels[0].set_ylabel("share of runs")
     style.legend_below(figure, [panels[0]], 3)
     return figure
 

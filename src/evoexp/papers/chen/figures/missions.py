@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pinocchio as pin
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -22,6 +21,10 @@ PATH, TRAVEL, DOCKED = "path", "travel posture", "docking posture"
 TARGET, BODY, FORCE = "target", "body", "force"
 MARK: dict[str, Any] = {"color": style.NEUTRAL}
 PLATFORM: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": style.NEUTRAL}
+ARMS: dict[str, dict[str, Any]] = {
+    TRAVEL: {"color": style.FAINT, "linestyle": "--"},
+    DOCKED: {"color": style.ARM_COLOURS[1]},
+}
 ARROW = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
 
 
@@ -33,16 +36,13 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
         q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
         word = "certified" if verdict["certified"] else "not certified"
         told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
-        robot = c.robot
-        scenario = c.scenario
-        model = c.problem(Problem).scene.model
+        robot, scenario, model = c.robot, c.scenario, c.problem(Problem).scene.model
+        data = model.createData()
         arms = []  # joints and end of both postures, (4, 2): x, and height
         for posture in q[-2:]:
-            data = model.createData()
             pin.forwardKinematics(model, data, posture)
-            points = [data.oMi[k].translation for k in range(3, model.njoints)]
-            tip = np.array([robot.link_lengths[-1], 0.0, 0.0])
-            points.append(data.oMi[model.njoints - 1].act(tip))
+            tip = data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0]))
+            points = [*(data.oMi[k].translation for k in range(3, model.njoints)), tip]
             arms.append([(float(x), float(z)) for x, _, z in points])
         reach, above = scenario.docking.target
         kinds = [
@@ -66,6 +66,7 @@ def draw_missions(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(count, 2, squeeze=False)
     for (above, side), (name, rows) in zip(panels, groups(table, "row"), strict=True):
         label, _, told = str(name).partition(", ")
+        unit = str(rows["unit"].iloc[0])
         # from above: obstacles and the platform's way
         for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
             draw_obstacle(above, corners["a"], corners["b"])
@@ -73,35 +74,27 @@ def draw_missions(table: pd.DataFrame) -> Figure:
         above.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
         above.plot(*path[0], "o", markersize=4, **MARK)
         above.plot(*path[-1], "*", markersize=8, label="docking place", **MARK)
-        style.operational_axes(above, str(rows["unit"].iloc[0]))
+        style.operational_axes(above, unit)
         above.margins(0.08)
         above.set_title(f"{label}: from above")
-        _draw_side(side, rows)
-        side.set_title(told)
+        # from the side: the platform, both postures of the arm, the target and the force
+        first = {str(kind): own[["a", "b"]].to_numpy()[0] for kind, own in groups(rows, "kind")}
+        (radius, height), (middle, _) = first[BODY], first[DOCKED]
+        side.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **PLATFORM))
+        for kind, look in ARMS.items():
+            joints = rows[rows["kind"] == kind]
+            side.plot(joints["a"], joints["b"], marker="o", markersize=3.5, label=kind, **look)
+        (x, z), (fx, fz) = first[TARGET], first[FORCE]
+        side.plot(x, z, "x", label="target of the end-effector", markersize=7, zorder=4, **MARK)
+        size = np.hypot(fx, fz) or 1.0
+        tail = x - 0.6 * fx / size, z - 0.6 * fz / size
+        side.annotate("F", (x, z), tail, arrowprops=ARROW, ha="center", fontsize=7.5)
+        side.axhline(0.0, linewidth=1.0, **MARK)
+        side.set(title=told, xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]")
+        side.set_aspect("equal", adjustable="datalim")
+        side.margins(0.1)
     style.legend_below(figure, panels[0], 3)
     return figure
-
-
-def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
-    """Draw the platform, both postures of the arm, the target and the force."""
-    first = {str(kind): own[["a", "b"]].to_numpy()[0] for kind, own in groups(rows, "kind")}
-    (radius, height), (middle, _) = first[BODY], first[DOCKED]
-    axes.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **PLATFORM))
-    for name, colour, pattern in ((TRAVEL, style.FAINT, "--"), (DOCKED, style.ARM_COLOURS[1], "-")):
-        arm: dict[str, Any] = {"marker": "o", "markersize": 3.5, "color": colour, "label": name}
-        joints = rows[rows["kind"] == name]
-        axes.plot(joints["a"], joints["b"], pattern, **arm)
-    (x, z), (fx, fz) = first[TARGET], first[FORCE]
-    axes.plot(x, z, "x", label="target of the end-effector", markersize=7, zorder=4, **MARK)
-    size = np.hypot(fx, fz) or 1.0
-    tail = x - 0.6 * fx / size, z - 0.6 * fz / size
-    axes.annotate("F", (x, z), tail, arrowprops=ARROW, ha="center", fontsize=7.5)
-    axes.axhline(0.0, linewidth=1.0, **MARK)
-    unit = rows["unit"].iloc[0]
-    axes.set(
-        xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]", adjustable="datalim", aspect="equal"
-    )
-    axes.margins(0.1)
 
 
 def mission_checks(

@@ -1,14 +1,16 @@
 """Docking postures: fitness, gaps, postures, landscapes of E (Chen & Zalzala 1995, Figs. 3–9)."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator
 
+from evoexp.papers import trails
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.statistics.inference import quantiles
@@ -21,9 +23,11 @@ OPTIMUM_LINE: dict[str, Any] = {
     "linewidth": 1.0,
 }
 LEAST_GAP = 1e-6  # [-] smaller gaps are drawn as this one
-POSTURE_NAMES = ("exact optimum", "best run", "paper's angles")
-# colour and width of each posture
-POSTURE_LOOKS = (style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)
+POSTURE_LOOKS = {  # colour and width of each posture
+    "exact optimum": (style.NEUTRAL, 3.4),
+    "best run": (style.ARM_COLOURS[0], 1.7),
+    "paper's angles": (style.ARM_COLOURS[1], 1.1),
+}
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": style.ARM_COLOURS[2], "linewidth": 1.4}
 OBSTACLE: dict[str, Any] = {"color": style.FORBIDDEN, "ms": 7, "mec": "white", "zorder": 8}
 GRID, RUN, PAPER, OPTIMUM, MINIMUM = "grid", "GA, runs", "paper", "optimum", "other local minima"
@@ -34,36 +38,30 @@ LOOKS: dict[str, dict[str, Any]] = {
     PAPER: {"marker": "+", "color": "#000000", "mew": 1.6, "ms": 10, "zorder": 8},
 }
 LABEL = "E [-], lower is better"
-# range of a colour bar → its ticks, both in units of the least E
-TICKS = {20.0: [1.0, 2.0, 5.0, 10.0, 20.0], 3.0: [1.0, 1.5, 2.0, 3.0]}
-GIVEN = "panel", "case", "quantity"
-LANDSCAPE_COLUMNS = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
+ANGLES = ["theta_1_deg", "theta_2_deg"]
 
 
 def _colour(method: str) -> str:
     return style.condition_colour(ORDER.index(method)) if method in ORDER else style.NEUTRAL
 
 
-# ------------------------------------------------------------------------------------------ fitness
-
-
 def fitness_table(cases: list[Case]) -> pd.DataFrame:
     """Return median and quartiles over runs of the best fitness f = E_m − E so far."""
     parts = []
     for panel, case in enumerate(cases):
-        given = panel, case.name, "fitness f"
-        offset, sign = float(case.conditions[0].planner.objective.greatest), -1.0
+        quantity, sign = "fitness f", -1.0
+        offset = float(case.conditions[0].planner.objective.greatest)
         if case.name == "least torque norm":
-            given, offset, sign = (panel, case.name, "torque norm E₁"), 0.0, 1.0
+            quantity, offset, sign = "torque norm E₁", 0.0, 1.0
         for method, condition in case.evolved.items():
             rows = condition.generations
-            wide = rows.pivot(index="index", columns="replicate", values=["best_cost", "mean_cost"])
             best, mean = (
-                offset + sign * wide[name].to_numpy(np.float64)
+                offset + sign * wide.to_numpy(np.float64)
                 for name in ("best_cost", "mean_cost")
+                for wide in (rows.pivot(index="index", columns="replicate", values=name),)
             )
-            columns: dict[str, Any] = dict(zip(GIVEN, given, strict=True))
-            columns |= {"method": method, "generation": wide.index}
+            columns: dict[str, Any] = {"panel": panel, "case": case.name, "quantity": quantity}
+            columns |= {"method": method, "generation": np.unique(rows["index"])}
             spreads = quantiles(best, (0.5, 0.25, 0.75))
             columns |= dict(zip(("median", "lower", "upper"), spreads, strict=True))
             (columns["average"],) = quantiles(mean, (0.5,))
@@ -76,7 +74,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: the best so far against generations, the optimum as a line."""
     figure, places = style.panels(2.5, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
-        optimum, quantity = rows[["optimum", "quantity"]].iloc[0]
+        case, optimum, quantity = rows[["case", "optimum", "quantity"]].iloc[0]
         for method, own in groups(rows, "method"):
             x, colour = own["generation"], _colour(method)
             label = f"{method} (n = {int(own['runs'].max())})"
@@ -84,22 +82,15 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
             axes.plot(x, own["median"], color=colour, label=label)
         axes.axhline(optimum, label="optimum", **OPTIMUM_LINE)
         # the first generations may be far off: later ones tell the range
-        late = rows[rows["generation"] >= min(3, int(rows["generation"].max()))]
-        far = max(float((late[["lower", "upper"]] - optimum).abs().to_numpy().max()), 1e-9)
+        most = int(rows["generation"].max())
+        late = rows.loc[rows["generation"] >= min(3, most), ["lower", "upper"]]
+        far = max(float((late - optimum).abs().to_numpy().max()), 1e-9)
         below, above = (0.08, 1.0) if quantity.startswith("t") else (1.0, 0.08)
         if np.isfinite([far, optimum]).all():
             axes.set_ylim(optimum - below * far, optimum + above * far)
-        axes.set(
-            xlim=(0, max(1, int(rows["generation"].max()))),
-            xlabel="generation",
-            ylabel=f"{quantity} [-]",
-            title=rows["case"].iloc[0],
-        )
+        axes.set(xlim=(0, max(1, most)), xlabel="generation", ylabel=f"{quantity} [-]", title=case)
     style.legend_below(figure, [places[0]], 4)
     return figure
-
-
-# --------------------------------------------------------------------------------------------- gaps
 
 
 def gaps_table(cases: list[Case]) -> pd.DataFrame:
@@ -108,15 +99,10 @@ def gaps_table(cases: list[Case]) -> pd.DataFrame:
     for panel, case in enumerate(cases):
         costs = {method: c.column("best_cost") for method, c in case.evolved.items()}
         costs |= {method: ends[:, 2] for method, ends in case.ends().items()}
-        given = {"panel": panel, "case": case.name}
-        parts += [
-            pd.DataFrame(
-                given
-                | {"method": method, "at": ORDER.index(method)}
-                | {"gap": np.maximum(case.gaps(values), 0.0)}
-            )
-            for method, values in costs.items()
-        ]
+        for method, values in costs.items():
+            columns: dict[str, Any] = {"panel": panel, "case": case.name, "method": method}
+            columns |= {"at": ORDER.index(method), "gap": np.maximum(case.gaps(values), 0.0)}
+            parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True))
 
 
@@ -125,35 +111,23 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
     figure, places = style.panels(2.5, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         for (_, method), own in groups(rows, ["at", "method"]):
-            x = np.sort(np.maximum(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP))
-            finite = np.isfinite(x)  # the gaps that are not come last
-            heights = np.arange(1, len(x) + 1)[finite] / len(x)
-            steps = np.append(x[finite], 1e2), np.append(heights, finite.mean())
-            look: dict[str, Any] = {"color": _colour(method), "label": f"{method} (n = {len(x)})"}
+            look: dict[str, Any] = {"color": _colour(method), "label": f"{method} (n = {len(own)})"}
             look["linestyle"] = "-" if method in RUNS else (0, (4, 1.5))
-            axes.step(*steps, where="post", **look)
+            axes.ecdf(np.clip(own["gap"], LEAST_GAP, 1e2), **look)
         for close in CLOSE:
             axes.axvline(close, color=style.FAINT, linewidth=0.8, linestyle=":")
-        axes.set(
-            xscale="log",
-            xlim=(LEAST_GAP, 10.0),
-            ylim=(0.0, 1.02),
-            xlabel="gap E / E* − 1 [-]",
-            ylabel="share with a smaller gap",
-            title=rows["case"].iloc[0],
-        )
+        axes.set(xscale="log", xlim=(LEAST_GAP, 10.0), ylim=(0.0, 1.02))
+        axes.set(xlabel="gap E / E* − 1 [-]", ylabel="share with a smaller gap")
+        axes.set_title(rows["case"].iloc[0])
     style.legend_below(figure, places, 3)
     return figure
-
-
-# ----------------------------------------------------------------------------------------- postures
 
 
 def postures_table(cases: list[Case]) -> pd.DataFrame:
     """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles."""
     rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
-        scenario: Any = case.conditions[0].scenario
+        scenario, robot = case.conditions[0].scenario, case.conditions[0].robot
         own: list[tuple[Any, ...]] = [
             ("obstacle", "", *place, *place, float(getattr(obstacle, "radius", 0.0)))
             for obstacle, place in zip(
@@ -166,68 +140,50 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
         run = case.elitist or case.plain
         best = run.solutions[run.best_replicate] if run is not None else None
         shown = case.optimal_angles, best, case.printed.angles
-        for posture, angles in zip(POSTURE_NAMES, shown, strict=True):
+        for posture, angles in zip(POSTURE_LOOKS, shown, strict=True):
             found = {} if angles is None else case.measured(angles)
-            if found.get("branch", -1.0) >= 0.0:
-                own += _links(case, posture, found)
+            if found.get("branch", -1.0) < 0.0:
+                continue
+            length, height = 0.5 * np.array(robot.platform_size)
+            turns = np.cumsum([np.radians(found[f"theta_{k}_deg"]) for k in (1, 2, 3)])
+            steps = np.array([np.cos(turns), np.sin(turns)]) * np.array(robot.link_lengths)
+            joints = np.cumsum([(found["platform_x"], 0.0), *steps.T], axis=0)
+            x, y = joints[0]
+            own.append(("platform", posture, x - length, y - height, x + length, y + height, 0.0))
+            ends = enumerate(pairwise(joints), 1)
+            own += [("link", posture, *start, *end, float(k)) for k, (start, end) in ends]
         rows += [(panel, case.name, *row) for row in own]
     names = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
     return rounded(pd.DataFrame(rows, columns=names))
 
 
-def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any, ...]]:
-    """Return the platform and the links of a posture, of which the terms are given."""
-    robot: Any = case.conditions[0].robot
-    length, height = 0.5 * np.array(robot.platform_size)
-    angles = np.cumsum([np.radians(found[f"theta_{k}_deg"]) for k in (1, 2, 3)])
-    steps = np.array([np.cos(angles), np.sin(angles)]) * np.array(robot.link_lengths)
-    joints = np.cumsum([(found["platform_x"], 0.0), *steps.T], axis=0)
-    x, y = joints[0]
-    return [
-        ("platform", posture, x - length, y - height, x + length, y + height, 0.0),
-        *(("link", posture, *joints[k], *joints[k + 1], k + 1.0) for k in range(len(joints) - 1)),
-    ]
-
-
 def draw_postures(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: three postures, the force, the obstacle."""
-    limits: dict[str, Any] = {}  # over all panels, with a margin
-    for axis in "xy":
-        values = table[[axis, f"{axis}_end"]].to_numpy()
-        margin = 0.07 * float(np.ptp(values)) + 0.05
-        limits[f"{axis}lim"] = values.min() - margin, values.max() + margin
+    (left, low), (right, high) = trails.room(table)
     figure, places = style.panels(2.6, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         style.operational_axes(axes, "unit")
         axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
-        for posture, look in zip(POSTURE_NAMES, POSTURE_LOOKS, strict=True):
+        for posture, (colour, width) in POSTURE_LOOKS.items():
             own = rows[rows["posture"] == posture]
             if not len(own):
                 continue
-            links, (colour, width) = own[own["element"] == "link"], look
-            x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
-            dots: dict[str, Any] = {"ms": 3.0, "mfc": "white", "zorder": 5}
-            axes.plot(x, y, "o-", color=colour, linewidth=width, label=posture, **dots)
+            links = own[own["element"] == "link"]
+            trails.draw_chain(axes, links, colour, label=posture, linewidth=width)
             for row in records(own[own["element"] == "platform"]):
-                height = row.y_end - row.y
-                ends = f"round,pad=0,rounding_size={0.499 * height}"
                 edge: dict[str, Any] = {"fill": False, "edgecolor": colour, "lw": 0.6 * width}
-                corner, length = (row.x, row.y), row.x_end - row.x
-                box = FancyBboxPatch(corner, length, height, boxstyle=ends, zorder=4, **edge)
-                axes.add_patch(box)
+                size = row.x_end - row.x, row.y_end - row.y
+                axes.add_patch(Rectangle((row.x, row.y), *size, zorder=4, **edge))
         obstacles = rows[rows["element"] == "obstacle"]
         if len(obstacles):
             axes.plot(obstacles["x"], obstacles["y"], "X", label="obstacle", **OBSTACLE)
         for row in records(rows[rows["element"] == "force"]):
             axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=ARROW, zorder=7)
             axes.plot([], [], color=ARROW["color"], label="force F")
-        axes.set(title=rows["case"].iloc[0], **limits)
+        axes.set(title=rows["case"].iloc[0], xlim=(left, right), ylim=(low, high))
         axes.xaxis.set_major_locator(style.few_ticks())
     style.legend_below(figure, places, 5)
     return figure
-
-
-# --------------------------------------------------------------------------------------- landscapes
 
 
 def landscape_table(cases: list[Case]) -> pd.DataFrame:
@@ -251,8 +207,9 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
             if len(angles)
         }
         for element, (angles, costs) in ({GRID: (grid, cost.ravel())} | marked).items():
-            columns = panel, case.name, element, angles[:, 0], angles[:, 1], costs
-            parts.append(pd.DataFrame(dict(zip(LANDSCAPE_COLUMNS, columns, strict=True))))
+            columns: dict[str, Any] = {"panel": panel, "case": case.name, "element": element}
+            columns |= dict(zip(ANGLES, angles.T, strict=True))
+            parts.append(pd.DataFrame(columns | {"cost": costs}))
     return rounded(pd.concat(parts, ignore_index=True))
 
 
@@ -261,36 +218,31 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
     figure, count = style.figure(7.4), table["panel"].nunique()
     places = figure.subplots(2, count, squeeze=False)
     for (whole, close), (_, rows) in zip(places.T, groups(table, "panel"), strict=True):
-        grid = rows[rows["element"] == GRID]
-        wide = grid.pivot(index="theta_2_deg", columns="theta_1_deg", values="cost")
-        for axes, widest in zip((whole, close), TICKS, strict=True):
-            # costs in colours, up to a multiple of the least one
-            costs, least = wide.to_numpy(), float(np.nanmin(wide))
-            shades: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest"}
-            norm = LogNorm(vmin=least, vmax=least * widest)
-            places_of = wide.columns, wide.index
-            image = axes.pcolormesh(*places_of, costs, norm=norm, rasterized=True, **shades)
-            bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8, label=LABEL)
-            ticks = [least * tick for tick in TICKS[widest]]
-            bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
-            bar.minorticks_off()
+        wide = rows[rows["element"] == GRID].pivot(
+            index=ANGLES[1], columns=ANGLES[0], values="cost"
+        )
+        least = float(np.nanmin(wide.to_numpy()))
+        for axes, greatest in ((whole, 20.0), (close, 3.0)):  # colours up to multiples of the least
+            norm = LogNorm(vmin=least, vmax=least * greatest)
+            look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
+            image = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), norm=norm, **look)
+            ticks = least * np.geomspace(1.0, greatest, 4)
+            scale: dict[str, Any] = {"ticks": ticks, "format": "%.3g", "label": LABEL}
+            figure.colorbar(image, ax=axes, extend="max", shrink=0.8, **scale).minorticks_off()
             for element, look in LOOKS.items():  # the marked points
-                names = ["theta_1_deg", "theta_2_deg"]
-                x, y = rows.loc[rows["element"] == element, names].to_numpy().T
+                x, y = rows.loc[rows["element"] == element, ANGLES].to_numpy().T
                 if len(x):
                     axes.plot(x, y, linestyle="none", label=element, **look)
             axes.set(xlabel="θ₁ [deg]", ylabel="θ₂ [deg]", aspect="equal")
             axes.grid(False)
-        whole.set(
-            xlim=(wide.columns.min(), wide.columns.max()),
-            ylim=(wide.index.min(), wide.index.max()),
-            title=rows["case"].iloc[0],
-        )
+        whole.set(xlim=wide.columns[[0, -1]], ylim=wide.index[[0, -1]])
+        whole.set_title(rows["case"].iloc[0])
         for axis in (whole.xaxis, whole.yaxis):
             axis.set_major_locator(MultipleLocator(90.0))
-        best = rows[rows["element"].isin([OPTIMUM, PAPER, RUN])]
-        for axis, name in (("x", "theta_1_deg"), ("y", "theta_2_deg")) if len(best) else ():
-            close.set(**{f"{axis}lim": (best[name].min() - 15.0, best[name].max() + 15.0)})
+        best = rows.loc[rows["element"].isin([OPTIMUM, PAPER, RUN]), ANGLES].to_numpy()
+        if len(best):
+            (left, low), (right, high) = best.min(axis=0) - 15.0, best.max(axis=0) + 15.0
+            close.set(xlim=(left, right), ylim=(low, high))
         close.set_title("around the best", fontweight="normal")
     style.legend_below(figure, [places[0, 0]], 4)
     return figure

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
@@ -21,7 +20,6 @@ from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics.judging import Judge
 
 BLOCKED = "*"
-MOST_LEVELS = 10  # of a map whose colour bar shows them one by one
 WRONG, MISSING, SURPLUS = "wrong", "missing", "surplus"
 MARKED_SLIPS = {
     WRONG: "another number is printed (below, small)",
@@ -112,18 +110,11 @@ def draw_maps(table: pd.DataFrame) -> Figure:
         wide = rows.pivot_table(index="y", columns="x", values="value", dropna=False)
         image = wide.to_numpy(dtype=np.float64)
         look: dict[str, Any] = {"cmap": "viridis", "interpolation": "nearest", "origin": "lower"}
-        levels = np.unique(image[np.isfinite(image)])
-        if 1 < len(levels) <= MOST_LEVELS:  # a colour and a tick for each number that there is
-            middles = 0.5 * (levels[1:] + levels[:-1])
-            ends = 2.0 * levels[0] - middles[0], 2.0 * levels[-1] - middles[-1]
-            look["norm"] = BoundaryNorm([ends[0], *middles, ends[1]], 256)
-        shown = axes.imshow(image, **look)
-        bar = figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
+        bar = figure.colorbar(
+            axes.imshow(image, **look), ax=axes, label="potential [–]", shrink=0.75
+        )
         for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
             axis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
-        if "norm" in look:
-            bar.set_ticks(levels.tolist())
-            bar.minorticks_off()
         axes.grid(visible=False)
         axes.set(title=str(name), xlabel="x [node]", ylabel="y [node]", facecolor=style.NEUTRAL)
     return figure
@@ -137,33 +128,25 @@ def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
     shades = 0.97 - 0.32 * numbers / float(np.nanmax(numbers))
     for cell, shade in zip(records(rows), shades, strict=True):
         x, y = cell.column, count - 1 - cell.row
-        # a token too many stands between two nodes
+        if cell.slip:  # a token too many stands between two nodes
+            wide, left = (0.24, x - 0.62) if cell.slip == SURPLUS else (0.92, x - 0.46)
+            frame = Rectangle((left, y - 0.46), wide, 0.92, zorder=3, **FRAMES[cell.slip])
+            axes.add_patch(frame)
         if cell.slip == SURPLUS:
-            axes.add_patch(Rectangle((x - 0.62, y - 0.46), 0.24, 0.92, zorder=3, **FRAMES[SURPLUS]))
             continue
-        # the node and its number, lifted where a wrong one stands below
-        blocked, wrong = cell.computed == BLOCKED, cell.slip == WRONG
+        blocked = cell.computed == BLOCKED
         face, ink = (style.NEUTRAL, "white") if blocked else (str(shade), "black")
         square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, edgecolor="white", lw=0.5)
         axes.add_patch(square)
+        # the number, lifted where a wrong one stands below
+        wrong = cell.slip == WRONG
         axes.text(x, y + 0.12 * wrong, cell.computed, color=ink, **NUMBER)
-        # a wrong or missing number
-        if cell.slip:
-            look = FRAMES[cell.slip]
-            axes.add_patch(Rectangle((x - 0.46, y - 0.46), 0.92, 0.92, zorder=3, **look))
         if wrong:
             axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **SMALL)
     axes.grid(visible=False)
-    axes.set(
-        xlim=(-0.5, width - 0.3),
-        ylim=(-0.5, count - 0.5),
-        aspect="equal",
-        xticks=range(0, width, 5),
-        yticks=range(0, count, 5),
-        xlabel="x [node]",
-        ylabel="y [node]",
-        title=title,
-    )
+    axes.set(xlim=(-0.5, width - 0.3), ylim=(-0.5, count - 0.5), aspect="equal", title=title)
+    axes.set(xlabel="x [node]", xticks=range(0, width, 5))
+    axes.set(ylabel="y [node]", yticks=range(0, count, 5))
 
 
 def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:

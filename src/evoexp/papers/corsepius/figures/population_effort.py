@@ -13,7 +13,6 @@ from matplotlib.ticker import NullFormatter, NullLocator
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.report.figures import groups, marks, style
-from evoexp.report.figures.effects import JITTER
 from evoexp.report.results.run_measures import solved
 from evoexp.report.results.stored_results import ConditionResults
 from evoexp.report.statistics import inference
@@ -41,44 +40,32 @@ def effort_table(
         for position, task in enumerate(found)
         for value, c in task.by_value.items()
     ]
-    rows: list[tuple[object, ...]] = [
-        (name, SHARE, *given, one.share, *one.interval(confidence), *one)
-        for name, count in shares.items()
-        for *given, c in points
-        for one in (count(c),)
-    ]
+    rows: list[tuple[object, ...]] = []
+    for name, count in shares.items():
+        for *given, c in points:
+            met = count(c)
+            rows.append((name, SHARE, *given, met.share, *met.interval(confidence), *met))
     for name, values in effort.items():
         for *given, c in points:
             runs = values(c), solved(c)
-            expected = (
-                inference.expected_effort(*runs),
-                *inference.expected_interval(*runs, confidence, num_resamples),
-            )
+            interval = inference.expected_interval(*runs, confidence, num_resamples)
+            expected = inference.expected_effort(*runs), *interval
             rows.append((name, EFFORT, *given, *expected, c.solved, c.done))
     return pd.DataFrame(rows, columns=[*NAMES, "having", "total"])
 
 
 def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
     """Draw one panel per quantity; a value without a success has no point."""
-    quantities = list(dict.fromkeys(table["quantity"]))
-    lines, free = -(-len(quantities) // 2), len(quantities) % 2 == 1
-    figure = style.figure(2.6 * lines + (0.0 if free else 0.7))
-    grid = figure.add_gridspec(lines, 2)
-    keys = _keys(table)
-    for k, quantity in enumerate(quantities):
-        axes = figure.add_subplot(grid[divmod(k, 2)])
+    quantities, keys = list(dict.fromkeys(table["quantity"])), _keys(table)
+    figure, panels = style.panels(2.6, len(quantities), 2, 0.7)
+    for axes, number, quantity in zip(panels, NUMBERS, quantities, strict=False):
         own = table[table["quantity"] == quantity]
         _draw_series(axes, own, len(keys), marked)
         share = own["kind"].iloc[0] == SHARE
-        title = f"{NUMBERS[k]}  {quantity.split(' [')[0]}{'' if share else ' per success'}"
+        title = f"{number}  {quantity.split(' [')[0]}{'' if share else ' per success'}"
         label = "share of runs [%]" if share else quantity
         axes.set(xlabel=setting, ylabel=label, title=title)
-    if free:  # the legend takes the last place
-        axes = figure.add_subplot(grid[lines - 1, 1])
-        axes.set_axis_off()
-        axes.legend(handles=keys, loc="center", ncols=2)
-    else:
-        style.keys_below(figure, keys, 4)
+    style.keys_below(figure, keys, 4)
     return figure
 
 
@@ -100,7 +87,7 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
     count = table["position"].nunique()
     keys = _keys(table[(table["expected"] > 0.0) & np.isfinite(table["expected"])])
     figure, panels = style.panels(3.3, len(quantities), sharey=True)
-    for k, (axes, quantity) in enumerate(zip(panels, quantities, strict=True)):
+    for axes, number, quantity in zip(panels, NUMBERS, quantities, strict=False):
         own = table[table["quantity"] == quantity]
         _draw_series(axes, own[own["expected"] > 0.0], count, float(reference))
         axes.axhline(1.0, color=style.NEUTRAL, linewidth=0.9)
@@ -108,7 +95,7 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
         if len(bounds):
             x, y = [*bounds["value"], reference], [*bounds["bound"], 1.0]
             axes.plot(x, y, color=style.NEUTRAL, linewidth=1.2, linestyle=(0, (1, 1.5)))
-        axes.set(xlabel=setting, title=f"{NUMBERS[k]}  {quantity}")
+        axes.set(xlabel=setting, title=f"{number}  {quantity}")
         axes.tick_params(axis="x", labelsize=6.5)
     panels[0].set_ylabel(f"effort over that of {reference:g} [-]")
     style.keys_below(figure, keys, 4)
@@ -192,32 +179,27 @@ def slope(task: Task) -> float:
 def draw_floor(table: pd.DataFrame) -> Figure:
     """Draw residuals with every run, and cycles, against the scope, a colour per kind of goal."""
     figure, (left, right) = style.panels(3.4, 2)
-    unit, keys = table["length_unit"].iloc[0], []
     for (position, task), own in groups(table, ["position", "task"]):
         colour = style.arm_colour(int(position))
-        name = f"{task} (slope {own['slope'].iloc[0]:.2f})"
-        keys.append(style.key(name, color=colour, marker="o", markersize=4.5))
-        # every run, beside its scope by a low-discrepancy jitter
         points = own[own["quantity"] == POINT]
-        beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
         dots: dict[str, Any] = {"color": colour, "ms": 2.2, "alpha": 0.35, "mec": "none"}
-        left.plot(points["scope"] * beside, points["median"], "o", **dots)
-        # medians and quartiles
+        left.plot(points["scope"], points["median"], "o", **dots)
         for axes, quantity in ((right, CYCLES), (left, RESIDUAL)):
             rows = own[own["quantity"] == quantity].sort_values("scope")
             x, medians = rows["scope"], rows["median"]
-            axes.plot(x, medians, "o-", color=colour, markersize=4.5, linewidth=1.1)
-            axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.6)
+            bars = medians - rows["lower"], rows["upper"] - medians
+            look: dict[str, Any] = {"color": colour, "markersize": 4.5, "elinewidth": 1.6}
+            name = f"{task} (slope {own['slope'].iloc[0]:.2f})"
+            axes.errorbar(x, medians, yerr=bars, fmt="o-", label=name, **look)
         # a line proportional to the scope through the middle of the residuals
         middle = len(rows) // 2
-        left.plot(x, medians.iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)
-    keys.append(style.key("proportional to the scope", **PROPORTIONAL))
-    scopes = sorted(set(table["scope"]))
+        line = medians.iloc[middle] * x / x.iloc[middle]
+        left.plot(x, line, label="proportional to the scope", **PROPORTIONAL)
     for axes in (left, right):
-        logarithmic_axis(axes, scopes)
+        logarithmic_axis(axes, sorted(set(table["scope"])))
         axes.set_xlabel("scope of a joint [rad]")
-    left.set_yscale("log")
-    left.set(ylabel=f"distance to the goal at the end [{unit}]", title="a  residual")
+    unit = table["length_unit"].iloc[0]
+    left.set(yscale="log", ylabel=f"distance to the goal at the end [{unit}]", title="a  residual")
     right.set(ylabel="cycles until it stagnates [-]", title="b  cycles", ylim=(0, None))
-    style.keys_below(figure, keys)
+    style.legend_below(figure, [left], 4)
     return figure

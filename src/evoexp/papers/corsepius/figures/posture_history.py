@@ -20,7 +20,6 @@ MANY = 3  # conditions; more have panels of their own
 VISIBLE = 1e-6  # [length unit] smaller tolerances are not drawn
 QUARTILES = (0.5, 0.25, 0.75)
 TOLERANCE: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.9, "linestyle": (0, (4, 2))}
-BESIDE: dict[str, Any] = {"va": "center", "ha": "left"}  # a text to the right of its place
 
 
 def history_table(results: Results) -> pd.DataFrame:
@@ -35,20 +34,13 @@ def history_table(results: Results) -> pd.DataFrame:
                 wide = numbered.pivot(index="cycle", columns="replicate", values=column)
                 values = wide.abs().ffill().to_numpy(dtype=np.float64)
                 quartiles = quantiles(values, QUARTILES)
-                table = {
-                    "position": position,
-                    "condition": c.label,
-                    "phase": names[int(phase) - 1],
-                    "order": int(phase) - len(names),
-                    "quantity": quantity,
-                    "cycle": wide.index,
-                    **dict(zip(("median", "lower", "upper"), quartiles, strict=True)),
-                    "begun": wide.shape[1],
-                    "running": wide.notna().sum(axis=1).to_numpy(),
-                    "tolerance": measures.tolerances(c)[int(phase) - 1],
-                    "length_unit": c.length_unit,
-                }
-                parts.append(pd.DataFrame(table))
+                columns: dict[str, Any] = {"position": position, "condition": c.label}
+                columns |= {"phase": names[int(phase) - 1], "order": int(phase) - len(names)}
+                columns |= {"quantity": quantity, "cycle": wide.index}
+                columns |= dict(zip(("median", "lower", "upper"), quartiles, strict=True))
+                columns |= {"begun": wide.shape[1], "running": wide.notna().sum(axis=1).to_numpy()}
+                columns |= {"tolerance": measures.tolerances(c)[int(phase) - 1]}
+                parts.append(pd.DataFrame(columns).assign(length_unit=c.length_unit))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -61,34 +53,31 @@ def draw_history(table: pd.DataFrame) -> Figure:
     conditions = sorted(set(zip(table["position"], table["condition"], strict=True)))
     in_order = table.sort_values(["position", "order"], kind="stable")["phase"]
     phases = sorted(dict.fromkeys(in_order), key=lambda name: not name.startswith("subgoal"))
-    many = len(conditions) > MANY
-    by, names = ("phase", phases) if many else ("condition", [name for _, name in conditions])
-    if many:
+    by, names, height = "condition", [name for _, name in conditions], 2.4
+    if len(conditions) > MANY:
+        by, names, height = "phase", phases, 2.1
         panels = [(table["position"] == k, name, DISTANCE) for k, name in conditions]
     elif len(phases) == 1:
         both = (("a", COST), ("b", DISTANCE))
         panels = [(table["phase"] == phases[0], f"{k}  {name}", name) for k, name in both]
     else:
-        panels = [
-            (table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)
-        ]
-    figure, places = style.panels(2.1 if many else 2.4, len(panels), PER_LINE, 0.8)
-    drawn: list[Axes] = []
+        numbered = enumerate(phases, 1)
+        panels = [(table["phase"] == name, f"{k}  {name}", DISTANCE) for k, name in numbered]
+    figure, places = style.panels(height, len(panels), PER_LINE, 0.8)
+    far = table.loc[table["quantity"] == DISTANCE, ["lower", "upper", "tolerance"]].to_numpy()
+    far = far[far > VISIBLE]
     for axes, (chosen, title, quantity) in zip(places, panels, strict=True):
         rows = table[chosen & (table["quantity"] == quantity)]
         _draw_curves(axes, rows, by, names)
-        unit = rows["length_unit"].iloc[0]
-        if quantity == DISTANCE:
-            drawn.append(axes)
+        label = "cost of the best so far [-]"
+        if quantity == DISTANCE:  # distances on one scale
+            label = f"distance [{rows['length_unit'].iloc[0]}]"
+            if len(far):
+                axes.set_ylim(0.7 * far.min(), 1.4 * far.max())
             for tolerance in sorted(set(rows["tolerance"][rows["tolerance"] >= VISIBLE])):
                 axes.axhline(tolerance, **TOLERANCE)
         axes.set_title(title, fontsize=8)
-        label = f"distance [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]"
         axes.set(xlabel="cycle of the phase", ylabel=label)
-    # distances on one scale
-    limits = np.array([axes.get_ylim() for axes in drawn])
-    for axes in drawn:
-        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
     colours = {name: style.condition_colour(k) for k, name in enumerate(names)}
     keys = [style.key(name.replace("_", " "), color=c) for name, c in colours.items()]
     if (table["tolerance"] >= VISIBLE).any():
@@ -109,8 +98,8 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
         begun = curve["begun"].iloc[0]
         if longest[begun] == name:
             at = x.iloc[-1], median.iloc[-1]
-            look: dict[str, Any] = {"color": colour, "annotation_clip": False, "fontsize": 6}
-            axes.annotate(f" {begun}", at, **look, **BESIDE)
+            look: dict[str, Any] = {"color": colour, "fontsize": 6, "va": "center", "ha": "left"}
+            axes.annotate(f" {begun}", at, annotation_clip=False, **look)
     axes.set(yscale="log", xlim=(0, max(1, int(table["cycle"].max()))))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
 
@@ -125,40 +114,26 @@ def phases_table(results: Results, confidence: float) -> pd.DataFrame:
             given = position, c.label, int(phase), measures.phase_names(c)[int(phase)]
             share = (reached.total, reached.having, reached.share, *reached.interval(confidence))
             rows.append((*given, *share, *(quantile(cycles, share) for share in QUARTILES)))
-    return pd.DataFrame(
-        rows,
-        columns=[
-            *("position", "condition", "order", "phase", "begun", "reached"),
-            *("share", "lower", "upper", "cycles", "cycles_lower", "cycles_upper"),
-        ],
-    )
+    names = ["position", "condition", "order", "phase", "begun", "reached"]
+    spreads = ["share", "lower", "upper", "cycles", "cycles_lower", "cycles_upper"]
+    return pd.DataFrame(rows, columns=names + spreads)
 
 
 def draw_phases(table: pd.DataFrame) -> Figure:
     """Draw, phase by phase, the share of runs that reach its end, and the cycles they take."""
-    several = table["position"].nunique() > 1
-    figure = style.figure(0.28 * len(table) + 1.1)
-    left, right = figure.subplots(1, 2, sharey=True)
-    at_edge: dict[str, Any] = {"xycoords": left.get_yaxis_transform(), "fontsize": 6.5} | BESIDE
+    figure, (left, right) = style.panels(0.28 * len(table) + 1.1, 2, sharey=True)
+    labels = []
     for y, row in enumerate(records(table)):
-        colour = style.condition_colour(int(row.position))
-        shares = 100 * row.lower, 100 * row.share, 100 * row.upper
-        cycles = row.cycles_lower, row.cycles, row.cycles_upper
-        for axes, (lower, middle, upper) in ((left, shares), (right, cycles)):
-            axes.hlines(y, lower, upper, color=colour, linewidth=1.6)
+        colour, percents = style.condition_colour(int(row.position)), 100 * row.share
+        left.hlines(y, 100 * row.lower, 100 * row.upper, color=colour, linewidth=1.6)
+        right.hlines(y, row.cycles_lower, row.cycles_upper, color=colour, linewidth=1.6)
+        for axes, middle in ((left, percents), (right, row.cycles)):
             axes.plot([middle], [y], "o", color=colour, markersize=4.5)
-        left.annotate(f" {row.reached}/{row.begun}", (1.0, y), **at_edge)
-    labels = [
-        (f"{row.condition}: " if several else "")
-        + f"{row.order + 1}  {row.phase.replace('_', ' ')}"
-        for row in records(table)
-    ]
+        marks.beside(left, y, f"{row.reached}/{row.begun}")
+        who = f"{row.condition}: " if table["position"].nunique() > 1 else ""
+        labels.append(f"{who}{row.order + 1}  {row.phase.replace('_', ' ')}")
     left.set_yticks(range(len(labels)), labels)
-    left.set(
-        ylim=(len(labels) - 0.5, -0.5),
-        xlim=(-3, 103),
-        title="a  goal of the phase met",
-        xlabel="share of the runs that began it [%]",
-    )
+    left.set(ylim=(len(labels) - 0.5, -0.5), xlim=(-3, 103), title="a  goal of the phase met")
+    left.set_xlabel("share of the runs that began it [%]")
     right.set(xlim=(0, None), xlabel="cycles (median, quartiles)", title="b  cycles")
     return figure

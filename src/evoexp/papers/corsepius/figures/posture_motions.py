@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import trails
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.planners.posture_es.phases import Problem, Span
@@ -24,10 +25,8 @@ from evoexp.robots.poses import frame_pose
 
 LINK, OBSTACLE, HELD, TIP, GOAL = "link", "obstacle", "held", "tip", "goal"
 PLACE, PATH = ["x", "y", "z"], ["x_end", "y_end", "z_end"]
-VIEW = (22.0, -62.0)  # [deg] elevation, azimuth
 FEW = 2  # panels up to which each is drawn from above, too
 PER_LINE = 3  # panels
-ARM, TOOL = style.arm_colour(0), style.arm_colour(1)
 POSTURE, REACH, WAY = "posture", "reach", "tool"
 FACTORS = (2.0, 1.0, 0.5)  # of the scope, whose reach is drawn
 STEPS = 3000  # random ones whose hull is drawn
@@ -62,31 +61,25 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
 
 def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
     """Draw one panel per path or phase; where there are one or two, each from above, too."""
-    panels = list(groups(table, ["panel", "title"]))
+    panels, unit = list(groups(table, ["panel", "title"])), table["length_unit"].iloc[0]
     above = len(panels) <= FEW
     columns = 2 if above else min(PER_LINE, len(panels))
     lines = len(panels) if above else -(-len(panels) // columns)
     figure = style.figure((3.1 if above else 2.6) * lines + 0.3)
-    grid = figure.add_gridspec(lines, columns)
-    every = _points(table) if same_scene else None
     for k, ((_, title), rows) in enumerate(panels):
-        unit, place = rows["length_unit"].iloc[0], (k, 0) if above else divmod(k, columns)
-        points = _points(rows) if every is None else every
-        axes = solids.space(figure, grid[place], points, unit, VIEW)
+        place = lines, columns, (2 if above else 1) * k + 1
+        points = _points(table if same_scene else rows)
+        axes = trails.space(figure, place, points, unit, zoom=0.92)
         axes.set_title(title, fontsize=8)
         _draw(axes, rows, "xyz")
         if above:
-            plane = figure.add_subplot(grid[k, 1])
+            plane = figure.add_subplot(lines, 2, 2 * k + 2)
             style.operational_axes(plane, unit)
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
-    keys = [
-        style.key("postures, the later the stronger", color=ARM, linewidth=0.8, alpha=0.4),
-        style.key("last posture", color=ARM, linewidth=2.4),
-        style.key("way of the tool", color=TOOL, linewidth=1.0),
-        style.key("goal", color="none", marker="*", mec=style.NEUTRAL, mfc="white", ms=9),
-    ]
-    style.keys_below(figure, keys)
+    goal = style.key("goal", color="none", marker="*", mec=style.NEUTRAL, mfc="white", ms=9)
+    tool = style.key("way of the tool", color=style.arm_colour(1), linewidth=1.0)
+    style.keys_below(figure, [*trails.trail_keys([])[:-1], tool, goal])
     return figure
 
 
@@ -132,36 +125,22 @@ def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any
 
 def _points(rows: pd.DataFrame) -> FloatArray:
     """Return points that a panel has to hold."""
-    links, goal = (rows[rows["element"] == element] for element in (LINK, GOAL))
-    solid = rows[rows["element"].isin([OBSTACLE, HELD])]
-    parts = (part.to_numpy(dtype=np.float64) for part in (links[PLACE], links[PATH], goal[PLACE]))
-    return np.vstack([*parts, solids.corners(solid)])
+    links, goal, *solid = (rows[rows["element"] == e] for e in (LINK, GOAL, OBSTACLE, HELD))
+    return np.vstack([links[PLACE], links[PATH], goal[PLACE], *map(solids.corners, solid)])
 
 
 def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     """Draw a panel into axes in space (names xyz) or in the plane (xy)."""
-    draw = solids.draw_solid if len(names) == 3 else solids.draw_outline
-    sticks, obstacles, held, tip, goal = (
-        rows[rows["element"] == element] for element in (LINK, OBSTACLE, HELD, TIP, GOAL)
-    )
-    first, last = sticks["instant"].min(), sticks["instant"].max()
-    # obstacles, and the held object: earlier fainter
-    for row in records(obstacles):
-        draw(axes, row, style.FAINT, 0.22)
-    for row in records(held):
-        draw(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
-    # postures: earlier fainter, joints of the last one
-    for instant, links in groups(sticks, "instant"):
-        points = [[links[name].iloc[0], *links[f"{name}_end"]] for name in names]
-        shade = 0.12 + 0.4 * (instant - first) / max(1, last - first)
-        newest = instant == last
-        look = {"linewidth": 2.4, "alpha": 1.0} if newest else {"linewidth": 0.8, "alpha": shade}
-        axes.plot(*points, color=ARM, zorder=5, **look)
-        if newest:
-            axes.plot(*points, "o", zorder=6, color="white", markeredgecolor=ARM, markersize=2.6)
+    last = rows.loc[rows["element"] == LINK, "instant"].max()
+    for row in records(rows[rows["element"] == OBSTACLE]):
+        solids.draw_solid(axes, row, style.FAINT, 0.22)
+    for row in records(rows[rows["element"] == HELD]):  # earlier fainter
+        solids.draw_solid(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
+    trails.draw_trail(axes, rows[rows["element"] == LINK], style.arm_colour(0), names)
     # the tool's way and its goal
-    way = tip.sort_values("instant")
-    axes.plot(*(way[name] for name in names), color=TOOL, linewidth=1.0, zorder=7)
+    way, goal = (rows[rows["element"] == element] for element in (TIP, GOAL))
+    places = (way.sort_values("instant")[name] for name in names)
+    axes.plot(*places, color=style.arm_colour(1), linewidth=1.0, zorder=7)
     star: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "ms": 8}
     axes.plot(*(goal[name] for name in names), "*", zorder=8, **star)
 

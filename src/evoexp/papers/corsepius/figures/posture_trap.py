@@ -59,9 +59,18 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
     failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
-    rows += _cells(stuck, failed[-1], a, b)
+    end = failed[-1]
+    # the cost over two joints, the others as at the end of the run that is stuck
+    low, high = _box(problem, end, AROUND)
+    q = np.repeat(end[:, None], CELLS * CELLS, axis=1)
+    ranges = [np.linspace(low[k], high[k], CELLS) for k in (a, b)]
+    q[a], q[b] = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
+    same = {"element": CELL, "scope_deg": problem.scope[a] / DEGREE}
+    same |= {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE}
+    cells = zip(q[a] / DEGREE, q[b] / DEGREE, _cost(stuck, q), strict=True)
+    rows += [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
     # the least cost of random postures in boxes around that posture, and its own cost
-    rng, end = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED)), failed[-1]
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     (own,) = _cost(stuck, end[:, None])
     for n, half in enumerate(BOXES):
         low, high = _box(problem, end, half)
@@ -87,19 +96,6 @@ def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
     return np.where(np.isinf(cost), np.nan, cost)
 
 
-def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
-    """Return the cost over two joints, the others as at the end of the run that is stuck."""
-    problem = measures.problem(condition)
-    low, high = _box(problem, end, AROUND)
-    ranges = [np.linspace(low[k], high[k], CELLS) for k in (a, b)]
-    q = np.repeat(end[:, None], CELLS * CELLS, axis=1)
-    q[a], q[b] = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
-    ends = {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE}
-    same = {"element": CELL, "scope_deg": problem.scope[a] / DEGREE} | ends
-    cells = zip(q[a] / DEGREE, q[b] / DEGREE, _cost(condition, q), strict=True)
-    return [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
-
-
 def _box(problem: Problem, q: FloatArray, scopes: float) -> tuple[FloatArray, FloatArray]:
     """Return the bounds (nq,) of a box of so many scopes around a posture, within the limits."""
     (low, high), half = problem.limits.T, scopes * problem.scope
@@ -116,7 +112,7 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     # ways of both kinds of runs, crosses where they are stuck
     for row in records(obstacles):
-        solids.draw_outline(above, row, style.FAINT, 0.35)
+        solids.draw_solid(above, row, style.FAINT, 0.35)
     looks = {
         STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
         HELPED: (style.arm_colour(0), "with a sub-goal"),
@@ -131,11 +127,9 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
     along.set(
-        xlabel="posture of the path",
-        ylabel=f"distance to the goal [{unit}]",
-        title="b  distance along the paths",
-        ylim=(0.0, None),
+        xlabel="posture of the path", ylabel=f"distance to the goal [{unit}]", ylim=(0.0, None)
     )
+    along.set_title("b  distance along the paths")
     _draw_landscape(figure, land, cells)
     # the least cost in boxes around the posture that is stuck
     look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
@@ -143,12 +137,8 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     escape.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     escape.set_xscale("log", base=2)
     escape.xaxis.set_major_formatter("{x:g}")
-    escape.set(
-        xlabel="half the edge of the box [scopes]",
-        ylabel="least cost found in it [-]",
-        title="d  random postures around it",
-        ylim=(0.0, None),
-    )
+    escape.set(xlabel="half the edge of the box [scopes]", ylabel="least cost found in it [-]")
+    escape.set(ylim=(0.0, None), title="d  random postures around it")
     keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
     style.keys_below(figure, keys)
     return figure

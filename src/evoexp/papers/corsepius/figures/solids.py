@@ -1,6 +1,6 @@
 """Solids in space, and robots beside the shapes that cover them (Corsépius 2001, Figs. 3 and 4)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import coal
@@ -10,27 +10,18 @@ import pinocchio as pin
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from evoexp.papers import trails
 from evoexp.papers.corsepius import measures
+from evoexp.playback.shapes import outline
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, records, rounded, style, surfaces
 from evoexp.report.results.stored_results import ConditionResults
 
-BALL, BRICK, ROD, DRUM = "sphere", "box", "capsule", "cylinder"
 SIZES = ["size_1", "size_2", "size_3"]  # box: half its edges; else radius and half the length
 TURN = [f"r{row}{column}" for row in range(1, 4) for column in range(1, 4)]
 COLUMNS = ["shape", "x", "y", "z", *TURN, *SIZES]
 BODY, COVER = "body", "cover"
-MODEL_VIEW = (18.0, -55.0)  # [deg]
-KINDS = {BALL: "spheres", ROD: "capsules"}
-
-
-# shapes that have a row of their own: its name, and the function that gives its sizes
-SOLIDS: dict[type, tuple[str, Callable[[Any], tuple[float, ...]]]] = {
-    coal.Sphere: (BALL, lambda shape: (shape.radius, 0.0, 0.0)),
-    coal.Capsule: (ROD, lambda shape: (shape.radius, shape.halfLength, 0.0)),
-    coal.Cylinder: (DRUM, lambda shape: (shape.radius, shape.halfLength, 0.0)),
-    coal.Box: (BRICK, lambda shape: tuple(shape.halfSide)),
-}
+KINDS = {"sphere": "spheres", "capsule": "capsules"}
 
 
 def solid(shape: Any, placement: Any) -> dict[str, Any]:
@@ -42,13 +33,14 @@ def solid(shape: Any, placement: Any) -> dict[str, Any]:
     where, turn = np.array(placement.translation), np.array(placement.rotation)
     if isinstance(shape, coal.Halfspace | coal.Plane):
         return {}
-    if type(shape) in SOLIDS:
-        name, size_of = SOLIDS[type(shape)]
-        size = size_of(shape)
+    if isinstance(shape, coal.Sphere | coal.Capsule | coal.Cylinder | coal.Box):
+        drawn, _ = outline(shape)
+        name, size = drawn.kind, np.array([*drawn.size, 0.0, 0.0][:3])
+        size *= 0.5 if name == "box" else (1.0, 0.5, 0.0)
     else:
         shape.computeLocalAABB()
         box = shape.aabb_local
-        name, size, where = BRICK, 0.5 * (box.max_ - box.min_), where + turn @ box.center()
+        name, size, where = "box", 0.5 * (box.max_ - box.min_), where + turn @ box.center()
     return dict(zip(COLUMNS, (name, *where, *turn.ravel(), *size), strict=True))
 
 
@@ -58,39 +50,26 @@ def triangles(row: Any) -> FloatArray:
         np.array([getattr(row, name) for name in names], dtype=np.float64)
         for names in (TURN, SIZES, "xyz")
     )
-    whole = 2.0 * size if row.shape == BRICK else size * (1.0, 2.0, 0.0)  # halves in the table
+    whole = 2.0 * size if row.shape == "box" else size * (1.0, 2.0, 0.0)  # halves in the table
     return surfaces.triangles_of(row.shape, whole, None) @ turn.reshape(3, 3).T + place
 
 
 def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
-    """Draw a row of `COLUMNS` in axes in space."""
+    """Draw a row of `COLUMNS` in axes in space, or as seen along z in plane ones."""
     faces = triangles(row)
+    if not hasattr(axes, "zaxis"):
+        seen = surfaces.outline_from_above(faces)
+        axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
+        return
     shades = surfaces.shaded(faces, colour, alpha)
     surface = Poly3DCollection(faces, facecolors=shades, linewidth=0, zorder=1)
     surface.set_rasterized(True)  # hundreds of triangles
     axes.add_collection3d(surface)
 
 
-def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
-    """Draw a row of `COLUMNS` as seen along z, in plane axes."""
-    seen = surfaces.outline_from_above(triangles(row))
-    axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
-
-
 def corners(table: pd.DataFrame) -> FloatArray:
     """Return the corners (points, 3) of the surfaces of all solids of a table."""
     return np.vstack([np.empty((0, 3)), *(triangles(row).reshape(-1, 3) for row in records(table))])
-
-
-def space(
-    figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple[float, float]
-) -> Any:
-    """Return axes in space, with equal scales, that hold some points."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    widest = float((high - low).max())
-    pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
-    look: dict[str, Any] = {"zoom": 0.92, "label_pads": (-7, -7, -7), "ticks": (2, 4)}
-    return surfaces.space(figure, (place,), low, high, pad, unit, view=view, pale=True, **look)
 
 
 def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
@@ -111,15 +90,11 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
                 pose, length = surfaces.capsule(start, end)
                 middle, turn = joint.act(pose.translation), (joint.rotation @ pose.rotation).ravel()
                 sizes = radius, 0.5 * length, 0.0
-                own.append((COVER, name, ROD if length else BALL, *middle, *turn, *sizes))
-        unit = c.length_unit
-        rows += [(position, title, *row, bodies.inflation, unit) for row in own]
-    return rounded(
-        pd.DataFrame(
-            rows,
-            columns=["position", "robot", "element", "name", *COLUMNS, "inflation", "length_unit"],
-        )
-    )
+                kind = "capsule" if length else "sphere"
+                own.append((COVER, name, kind, *middle, *turn, *sizes))
+        rows += [(position, title, *row, bodies.inflation, c.length_unit) for row in own]
+    names = ["position", "robot", "element", "name", *COLUMNS, "inflation", "length_unit"]
+    return rounded(pd.DataFrame(rows, columns=names))
 
 
 def draw_models(table: pd.DataFrame) -> Figure:
@@ -139,7 +114,7 @@ def draw_models(table: pd.DataFrame) -> Figure:
             (covers, 0.35, f"{kinds}, at most {inflation:.3g} {unit} beyond"),
         )
         for k, (own, alpha, title) in enumerate(shown):
-            axes = space(figure, grid[position, k], points, unit, MODEL_VIEW)
+            axes = trails.space(figure, (grid[position, k],), points, unit)
             for row in records(own):
                 draw_solid(axes, row, style.arm_colour(k), alpha)
             axes.set_title(title)

@@ -58,19 +58,18 @@ def draw_intersection(table: pd.DataFrame) -> Figure:
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])
     rows = {row.element: row for row in records(table)}
-    size = max(
-        float(np.hypot(rows[v].x_end - rows[v].x, rows[v].y_end - rows[v].y)) for v in VECTORS
-    )
-    for k, name in enumerate(VECTORS):
-        row, colour = rows[name], style.arm_colour(k // 2)
-        look: dict[str, Any] = {"color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
-        arrow = {"arrowstyle": "-|>", **look}
-        axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow)
+    links = [rows[name] for name in VECTORS]
+    size = max(float(np.hypot(row.x_end - row.x, row.y_end - row.y)) for row in links)
+    arrow: dict[str, Any] = {"shrinkA": 0, "shrinkB": 0}
+    for k, row in enumerate(links):
+        colour = style.arm_colour(k // 2)
+        look: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2}
+        axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=look | arrow)
         # a line for the limits of the axes
         axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1)
         away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
-        name_look: dict[str, Any] = {"va": "center", "color": colour, "weight": "bold"}
-        marks.write(axes, row.element, _middle(row), tuple(away), **name_look)
+        name: dict[str, Any] = {"va": "center", "color": colour, "weight": "bold"}
+        marks.write(axes, row.element, _middle(row), tuple(away), **name)
         # the angle from +x
         radius, half = 0.2 * size, np.radians(0.5 * row.angle_deg)
         faint: dict[str, Any] = {"color": style.FAINT, "linewidth": 0.9, "zorder": 1}
@@ -82,13 +81,13 @@ def draw_intersection(table: pd.DataFrame) -> Figure:
         axes.annotate(text, place, ha="left", va="center", color=colour, fontsize=7)
     # the distance of the bases, the first joints, and the crossing
     base, point = rows["base"], rows["point"]
-    arrow = {"arrowstyle": "<->", "shrinkB": 0}
-    axes.annotate("", (base.x_end, base.y_end), (base.x, base.y), arrowprops=arrow)
+    both = {"arrowstyle": "<->"} | arrow
+    axes.annotate("", (base.x_end, base.y_end), (base.x, base.y), arrowprops=both)
     marks.write(axes, "d·i", _middle(base), (0, -12))
-    for robot, (name, mark, side) in enumerate((("b", "O₁", -11), ("d", "O₂", 11))):
-        row = rows[name]
-        marks.hollow(axes, row.x, row.y, "o", style.arm_colour(robot), 6, zorder=4)
-        marks.write(axes, mark, (row.x, row.y), (side, 4))
+    for k, text, side in ((1, "O₁", -11), (3, "O₂", 11)):
+        joint = links[k].x, links[k].y
+        marks.hollow(axes, *joint, "o", style.arm_colour(k // 2), 6, zorder=4)
+        marks.write(axes, text, joint, (side, 4))
     marks.contact(axes, point.x, point.y, 9, zorder=6)
     marks.write(axes, "P", (point.x, point.y), (0, 9), color=style.FORBIDDEN, weight="bold")
     word = "the links cross" if base.crossing else "the links do not cross"

@@ -20,7 +20,6 @@ from evoexp.report.results.stored_results import ConditionResults
 SAMPLES = 40  # per segment
 HALF_TURN = 180.0  # [deg]
 KINDS: tuple[Any, ...] = ("-", (0, (4, 1.5)))  # of first and second links
-COLUMNS = 2  # of panels
 LOWEST, HIGHEST, BEST, STRAIGHT = "lowest", "highest", "best replicate", "straight line"
 
 
@@ -29,63 +28,50 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
     prepared = condition.prepared
     motion = link_motions.executed(prepared, condition.solutions[measures.exemplar(condition)])
     found, limits = link_motions.sampled(motion, SAMPLES), link_motions.speed_limits(prepared)
-    parts = [
-        pd.DataFrame(
-            {
-                "robot": robot,
-                "link": link,
-                "instant": found.instants,
-                "angle_deg": found.links[:, robot, link],
-                "turn_deg": np.abs(found.speeds[:, robot, link]),
-                "limit_deg": limit,
-            }
-        )
-        for (robot, link), limit in np.ndenumerate(limits)
-    ]
-    table = rounded(pd.concat(parts, ignore_index=True))
-    table.insert(3, "at_configuration", table["instant"] == table["instant"].round())
-    return table
+    parts = []
+    for (robot, link), limit in np.ndenumerate(limits):
+        columns: dict[str, Any] = {"robot": robot, "link": link, "instant": found.instants}
+        columns |= {"at_configuration": found.instants == found.instants.round()}
+        columns |= {"angle_deg": found.links[:, robot, link]}
+        columns |= {"turn_deg": np.abs(found.speeds[:, robot, link]), "limit_deg": limit}
+        parts.append(pd.DataFrame(columns))
+    return rounded(pd.concat(parts, ignore_index=True))
 
 
 def draw_joints(table: pd.DataFrame) -> Figure:
     """Draw link angles in their range, and beside them turns per sampling step with limits."""
-    robots = sorted(table["robot"].unique())
-    figure = style.figure(1.9 * len(robots) + 1.0)
-    panels = figure.subplots(len(robots), 2, sharex=True, squeeze=False)
-    for (angles, turns), robot in zip(panels, robots, strict=True):
-        own, colour = table[table["robot"] == robot], style.arm_colour(int(robot))
-        low, high = float(own["angle_deg"].min()), float(own["angle_deg"].max())
+    red: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 0.9, "zorder": 1}
+    limit_look = red | {"linestyle": ":", "linewidth": 1.2}
+    figure, panels = style.panels(1.9, 2 * table["robot"].nunique(), 2, 1.0)
+    for (robot, own), angles, turns in zip(
+        groups(table, "robot"), panels[::2], panels[1::2], strict=True
+    ):
+        colour = style.arm_colour(int(robot))
         for edge in (0.0, HALF_TURN):
-            angles.axhline(edge, color=style.FORBIDDEN, linewidth=0.9, zorder=1)
-        ends = min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0
-        angles.set(ylim=ends, yticks=[0, 60, 120, 180])
+            angles.axhline(edge, **red)
         for link, rows in groups(own, "link"):
-            kind = KINDS[int(link)]
-            angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
-            turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
+            kind, x = KINDS[int(link)], rows["instant"]
+            angles.plot(x, rows["angle_deg"], color=colour, linestyle=kind)
+            turns.plot(x, rows["turn_deg"], color=colour, linestyle=kind)
             at = rows[rows["at_configuration"]]
             angles.plot(at["instant"], at["angle_deg"], "o", color=colour, **style.DOTS)
             limit = float(rows["limit_deg"].iloc[0])
-            turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
-            told = f"link {int(link) + 1}: {limit:.1f}°"
-            marks.beside(turns, limit, told, va="bottom" if link else "top")  # they may be close
+            turns.axhline(limit, **limit_look)
+            text = f"link {int(link) + 1}: {limit:.1f}°"
+            marks.beside(turns, limit, text, va="bottom" if link else "top")  # they may be close
         turns.set_ylim(bottom=0.0)
-        angles.set_ylabel(f"robot {robot + 1}: link angle [deg]")
+        angles.set(yticks=[0, 60, 120, 180], ylabel=f"robot {robot + 1}: link angle [deg]")
         turns.set_ylabel("turn per step [deg]")
-    for axes, title in zip(
-        panels.T, ("a  link angles from +x", "b  turns per sampling step"), strict=True
-    ):
-        axes[0].set_title(title)
-        axes[-1].set(
-            xlabel="sampling step (whole numbers: configurations)",
-            xlim=(-0.05, table["instant"].max() + 0.05),
-        )
-    grey, red = style.NEUTRAL, style.FORBIDDEN
+    panels[0].set_title("a  link angles from +x")
+    panels[1].set_title("b  turns per sampling step")
+    for axes in panels[-2:]:
+        axes.set_xlabel("sampling step (whole numbers: configurations)")
+    grey = style.NEUTRAL
     keys = [
         *(style.key(f"link {k + 1}", color=grey, linestyle=kind) for k, kind in enumerate(KINDS)),
         style.key("configurations", color=grey, marker="o", mec="white", linestyle="none", ms=5),
-        style.key("range [0, 180°]", color=red, linewidth=0.9),
-        style.key("limit of a link, Eq. 2", color=red, linewidth=1.2, linestyle=":"),
+        style.key("range [0, 180°]", **red),
+        style.key("limit of a link, Eq. 2", **limit_look),
     ]
     style.keys_below(figure, keys)
     return figure
@@ -95,23 +81,18 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
     """Return the bodies' least distance: range over all motions, best replicate, straight line."""
     parts = []
     for position, c in enumerate(conditions):
-        columns = {"condition": c.label, "position": position}
-        counts = {"replicates": c.done, "refuted": len(motion_geometry.refuted(c))}
         scene = c.problem(Problem).scene
         distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
         quick = motion_geometry.distance_measure(scene, distance)
         sampled = partial(_sampled, c, samples=samples)
-        motions = motion_geometry.extremes(list(c.solutions), sampled, [quick])
-        series = {
-            LOWEST: motions[0].at_lowest,
-            HIGHEST: motions[0].at_highest,
-            BEST: sampled(measures.exemplar(c)),
-            STRAIGHT: sampled(None),
-        }
+        (extremes,) = motion_geometry.extremes(list(c.solutions), sampled, [quick])
+        series = {LOWEST: extremes.at_lowest, HIGHEST: extremes.at_highest}
+        series |= {BEST: sampled(measures.exemplar(c)), STRAIGHT: sampled(None)}
         for name, q in series.items():
-            instants = np.arange(q.shape[1]) / samples
-            values = {"series": name, "instant": instants, "distance": distance(q)}
-            parts.append(pd.DataFrame(columns | values | counts))
+            columns: dict[str, Any] = {"condition": c.label, "position": position, "series": name}
+            columns |= {"instant": np.arange(q.shape[1]) / samples, "distance": distance(q)}
+            columns |= {"replicates": c.done, "refuted": len(motion_geometry.refuted(c))}
+            parts.append(pd.DataFrame(columns))
     table = rounded(pd.concat(parts, ignore_index=True))
     return table.assign(length_unit=conditions[0].length_unit)
 
@@ -126,14 +107,9 @@ def _sampled(condition: ConditionResults, replicate: int | None, samples: int) -
 
 def draw_distances(table: pd.DataFrame) -> Figure:
     """Draw the distance at each instant: best replicate, range over all, straight line."""
-    positions = sorted(table["position"].unique())
-    columns = min(COLUMNS, len(positions))
-    lines = -(-len(positions) // columns)
-    figure = style.figure(1.9 * lines + 0.9)
-    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes in panels[len(positions) :]:
-        axes.set_axis_off()
-    for axes, (position, rows) in zip(panels, groups(table, "position"), strict=False):
+    by_position = list(groups(table, "position"))
+    figure, panels = style.panels(1.9, len(by_position), 2, 0.9, sharey=True)
+    for axes, (position, rows) in zip(panels, by_position, strict=True):
         colour = style.condition_colour(int(position))
         own = dict(groups(rows, "series"))
         low, high, best, straight = (own[name] for name in (LOWEST, HIGHEST, BEST, STRAIGHT))
@@ -142,17 +118,15 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         axes.plot(best["instant"], best["distance"], color=colour)
         at = best[best["instant"] == best["instant"].round()]
         axes.plot(at["instant"], at["distance"], "o", color=colour, **style.DOTS)
-        refuted, replicates = (int(rows[name].iloc[0]) for name in ("refuted", "replicates"))
-        title = f"{rows['condition'].iloc[0]}: {refuted} of {replicates} refuted"
-        axes.set_title(title, fontsize=7.5)
+        condition, refuted, runs = rows[["condition", "refuted", "replicates"]].iloc[0]
+        axes.set_title(f"{condition}: {refuted} of {runs} refuted", fontsize=7.5)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    below = -0.02 * float(table["distance"].max())
-    panels[0].set(xlim=(0.0, table["instant"].max()), ylim=(below, None))
-    for k, axes in enumerate(panels):
-        if k % columns == 0:
+        axes.set_xlim(0.0, table["instant"].max())
+        if style.begins_line(axes):
             axes.set_ylabel(f"least distance [{table['length_unit'].iloc[0]}]")
-        if k >= len(panels) - columns:
+        if style.ends_column(axes, panels):
             axes.set_xlabel("sampling step (whole: configurations)")
+    panels[0].set_ylim(bottom=-0.02 * float(table["distance"].max()))
     grey = style.NEUTRAL
     keys = [
         style.key(f"{BEST}, dots: configurations", color=grey, marker="o", mec="white", ms=5),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from evoexp.evolution.pareto import pareto_front
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report.figures import groups, marks, rounded, style
+from evoexp.report.figures import groups, rounded, style
 from evoexp.report.pages.page_parts import Quantity
 from evoexp.report.results.run_measures import counted
 from evoexp.report.results.stored_results import ConditionResults, Results
@@ -24,21 +24,15 @@ DOMINATED, FRONT = style.ARM_COLOURS[:2]  # blue and red, as the paper draws the
 
 def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> pd.DataFrame:
     """Return the criteria of every individual of every population."""
-    parts = [
-        pd.DataFrame(
-            {
-                "generation": front.generation,
-                "population": front.population,
-                "individual": np.arange(len(front.criteria)),
-                **dict(zip(CRITERIA, front.criteria.T, strict=True)),
-                "non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T)),
-            }
-        )
-        for front in fronts
-    ]
-    return rounded(pd.concat(parts, ignore_index=True)).assign(
-        replicate=replicate, length_unit=length_unit
-    )
+    parts = []
+    for front in fronts:
+        columns: dict[str, Any] = {"generation": front.generation, "population": front.population}
+        columns |= {"individual": np.arange(len(front.criteria))}
+        columns |= dict(zip(CRITERIA, front.criteria.T, strict=True))
+        columns |= {"non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T))}
+        parts.append(pd.DataFrame(columns))
+    table = rounded(pd.concat(parts, ignore_index=True))
+    return table.assign(replicate=replicate, length_unit=length_unit)
 
 
 def draw_fronts(table: pd.DataFrame) -> Figure:
@@ -46,19 +40,14 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     words = "C₁ [collisions]", f"C₂ path [{unit}]", "C₃ rotation [rad]", f"C₄ unevenness [{unit}]"
     names = dict(zip(CRITERIA, words, strict=True))
-    figure = style.figure(4.9)
-    panels = figure.subplots(2, 3)
-    for axes, (x, y) in zip(panels.ravel(), combinations(CRITERIA, 2), strict=True):
+    figure, panels = style.panels(2.3, 6, 3, 0.3)
+    for axes, (x, y) in zip(panels, combinations(CRITERIA, 2), strict=True):
         for (front, population), rows in groups(table, ["non_dominated", "population"]):
-            look = (
-                {"color": FRONT, "alpha": 0.85, "zorder": 3}
-                if front
-                else {"color": DOMINATED, "alpha": 0.45}
-            )
+            colour, word = (FRONT, "non-dominated") if front else (DOMINATED, "dominated")
+            look: dict[str, Any] = {"alpha": 0.85 if front else 0.45, "ms": 3.4, "mec": "none"}
+            label = f"robot {population + 1}: {len(rows)} {word}"
             marker = MARKERS[int(population) % len(MARKERS)]
-            axes.plot(
-                rows[x], rows[y], marker, markersize=3.6 if front else 3.2, mec="none", **look
-            )
+            axes.plot(rows[x], rows[y], marker, color=colour, label=label, **look)
         axes.set(xlabel=names[x], ylabel=names[y])
         axes.yaxis.set_major_locator(style.few_ticks())
         if x == CRITERIA[0]:
@@ -66,17 +55,7 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
             axes.set_xlim(left=-0.2)
         else:
             axes.xaxis.set_major_locator(style.few_ticks())
-    keys = [
-        marks.point_key(
-            f"robot {population + 1}: {int((rows['non_dominated'] == front).sum())} {word}",
-            MARKERS[int(population) % len(MARKERS)],
-            4,
-            color=colour,
-        )
-        for population, rows in groups(table, "population")
-        for front, colour, word in ((True, FRONT, "non-dominated"), (False, DOMINATED, "dominated"))
-    ]
-    style.keys_below(figure, keys)
+    style.legend_below(figure, panels[:1], 4)
     return figure
 
 

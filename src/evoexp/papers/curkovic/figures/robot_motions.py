@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from evoexp.condition import Prepared
+from evoexp.papers import trails
 from evoexp.papers.curkovic import link_motions, measures
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.results import motion_geometry
@@ -24,7 +25,6 @@ POSTURE, CONFIGURATION, PATH = "posture", "configuration", "path"
 CONTACT, OBSTACLE = "contact", "obstacle"
 LINK = ["robot", "link", "instant", "x", "y", "x_end", "y_end", "radius"]
 TOOL = 2  # number of a robot's third link, which is the body around its end-effector
-DASHES: Any = (0, (2, 1))
 
 
 def motion_table(condition: ConditionResults) -> pd.DataFrame:
@@ -66,21 +66,30 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_motion(table: pd.DataFrame) -> Figure:
     """Draw the best replicate's motion as a trail of postures, beside it all end-effectors."""
-    limits = []
-    for name in "xy":
-        values = table[[name, f"{name}_end"]].to_numpy()
-        pad = 0.05 * float(np.ptp(values)) + float(table["radius"].max())
-        limits.append((float(values.min()) - pad, float(values.max()) + pad))
-    (left, right), (low, high) = limits
-    figure = style.figure(min(4.6, 3.3 * (high - low) / (right - left)) + 1.0)
-    trail, paths = figure.subplots(1, 2, sharex=True, sharey=True)
-    best, unit = table["best"].iloc[0], table["length_unit"].iloc[0]
-    path, contacts = table[table["element"] == PATH], table[table["element"] == CONTACT]
+    figure, (trail, paths) = trails.planes(table, 2)
+    best, rows_of = table["best"].iloc[0], dict(groups(table, "element"))
     for axes in (trail, paths):
         for _, outline in groups(table[table["element"] == OBSTACLE], "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
-        style.operational_axes(axes, unit)
-    _trail(trail, table)
+    postures, path = rows_of[POSTURE], rows_of[PATH]
+    for robot, links in groups(postures[postures["link"] < TOOL], "robot"):
+        trails.draw_trail(trail, links, style.arm_colour(int(robot)))
+        trails.draw_base(trail, links)
+    # at configurations the boundaries of thick links, and tools
+    at = rows_of[CONFIGURATION]
+    for row in records(at[at["radius"] > 0.0]):
+        look: dict[str, Any] = {"color": style.arm_colour(row.robot), "lw": 0.6, "alpha": 0.6}
+        if row.link == TOOL:
+            trail.add_patch(Circle((row.x, row.y), row.radius, fill=False, **look))
+            continue
+        along = np.array([row.x_end - row.x, row.y_end - row.y])
+        x, y = row.radius * np.array([-along[1], along[0]]) / float(np.hypot(*along))
+        for side in (-1.0, 1.0):
+            ends = (
+                [row.x + side * x, row.x_end + side * x],
+                [row.y + side * y, row.y_end + side * y],
+            )
+            trail.plot(*ends, **look)
     for (robot, replicate), rows in groups(path, ["robot", "replicate"]):
         colour = style.arm_colour(int(robot))
         if replicate == best:
@@ -88,22 +97,15 @@ def draw_motion(table: pd.DataFrame) -> Figure:
         paths.plot(rows["x_end"], rows["y_end"], color=colour, linewidth=0.8, alpha=0.5)
         for axes in (trail, paths):
             _ends(axes, rows)
+    contacts = table[table["element"] == CONTACT]
     for axes, rows in ((trail, contacts[contacts["replicate"] == best]), (paths, contacts)):
         marks.contact(axes, rows["x"], rows["y"], 8, zorder=7)
     trail.set_title(f"a  motion of replicate {best}")
     paths.set_title(f"b  end-effectors, all replicates (n = {path['replicate'].nunique()})")
-    trail.set(xlim=(left, right), ylim=(low, high))
-    grey, red = style.NEUTRAL, style.FORBIDDEN
-    robots = sorted(path["robot"].unique())
-    keys = [
-        *style.arm_keys(robots, "robot", linewidth=3),
-        style.key("start posture", color=grey, linewidth=2, linestyle=DASHES),
-        style.key("goal posture", color=grey, linewidth=3, marker="o", ms=4),
-        *_end_keys(),
-    ]
+    keys = [*trails.trail_keys(set(path["robot"]), "robot"), *_end_keys()]
     if len(contacts):
-        told = f"first contact of bodies (refuted: {len(contacts)})"
-        keys.append(marks.point_key(told, "X", 8, color=red, mec="white"))
+        text, look = f"first contact of bodies (refuted: {len(contacts)})", {"mec": "white"}
+        keys.append(marks.point_key(text, "X", 8, color=style.FORBIDDEN, **look))
     style.keys_below(figure, keys, 4)
     return figure
 
@@ -133,37 +135,29 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
 
 def draw_tools(table: pd.DataFrame) -> Figure:
     """Draw the paths with circles at the configurations, a panel per collision substeps."""
-    radii = sorted(table["tcp_radius"].unique())
-    tests = sorted(table["collision_substeps"].unique(), reverse=True)
-    unit = table["length_unit"].iloc[0]
-    x, y = (table[f"{name}_end"].to_numpy() for name in "xy")
-    figure = style.figure(min(4.6, 3.6 * float(np.ptp(y) / np.ptp(x))) + 1.1)
-    panels = figure.subplots(1, len(tests), sharex=True, sharey=True, squeeze=False)[0]
-    for axes, substeps in zip(panels, tests, strict=True):
-        style.operational_axes(axes, unit)
-        for (radius, _), rows in groups(
-            table[table["collision_substeps"] == substeps], ["tcp_radius", "robot"]
-        ):
-            colour = style.condition_colour(radii.index(radius))
-            kind = DASHES if rows["refuted"].any() else "-"
-            axes.plot(rows["x_end"], rows["y_end"], color=colour, linestyle=kind)
+    tests, unit = list(groups(table, "collision_substeps"))[::-1], table["length_unit"].iloc[0]
+    looks: dict[float, dict[str, Any]] = {
+        radius: {"color": style.condition_colour(k)}
+        for k, radius in enumerate(sorted(table["tcp_radius"].unique()))
+    }
+    figure, panels = trails.planes(table, len(tests))
+    for axes, (substeps, tested) in zip(panels, tests, strict=True):
+        for (radius, _), rows in groups(tested, ["tcp_radius", "robot"]):
+            kind = trails.DASHES if rows["refuted"].any() else "-"
+            axes.plot(rows["x_end"], rows["y_end"], linestyle=kind, **looks[radius])
             for row in records(rows[rows["at_configuration"]]):
-                tip = row.x_end, row.y_end
-                axes.add_patch(Circle(tip, radius, fill=False, edgecolor=colour, lw=0.7, alpha=0.7))
+                circle = Circle((row.x_end, row.y_end), radius, fill=False, lw=0.7, **looks[radius])
+                axes.add_patch(circle)
             _ends(axes, rows)
-        for robot, rows in groups(table, "robot"):
+        for robot, rows in groups(tested, "robot"):
             look: dict[str, Any] = {"fontsize": 7.5, "zorder": 7, "path_effects": marks.HALO}
             start = rows["x_end"].iloc[0], rows["y_end"].iloc[0]
             marks.write(axes, f"robot {int(robot) + 1}", start, (0, -13), **look)
         where = "the configurations" if substeps == 1 else f"{substeps} substeps"
         axes.set_title(f"tested at {where}")
-        axes.margins(0.1)
-    keys = [
-        style.key(f"radius {radius:g} {unit}", color=style.condition_colour(k))
-        for k, radius in enumerate(radii)
-    ]
+    keys = [style.key(f"radius {radius:g} {unit}", **look) for radius, look in looks.items()]
     if table["refuted"].any():
-        keys.append(style.key("refuted", color=style.NEUTRAL, linestyle=DASHES))
+        keys.append(style.key("refuted", color=style.NEUTRAL, linestyle=trails.DASHES))
     style.keys_below(figure, [*keys, *_end_keys()])
     return figure
 
@@ -186,31 +180,6 @@ def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFra
     tips = links[links["link"] == 1].drop(columns=["x", "y"])
     before = tips.groupby("robot")[["x_end", "y_end"]].shift().fillna(tips[["x_end", "y_end"]])
     return tips.assign(element=PATH, x=before["x_end"], y=before["y_end"])
-
-
-def _trail(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw postures, and at configurations the boundaries of thick links and tools."""
-    postures, at = table[table["element"] == POSTURE], table[table["element"] == CONFIGURATION]
-    last = postures["instant"].max()
-    for (robot, instant), rows in groups(postures, ["robot", "instant"]):
-        links = rows[rows["link"] < TOOL]
-        if instant in (0.0, last):
-            style.draw_arm(axes, int(robot), links, dashed=instant == 0.0)
-        else:
-            x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
-            axes.plot(x, y, color=style.arm_colour(int(robot)), linewidth=0.9, alpha=0.3, zorder=2)
-        marks.base(axes, links["x"].iloc[0], links["y"].iloc[0], 6, zorder=2)
-    for row in records(at[at["radius"] > 0.0]):
-        look: dict[str, Any] = {"linewidth": 0.6, "alpha": 0.6, "zorder": 2}
-        look["color"] = style.arm_colour(row.robot)
-        if row.link == TOOL:
-            axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, **look))
-            continue
-        along = np.array([row.x_end - row.x, row.y_end - row.y])
-        x, y = row.radius * np.array([-along[1], along[0]]) / float(np.hypot(*along))
-        for side in (-1.0, 1.0):
-            ends = np.array([[row.x, row.x_end], [row.y, row.y_end]]) + side * np.array([[x], [y]])
-            axes.plot(*ends, **look)
 
 
 def _ends(axes: Axes, path: pd.DataFrame) -> None:

@@ -7,16 +7,17 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, Patch, Rectangle
+from matplotlib.patches import Ellipse
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers import trails
 from evoexp.papers.lavoie import measures
 from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
 from evoexp.report.pages import markdown
 from evoexp.report.results import motion_geometry
-from evoexp.report.results.run_measures import median_replicate, solved
+from evoexp.report.results.run_measures import median_replicate, solved, touches
 from evoexp.report.results.stored_results import ConditionResults
 
 ELLIPSE, BOX, TARGET = "ellipse", "box", "target"
@@ -28,11 +29,10 @@ NAMES = [
 NO_SIZE = (np.nan,) * 3
 MOST_POSTURES = 10  # of a sub-path that are drawn
 TARGETS = ("via point", "goal point")
-AROUND = 0.35  # [-] of the box by which a view of it is wider than box and targets
+AROUND = 0.3  # [-] of the box by which a view of it is wider than box and targets
 MARKERS = {"via point": "P", "goal point": "*"}
-START: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 2.6}
 INSIDE: dict[str, Any] = {"linestyle": (0, (3, 2)), "linewidth": 0.9}
-TOUCH: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.4, "linestyle": (0, (3, 1.5))}
+TOUCH: dict[str, Any] = {"linewidth": 1.4, "linestyle": (0, (3, 1.5))}
 # names of the start and of both ends, and where they stand beside the tip: off its markers [pt]
 PLACES: tuple[tuple[str, tuple[int, int], Literal["left", "right"]], ...] = (
     ("start", (-4, 5), "right"),
@@ -67,75 +67,46 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
     """Return scenes, postures and contacts."""
     parts = []
     for panel, one in enumerate(shown):
-        unit = one.condition.length_unit
-        rows = [*_scene(one.condition), *_postures(one)]
-        parts += [(panel, one.title, *row, unit) for row in rows]
+        scenario, unit = one.condition.scenario, one.condition.length_unit
+        table = scenario.obstacle_table()
+        angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
+        ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)
+        targets = zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True)
+        left, right, bottom, top = scenario.box
+        scene: list[tuple[Any, ...]] = [
+            *(
+                (ELLIPSE, f"obstacle_{k}", *center, *center, *size, float(angle))
+                for k, (center, size, angle) in enumerate(ellipses, 1)
+            ),
+            (BOX, "box", left, bottom, right, top, *NO_SIZE),
+            *((TARGET, name, *point, *point, *NO_SIZE) for name, point in targets),
+        ]
+        rows = [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in scene]
+        parts += [(panel, one.title, *row, unit) for row in (*rows, *_postures(one))]
     return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
     """Draw every scene with its postures, and below each motion a close view of its box."""
     panels = [rows for _, rows in groups(table, "panel")]
-    spans = [
-        [float(np.ptp(rows[[name, f"{name}_end"]].to_numpy())) for name in "xy"] for rows in panels
-    ]
-    ratios = [wide / high for wide, high in spans]
+    sizes = [np.subtract(*reversed(trails.room(rows))) for rows in panels]
+    ratios = [wide / high for wide, high in sizes]
     moving = bool((table["sub_path"] > 0).any())
     height = min(4.6, 6.1 / sum(ratios))
     figure = style.figure(height + (3.6 if moving else 0.0) + 1.0)
     places = figure.subplots(1 + moving, len(panels), squeeze=False, width_ratios=ratios)
-    for (whole, *close), rows in zip(places.T, panels, strict=True):
-        links = rows[rows["element"].isin([LINK, TOUCHING])]
-        contacts = rows[rows["element"] == CONTACT]
-        for axes in (whole, *close):
+    for views, rows in zip(places.T, panels, strict=True):
+        for axes in views:
             style.operational_axes(axes, rows["length_unit"].iloc[0])
             _draw_scene(axes, rows)
-            _draw_postures(axes, links, (0,) if axes is whole else (1, 2))
-            marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9)
-        whole.set_title(rows["title"].iloc[0])
-        whole.margins(0.06)
+            _draw_postures(axes, rows)
         shown = rows[rows["element"].isin([BOX, TARGET])]
-        for axes in close:  # the surroundings of box and targets only
-            for name in "xy":
-                values = shown[[name, f"{name}_end"]].to_numpy()
-                pad = AROUND * float(np.ptp(values))
-                axes.set(**{f"{name}lim": (float(values.min()) - pad, float(values.max()) + pad)})
-            axes.set_title("around the box", fontweight="normal")
-    moved = sorted(set(table.loc[table["element"] == LINK, "sub_path"]) - {0})
-    point: dict[str, Any] = {"linestyle": "none", "color": "black", "mec": "white", "ms": 9}
-    ends = {k: f"SP{k}, to posture {'AB'[k - 1]}" for k in moved}
-    keys = [
-        style.key("start posture", **START, marker="o", mfc="white", ms=4),
-        *(style.key(name, color=_colour(k), linewidth=2.6) for k, name in ends.items()),
-        Patch(facecolor=style.FAINT, label="ellipses"),
-        style.key("inside of the box", color=style.FAINT, **INSIDE),
-        *(style.key(name, marker=MARKERS[name], **point) for name in TARGETS),
-    ]
-    if (table["element"] == CONTACT).any():
-        cross: dict[str, Any] = {"color": style.FORBIDDEN, "mec": "white"}
-        keys.append(style.key("posture in contact, never tested", **TOUCH))
-        keys.append(marks.point_key("first contact of a sub-path", "X", 9, **cross))
-    style.keys_below(figure, keys, 3)
+        limits = trails.room(rows), trails.room(shown, share=AROUND)
+        titles = rows["title"].iloc[0], "around the box"
+        for axes, title, (low, high) in zip(views, titles, limits, strict=False):
+            axes.set(title=title, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    style.legend_below(figure, places.flat, 3)
     return figure
-
-
-def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
-    """Return the rows of ellipses, box and targets."""
-    scenario = condition.scenario
-    table = scenario.obstacle_table()
-    angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
-    ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)
-    targets = zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True)
-    left, right, bottom, top = scenario.box
-    rows: list[tuple[Any, ...]] = [
-        *(
-            (ELLIPSE, f"obstacle_{k}", *center, *center, *size, float(angle))
-            for k, (center, size, angle) in enumerate(ellipses, 1)
-        ),
-        (BOX, "box", left, bottom, right, top, *NO_SIZE),
-        *((TARGET, name, *point, *point, *NO_SIZE) for name, point in targets),
-    ]
-    return [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in rows]
 
 
 def _postures(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
@@ -171,55 +142,48 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw ellipses, box and targets."""
     for row in records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
-        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
+        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2, "label": "ellipses"}
         axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
     for row in records(rows[rows["element"] == BOX]):
-        size = row.x_end - row.x, row.y_end - row.y
-        edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
-        axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
+        x, y = (
+            [row.x, row.x_end, row.x_end, row.x, row.x],
+            [row.y, row.y, row.y_end, row.y_end, row.y],
+        )
+        axes.plot(x, y, color=style.FAINT, label="inside of the box", zorder=1, **INSIDE)
     for row in records(rows[rows["element"] == TARGET]):
-        wide = 8 if row.name == "via point" else 11
         point: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
-        axes.plot(row.x, row.y, MARKERS[row.name], ms=wide, **point)
+        axes.plot(row.x, row.y, MARKERS[row.name], ms=10, label=row.name, **point)
 
 
-def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
-    """Draw the start in black, each sub-path in a colour of its own, its end strong."""
-    for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
-        x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
-        colour, share = _colour(sub_path), instant - (sub_path - 1)
-        if element == TOUCHING:
-            axes.plot(x, y, **TOUCH, zorder=6)
-        elif sub_path == 0:
-            axes.plot(x, y, **START, zorder=5)
-        elif share == 1.0:
-            axes.plot(x, y, color=colour, alpha=1.0, linewidth=2.6, zorder=6)
+def _draw_postures(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw the start in black, each sub-path in a colour of its own, ends with their names."""
+    links, touching, contacts = (
+        rows[rows["element"] == element] for element in (LINK, TOUCHING, CONTACT)
+    )
+    for sub_path, own in groups(links, "sub_path"):
+        end, colour = own[own["instant"] == own["instant"].max()], style.NEUTRAL
+        name, place, side = PLACES[sub_path]
+        if sub_path == 0:
+            trails.draw_chain(axes, end, colour, label="start posture")
+            trails.draw_base(axes, end)
         else:
-            axes.plot(x, y, color=colour, alpha=0.15 + 0.5 * share, linewidth=1.0, zorder=3)
-        if element == LINK and sub_path > 0:
-            axes.plot(x[-1], y[-1], ".", color=colour, markersize=4, zorder=7)
-        if element == LINK and instant == sub_path:  # joints at the end of a sub-path
-            marks.hollow(axes, x[:-1], y[:-1], "o", colour, 3.6, mew=0.9, zorder=7)
-            if sub_path in named:
-                name, place, side = PLACES[sub_path]
-                look: dict[str, Any] = {"ha": side, "zorder": 10, "fontsize": 8, "color": colour}
-                marks.write(axes, name, (x[-1], y[-1]), place, path_effects=marks.HALO, **look)
-    base = links[links["link"] == 0].iloc[0]
-    marks.base(axes, base["x"], base["y"], 7, zorder=4)
-
-
-def _colour(sub_path: int) -> str:
-    """Return the colour of a sub-path; that of the start for 0."""
-    return style.arm_colour(sub_path - 1) if sub_path else style.NEUTRAL
+            colour = style.arm_colour(sub_path - 1)
+            trails.draw_trail(axes, own, colour, label=f"SP{sub_path}, to posture {name}")
+        look: dict[str, Any] = {"ha": side, "zorder": 10, "color": colour}
+        tip = end[["x_end", "y_end"]].iloc[-1]
+        marks.write(axes, name, tip, place, path_effects=marks.HALO, **look)
+    for _, posture in groups(touching, "instant"):
+        label = "posture in contact, never tested"
+        trails.draw_chain(axes, posture, style.FORBIDDEN, joints=False, label=label, **TOUCH)
+    if len(contacts):
+        cross: dict[str, Any] = {"linestyle": "none", "label": "first contact of a sub-path"}
+        marks.contact(axes, contacts["x"], contacts["y"], 9, zorder=9, **cross)
 
 
 PAGE_VALUES: dict[str, Callable[..., Any]] = {
     # its solved run of median error among those that touch an obstacle
     "refuted_solutions": lambda conditions: [
-        _shown(c, rows)
-        for c in conditions
-        for rows in (solved(c) & measures.touches(c),)
-        if rows.any()
+        _shown(c, rows) for c in conditions for rows in (solved(c) & touches(c),) if rows.any()
     ],
     # the start posture of every condition, and its solved run of median error
     "starts": lambda conditions: [ShownMotion(c.label, c) for c in conditions],

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 from evoexp.papers.lavoie.measures import Percentage
 from evoexp.report.figures import groups, marks, records, style
@@ -20,7 +19,6 @@ ATTEMPT_COLUMNS = [
     *("share", "lower", "upper", "mean"),
 ]
 FOUND, PRINTED = "found", "printed"
-HALO = [withStroke(linewidth=2.5, foreground="white")]
 DISTRIBUTION_COLUMNS = [
     *("series", "position", "condition", "error", "having", "total"),
     *("share", "lower", "upper"),
@@ -86,11 +84,8 @@ def distribution_table(
             given = series, results.position(c.label), c.label, x
             rows.append((*given, *share, share.share, *share.interval(confidence)))
     unit = results.with_data[0].length_unit
-    return (
-        pd.DataFrame(rows, columns=DISTRIBUTION_COLUMNS)
-        .astype({"error": "float64"})
-        .assign(length_unit=unit)
-    )
+    table = pd.DataFrame(rows, columns=DISTRIBUTION_COLUMNS)
+    return table.astype({"error": "float64"}).assign(length_unit=unit)
 
 
 def draw_distribution(table: pd.DataFrame) -> Figure:
@@ -112,23 +107,17 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
             axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
             look = {"label": name, "mew": 1.4, "zorder": 5}
             marks.hollow(axes, x, rows["share"], "D", colour, 5, **look)
-        axes.set(
-            xlim=(0.0, greatest),
-            xlabel=f"x [{table['length_unit'].iloc[0]}]",
-            ylabel="P(position error < x)",
-        )
+        axes.set(xlim=(0.0, greatest), ylabel="P(position error < x)")
+        axes.set_xlabel(f"x [{table['length_unit'].iloc[0]}]")
     whole.set(ylim=(-0.02, 1.03), title="a  whole range")
     low = min([0.93, *printed["lower"]])
     near = low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low)
     close.set(ylim=near, title="b  where the printed percentages are")
-    # printed percentages, the greatest at its x above its point, others below
-    for row in records(printed):
-        is_greatest = row.share == printed.loc[printed["error"] == row.error, "share"].max()
-        left = row.error > 0.7 * greatest
-        words: dict[str, Any] = {"ha": "right" if left else "left", "fontsize": 7.5, "zorder": 6}
-        words |= {"color": style.condition_colour(row.position), "path_effects": HALO}
-        offset = -6 if left else 7, 4 if is_greatest else -10
-        marks.write(close, f"{100 * row.share:.1f} %", (row.error, row.share), offset, **words)
+    for row in records(printed):  # to the left of points on the right
+        side, offset = ("right", -6) if row.error > 0.7 * greatest else ("left", 7)
+        words: dict[str, Any] = {"color": style.condition_colour(row.position), "fontsize": 7.5}
+        words |= {"ha": side, "path_effects": marks.HALO, "zorder": 6}
+        marks.write(close, f"{100 * row.share:.1f} %", (row.error, row.share), (offset, 4), **words)
     style.legend_below(figure, [whole], 2)
     return figure
 
@@ -149,8 +138,7 @@ def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataF
 
 def draw_stopping(table: pd.DataFrame) -> Figure:
     """Draw medians with quartiles of error and effort, one series per limit of generations."""
-    figure = style.figure(3.2)
-    panels = figure.subplots(1, 2, sharex=True)
+    figure, panels = style.panels(3.2, 2)
     count = table["num_generations"].nunique()
     apart = BESIDE * float(np.ptp(table["stop_cost"]) or 1.0)
     labels = {
@@ -163,20 +151,15 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
             rows = rows.sort_values("stop_cost")
             x = rows["stop_cost"] + apart * (2 * k - count + 1)
             solved, done = rows[["solved", "done"]].sum()
-            runs, colour = f"({solved} of {done} runs with a solution)", style.condition_colour(k)
-            name = f"at most {int(generations)} generations {runs}"
-            without_end = rows["upper"].isna() & rows["lower"].notna()
+            name = f"at most {generations} generations ({solved} of {done} runs with a solution)"
+            colour, without_end = style.condition_colour(k), rows["upper"].isna()
             axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.2)
             axes.plot(x[without_end], rows["lower"][without_end], "^", color=colour, ms=6)
             axes.plot(x, rows["median"], "o-", label=name, color=colour, ms=4.5, lw=1.0)
-        axes.set(
-            ylim=(0.0, None),
-            xlabel="stopping value of SP2 (objective) [-]",
-            ylabel=label,
-            title=title,
-        )
+        axes.set(ylim=(0.0, None), ylabel=label, title=title)
+        axes.set_xlabel("stopping value of SP2 (objective) [-]")
         axes.set_xticks(sorted(table["stop_cost"].unique()))
+        axes.invert_xaxis()
         style.shorten_thousands(axes.yaxis)
-    panels[0].invert_xaxis()
     style.legend_below(figure, [panels[0]], 2)
     return figure

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.papers import trails
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report.figures import groups, marks, records, rounded, style
@@ -22,8 +22,6 @@ CLOSEST: dict[str, tuple[str, dict[str, Any]]] = {  # pairs of points: name, loo
     "bodies": ("the links", {"color": style.ARM_COLOURS[3], "ls": ":"}),
 }
 NUMBERED = 5  # every fifth via-point carries its number
-NUMBER_OFFSET = 10.0  # [pt] from via-point to number
-NUMBER_ROOM = 0.07  # [-] of the path's extent, from via-point to number
 
 
 def arms_table(condition: ConditionResults) -> pd.DataFrame:
@@ -45,32 +43,31 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     figure = style.figure(4.7, 4.2)
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])
+    looks: dict[str, dict[str, Any]] = {
+        "start": {},
+        "goal": {"alpha": 0.35, "linestyle": trails.DASHES},
+    }
     for (posture, arm), links in groups(table, ["posture", "arm"]):
-        at_start = posture == "start"
-        style.draw_arm(axes, arm, links, alpha=1.0 if at_start else 0.35, dashed=not at_start)
-        # joint angles with their reference directions, arcs and values
-        for row in records(links) if at_start else ():
-            x, y, colour = row.x, row.y, style.arm_colour(row.arm)
-            reference, angle, radius = row.reference_deg, row.angle_deg, 0.55 if row.joint else 0.75
-            s, c = sincos(DEGREE * reference)
-            line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.8, "zorder": 1}
-            axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", **line)
-            first, last = sorted((reference, reference + angle))
-            arc: dict[str, Any] = {"theta1": first, "theta2": last, "linewidth": 1.0}
-            axes.add_patch(Arc((x, y), 2 * radius, 2 * radius, color=colour, **arc))
-            s, c = sincos(DEGREE * (reference + 0.5 * angle))
-            text = f"{style.joint_symbol(row.arm, row.joint)} = {angle:g}°"
-            place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
-            look: dict[str, Any] = {"va": "center", "color": colour, "zorder": 5}
-            axes.annotate(text, place, ha="left" if c >= 0 else "right", **look)
-    for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
-        marks.base(axes, row.x, row.y, 9, zorder=2)
-        colour = style.arm_colour(row.arm)
-        marks.write(axes, f"arm {row.arm + 1}", (row.x, row.y), (0, -22), color=colour)
-    keys = [
-        style.key("start", color=style.NEUTRAL, linewidth=3, marker="o", markersize=4),
-        style.key("goal", color=style.NEUTRAL, linewidth=2, alpha=0.35, linestyle=(0, (2, 1))),
-    ]
+        trails.draw_chain(axes, links, style.arm_colour(arm), **looks[posture])
+    # joint angles with their reference directions, arcs and values
+    for row in records(table[table["posture"] == "start"]):
+        x, y, colour = row.x, row.y, style.arm_colour(row.arm)
+        reference, angle, radius = row.reference_deg, row.angle_deg, 0.55 if row.joint else 0.75
+        s, c = sincos(DEGREE * reference)
+        line: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.8, "zorder": 1}
+        axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", **line)
+        first, last = sorted((reference, reference + angle))
+        arc: dict[str, Any] = {"theta1": first, "theta2": last, "linewidth": 1.0}
+        axes.add_patch(Arc((x, y), 2 * radius, 2 * radius, color=colour, **arc))
+        s, c = sincos(DEGREE * (reference + 0.5 * angle))
+        text = f"{style.joint_symbol(row.arm, row.joint)} = {angle:g}°"
+        place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
+        look: dict[str, Any] = {"va": "center", "color": colour, "zorder": 6}
+        axes.annotate(text, place, ha="left" if c >= 0 else "right", **look)
+        if row.joint == 0:
+            marks.base(axes, x, y, 9, zorder=2)
+            marks.write(axes, f"arm {row.arm + 1}", (x, y), (0, -22), color=colour)
+    keys = [style.key(name, color=style.NEUTRAL, **look) for name, look in looks.items()]
     style.keys_below(figure, keys)
     axes.margins(0.12)
     return figure
@@ -89,34 +86,26 @@ def via_points_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_via_points(table: pd.DataFrame) -> Figure:
-    """Draw via-points in the arms' configuration planes, numbered by instant."""
-    figure, planes = configuration_planes(table, 3.6)
+    """Draw via-points in the arms' configuration planes, every fifth numbered by its instant."""
+    arms = list(groups(table, "arm"))
+    figure, panels = style.panels(3.6, len(arms))
     first, last = dict.fromkeys(table["stage"])
     looks: dict[str, dict[str, Any]] = {
         first: {"color": style.FAINT, "linewidth": 0.9, "marker": "s", "markersize": 3},
         last: {"color": style.NEUTRAL, "linewidth": 0.9, "marker": "o", "markersize": 4},
     }
-    for axes, arm, rows in planes:
-        initial, final = (rows[rows["stage"] == stage] for stage in (first, last))
-        axes.plot(*(initial[name] for name in ANGLES), **looks[first])
-        axes.plot(
-            *(final[name] for name in ANGLES), **looks[last] | {"color": style.arm_colour(arm)}
-        )
-        # every fifth via-point, the start and the goal have their number at that of eight places
-        # around that is farthest from all points, and from the numbers that stand there already
-        points, taken = final[ANGLES].to_numpy(), list(rows[ANGLES].to_numpy())
-        size = max(float(np.ptp(points, axis=0).max()), 1e-9)
-        angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
-        for k, (here, instant) in enumerate(zip(points, final["instant"], strict=True)):
-            if instant % NUMBERED and k < len(points) - 1:
-                continue
-            places = [here + NUMBER_ROOM * size * np.array([c, s]) for s, c in angles]
-            best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
-            s, c = angles[best]
-            taken.append(places[best])
-            look: dict[str, Any] = {"va": "center", "fontsize": 7, "zorder": 6}
-            offset = NUMBER_OFFSET * c, NUMBER_OFFSET * s
-            marks.write(axes, str(instant), here, offset, path_effects=marks.HALO, **look)
+    for axes, (arm, rows) in zip(panels, arms, strict=True):
+        for stage, look in looks.items():
+            colour = {"color": style.arm_colour(arm)} if stage == last else {}
+            own = rows[rows["stage"] == stage]
+            axes.plot(*(own[name] for name in ANGLES), **look | colour)
+        for row in records(own[(own["instant"] % NUMBERED == 0) | (own.index == own.index[-1])]):
+            number: dict[str, Any] = {"fontsize": 7, "zorder": 6, "path_effects": marks.HALO}
+            place = row.joint_1_deg, row.joint_2_deg
+            marks.write(axes, str(row.instant), place, (0, 6), **number)
+        x, y = (f"{style.joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
+        axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
+        axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
         axes.margins(0.1)
     keys = [
         style.key(first, **looks[first]),
@@ -124,19 +113,6 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
     ]
     style.keys_below(figure, keys)
     return figure
-
-
-def configuration_planes(
-    table: pd.DataFrame, height: float
-) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
-    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm)."""
-    by_arm = list(groups(table, "arm"))
-    figure, panels = style.panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
-    for axes, (arm, _) in zip(panels, by_arm, strict=True):
-        x, y = (f"{style.joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
-        axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
-        axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
-    return figure, [(axes, *own) for axes, own in zip(panels, by_arm, strict=True)]
 
 
 def circles_table(condition: ConditionResults) -> pd.DataFrame:
@@ -182,8 +158,8 @@ def draw_circles(table: pd.DataFrame) -> Figure:
         axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, ec=colour, lw=0.8))
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
     for arm, links in groups(table[table["element"] == "link"], "arm"):
-        style.draw_arm(axes, arm, links)
-        marks.base(axes, links["x"].iloc[0], links["y"].iloc[0], 9, zorder=2)
+        trails.draw_chain(axes, links, style.arm_colour(arm))
+        trails.draw_base(axes, links)
     for row in records(table[table["distance"].notna()]):
         what, line = CLOSEST[row.element]
         label = f"least distance of {what}: {row.distance:.3f} {unit}"

@@ -1,0 +1,119 @@
+"""Arms as chains of links, and their motions as trails of postures, in the plane or in space.
+
+Links are rows with x, y, x_end, y_end (in space z, z_end, too), in order from the base on. `names`
+are the axes that are drawn: "xy" or "xyz".
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evoexp.records import FloatArray
+from evoexp.report.figures import groups, style, surfaces
+
+DASHES: Any = (0, (2, 1))
+DASHED: dict[str, Any] = {"linestyle": DASHES}
+WAY: dict[str, Any] = {"linestyle": ":", "linewidth": 0.9}
+WIDE, THIN = 2.4, 0.9  # [pt] of the last posture, and of those before
+
+
+def draw_chain(
+    axes: Any,
+    links: pd.DataFrame,
+    colour: str,
+    names: str = "xy",
+    *,
+    joints: bool = True,
+    **look: Any,
+) -> None:
+    """Draw one posture, with its joints."""
+    points = [[links[name].iloc[0], *links[f"{name}_end"]] for name in names]
+    look = {"linewidth": WIDE, "zorder": 4} | look
+    axes.plot(*points, color=colour, **look)
+    if joints:
+        dots: dict[str, Any] = {"color": "white", "markeredgecolor": colour, "markersize": 3.6}
+        axes.plot(*points, "o", alpha=look.get("alpha"), zorder=look["zorder"] + 1, **dots)
+
+
+def draw_trail(
+    axes: Any, links: pd.DataFrame, colour: str, names: str = "xy", label: str | None = None
+) -> None:
+    """Draw postures of an arm: the first dashed, later ones stronger, the last one wide; its tip.
+
+    Links have an instant each.
+    """
+    first, last = links["instant"].min(), links["instant"].max()
+    for instant, posture in groups(links, "instant"):
+        if instant == last:
+            draw_chain(axes, posture, colour, names, label=label)
+        elif instant == first:
+            look: dict[str, Any] = {"linewidth": 1.4, "linestyle": DASHES, "zorder": 3}
+            draw_chain(axes, posture, colour, names, joints=False, **look)
+        else:
+            look = {"linewidth": THIN, "alpha": 0.15 + 0.45 * (instant - first) / (last - first)}
+            draw_chain(axes, posture, colour, names, joints=False, **look | {"zorder": 2})
+    tips = links.groupby("instant").last()
+    axes.plot(*(tips[f"{name}_end"] for name in names), color=colour, zorder=3, **WAY)
+
+
+def draw_base(axes: Any, links: pd.DataFrame, names: str = "xy") -> None:
+    """Draw the square of an arm's base."""
+    square: dict[str, Any] = {"color": style.NEUTRAL, "markersize": 6, "zorder": 3}
+    axes.plot(*(links[name].iloc[:1] for name in names), "s", **square)
+
+
+def trail_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
+    """Return the entries of a legend for trails of arms, counted from 0."""
+    grey = style.NEUTRAL
+    return [
+        *arm_keys(arms, name),
+        style.key("first posture", color=grey, linewidth=1.4, linestyle=DASHES),
+        style.key("last posture", color=grey, linewidth=WIDE, marker="o", mfc="white", ms=4),
+        style.key("way of the tip", color=grey, **WAY),
+    ]
+
+
+def arm_keys(arms: Iterable[int], name: str = "arm") -> list[Line2D]:
+    """Return entries of a legend for arms, counted from 0: "arm 1" in the arm's colour, …."""
+    colours = {f"{name} {int(k) + 1}": style.arm_colour(int(k)) for k in sorted(arms)}
+    return [style.key(text, color=colour, linewidth=WIDE) for text, colour in colours.items()]
+
+
+def room(
+    table: pd.DataFrame, names: str = "xy", share: float = 0.08
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest place of links, each (names,), and a share of room around."""
+    ends = np.array([table[[name, f"{name}_end"]] for name in names], dtype=np.float64)
+    low, high = np.nanmin(ends, axis=(1, 2)), np.nanmax(ends, axis=(1, 2))
+    pad = share * float((high - low).max())
+    return low - pad, high + pad
+
+
+def planes(table: pd.DataFrame, count: int, per_line: int = 2) -> tuple[Figure, list[Axes]]:
+    """Return panels in the plane that all hold the links of a table, in one scale."""
+    (left, low), (right, high) = room(table)
+    width = style.WIDTH / min(count, per_line) - 0.5
+    height = min(width * (high - low) / (right - left), 4.4) + 0.6
+    figure, panels = style.panels(height, count, per_line, 0.5)
+    for axes in panels:
+        style.operational_axes(axes, table["length_unit"].iloc[0])
+        axes.set(xlim=(left, right), ylim=(low, high))
+        axes.label_outer()
+    return figure, panels
+
+
+def space(
+    figure: Figure, place: tuple[Any, ...], points: FloatArray, unit: str, **look: Any
+) -> Any:
+    """Return axes in space, with equal scales, that hold some points (points, 3)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    widest = float((high - low).max())
+    pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
+    usual: dict[str, Any] = {"view": (22.0, -55.0), "zoom": 0.95, "label_pads": (-7, -7, -7)}
+    look = usual | {"ticks": (2, 4)} | look
+    return surfaces.space(figure, place, low, high, pad, unit, pale=True, **look)

@@ -59,7 +59,7 @@ def memory_of(tables: BodyTables, nq: int) -> Memory:
         np.empty(U(len(tables.spheres)) * POINT),
         np.empty(3 * LANES),
         np.full(num_units, -1.0),
-        np.full(num_units, -1.0),
+        np.full(num_units + 1, -1.0),
         np.empty(LANES),
     )
 

@@ -16,16 +16,10 @@ from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.records import FloatArray, IntArray
 
 FIRST_STEP = 0.02  # [segments] towards a local minimum
-
 FINEST = 1e-10  # [segments] the last step is not less
-
 SHRINK = 0.0625  # [-] of the step where neither side is closer
-
 MAX_MOVES = 1000  # on the way to a local minimum
-
 MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least distances
-
-SAME = 1e-4  # [segments] a local minimum so close is the same one
 
 
 class LeastDistance:
@@ -35,11 +29,7 @@ class LeastDistance:
     """
 
     def __init__(self, scene: Scene) -> None:
-        """Take a scene and its pairs.
-
-        Args:
-            scene: Its bodies must be `known`.
-        """
+        """Take a scene whose bodies are `known`, and its pairs."""
         num_pairs, num_joints = len(scene.pairs), len(scene.table.chain.parent)
         self._task = Task(
             chain=scene.table.chain,
@@ -136,43 +126,3 @@ def polish(
             if step < FINEST:
                 break
         t[walk], distances[walk] = here, best
-
-
-def nearest_minimum(
-    task: Task,
-    work: Workspace,
-    least: FloatArray,
-    begins: FloatArray,
-    worth: float,
-    known: tuple[int, float],
-    rounding: float,
-) -> tuple[int, float]:
-    """Return pair and instant of the least local minimum; of equal ones the first in time.
-
-    Args:
-        work: From `work_space`.
-        least: (pairs,) the distance of each that was found.
-        begins: (pairs,) its instant, at which the walk begins.
-        worth: Pairs with a greater distance are left out, and those whose distances are not exact.
-        known: Pair and instant of a local minimum that is known.
-        rounding: Distances closer than that are equal [length unit].
-
-    Returns:
-        A pair of −1 if there is none but the known one.
-    """
-    # the pairs that came closest, without the one that is known
-    close = np.flatnonzero((least <= worth) & task.exact)
-    pairs = close[np.argsort(least[close], kind="stable")][:MAX_POLISHED]
-    # a motion of one instant is swept as a segment without movement
-    t = np.minimum(begins[pairs], task.last)
-    is_new = (pairs != known[0]) | ~(np.abs(t - known[1]) < SAME)
-    pairs, t = pairs[is_new], t[is_new]
-    if len(pairs) == 0:
-        return -1, np.nan
-    # their local minima; of equal ones the first
-    distances = np.empty(len(pairs))
-    polish(task, work, pairs, t, distances)
-    tied = distances <= distances.min() + rounding
-    first = tied & (t <= t[tied].min() + SAME)
-    nearest = int(np.argmin(np.where(first, distances, np.inf)))
-    return int(pairs[nearest]), float(t[nearest])

@@ -111,10 +111,8 @@ def joint_limits(assembly: Assembly) -> FloatArray:
 def contacts_seen(
     assembly: Assembly, pairs: list[Pair], samples: int
 ) -> tuple[BoolArray, BoolArray]:
-    """Return which pairs touch on coal's geometry, and which are apart, in any of some samples.
-
-    Without limits of all joints, all pairs count as seen both ways.
-    """
+    """Return which pairs touch on coal's geometry, and which are apart, in any of some samples."""
+    # without limits of all joints, all pairs count as seen both ways
     touched = np.zeros(len(pairs), dtype=np.bool_)
     parted = np.zeros(len(pairs), dtype=np.bool_)
     q = sampled_configurations(assembly, samples)

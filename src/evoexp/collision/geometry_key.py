@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.collision.box_support import EXACT, coal
+from evoexp.collision.box_support import EXACT, coal, corners_of
 from evoexp.numeric.kernel_folders import sources_key
 
 _LIBRARIES = ("numpy", "scipy", "coal")
@@ -36,11 +36,10 @@ def _numbers_of(shape: Any) -> list[Any]:
     """Return all numbers that a shape consists of."""
     if isinstance(shape, coal.ConvexBase):
         faces = range(shape.num_polygons if hasattr(shape, "polygons") else 0)
-        points = [shape.point(k) for k in range(shape.num_points)]
-        return [points, [_corners(shape.polygons(k)) for k in faces]]
+        return [corners_of(shape), [_corners(shape.polygons(k)) for k in faces]]
     if isinstance(shape, coal.BVHModelBase):
-        points = [shape.vertex(k) for k in range(shape.num_vertices)]
-        return [points, [_corners(shape.tri_indices(k)) for k in range(shape.num_tris)]]
+        faces = range(shape.num_tris)
+        return [corners_of(shape), [_corners(shape.tri_indices(k)) for k in faces]]
     return [getattr(shape, name) for name in _SIZES if hasattr(shape, name)]
 
 

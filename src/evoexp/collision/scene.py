@@ -68,11 +68,7 @@ class Scene(NamedTuple):
         return self.names[one], self.names[two]
 
     def of_pairs(self, kept: np.ndarray) -> "Scene":
-        """Return the scene with some of its pairs only.
-
-        Args:
-            kept: (pairs,) whether each is kept.
-        """
+        """Return the scene with those of its pairs that are kept, (pairs,)."""
         return self._replace(pairs=self.pairs[kept], tolerances=self.tolerances[kept])
 
     def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
@@ -202,10 +198,7 @@ def obstacle_shapes(
 
 
 def _size(model: Any, bodies: BodyTable) -> float:
-    """Return the bodies' greatest reach from the world's origin at the neutral configuration.
-
-    Without bodies it is 1.
-    """
+    """Return the bodies' greatest reach from the world's origin at the neutral configuration."""
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
     far = [0.0]

@@ -71,12 +71,7 @@ class Urdf(UrdfSettings):
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
-        """Return settings with the contents of files in the place of their paths.
-
-        Raises:
-            SettingError: If a file is missing or is no URDF, or a joint is of another kind than
-                evoexp's kinematics.
-        """
+        """Return settings with the contents of files in the place of their paths."""
         settings = dict(settings)
         if "path" not in settings:
             return settings

@@ -13,11 +13,7 @@ MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
 
 @functools.lru_cache(maxsize=32)
 def parsed_xml(content: bytes, field: str, tag: str) -> Any:
-    """Read XML as TinyXML does, which knows no namespaces; return its root element, shared by all.
-
-    Args:
-        tag: The root's.
-    """
+    """Read XML as TinyXML does, without namespaces; return its root element, shared by all."""
     must, builder, open_tags, count = f"XML with the root <{tag}>", ET.TreeBuilder(), [], 0
 
     def start(name: str, attributes: Any) -> None:

@@ -35,11 +35,6 @@ SMALLEST = 1e-6  # [length unit] radius of a cover
 class CollisionModel(Component):
     """Base of the collision models that cover bodies: sphere sets and capsules."""
 
-    @property
-    def asked(self) -> float:
-        """How far covers are asked to reach beyond bodies at most [length unit]; inf: no matter."""
-        return np.inf
-
     def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
         """Return the cover that stands for a geometry object, for which spheres may be given."""
         raise NotImplementedError
@@ -54,7 +49,8 @@ class CollisionModel(Component):
         covers = tuple(self.cover(item, given.get(item.name)) for item in items)
         bodies = zip(covers, (item.parentJoint for item in items), strict=True)
         shapes = Shapes.joined(_shapes(*body, number) for number, body in enumerate(bodies))
-        return BodyModel(assembly, covers, shapes, body_pairs(assembly, shapes), self.asked)
+        pairs, asked = body_pairs(assembly, shapes), getattr(self, "inflation", np.inf)
+        return BodyModel(assembly, covers, shapes, pairs, asked)
 
 
 class SphereSets(CollisionModel):
@@ -64,11 +60,6 @@ class SphereSets(CollisionModel):
 
     # how far spheres may reach beyond a body; less takes more spheres [length unit]
     inflation: Positive
-
-    @property
-    def asked(self) -> float:
-        """The inflation."""
-        return self.inflation
 
     def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
         """Return the given spheres, or else spheres around a geometry object."""
@@ -126,11 +117,7 @@ class BodyModel(NamedTuple):
         return max(cover.inflation for cover in self.covers)
 
     def notes(self, unit: str, is_complete: bool = False) -> list[str]:
-        """Describe the covers [unit], and the pairs that only the certifier judges.
-
-        Args:
-            is_complete: Whether pairs that nobody judges are listed, too.
-        """
+        """Describe the covers [unit], and the pairs that only the certifier judges, or nobody."""
         items, names = self.assembly.geometry.geometryObjects, self.names
         # how many covers there are, and how far they reach
         meshes = any(isinstance(item.geometry, coal.BVHModelBase) for item in items)
@@ -156,17 +143,12 @@ class BodyModel(NamedTuple):
             "always touch, not tested": pairs.always,
             "never touch, not tested": pairs.never,
         }
-        left = {
+        covers = "covers touch in every posture sampled"
+        groups = (unjudged if is_complete else {}) | {
             "touch in no posture sampled, judged by the certifier only": pairs.unseen,
-            "covers touch in every posture sampled, judged by the certifier only": (
-                pairs.overlapping
-            ),
+            f"{covers}, judged by the certifier only": pairs.overlapping,
+            f"{covers}, tested by maps of exact distances": pairs.mapped,
         }
-        mapped = {
-            "covers touch in every posture sampled, tested by maps of exact distances": pairs.mapped
-        }
-        fitted = {f"covers touch at {where}, left to the certifier": pairs.fitted}
-        groups = (unjudged | left | mapped) if is_complete else left | mapped
         lines += _listed(groups, names)
         if self.shrunk:
             sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
@@ -174,7 +156,9 @@ class BodyModel(NamedTuple):
                 f"covers made smaller, since they touch an obstacle at {where} where the bodies do "
                 f"not: {sizes}"
             )
-        return lines + _listed(fitted, names)
+        return lines + _listed(
+            {f"covers touch at {where}, left to the certifier": pairs.fitted}, names
+        )
 
     @property
     def num_shapes(self) -> int:

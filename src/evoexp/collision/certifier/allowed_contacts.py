@@ -76,21 +76,16 @@ def _searched(depth: Depth, pair: int, distance: CoalDistance, weights: np.ndarr
     goals = _DepthGoals(0.0, -allowed - slack, slack, np.inf, RESOLUTION * allowed, 0.0)
     if motion.num_segments == 0:
         least = distance(pair, 0.0)
-        return _noted(depth, least, 0.0, 0.0 if least <= goals.level else None)
+        too_deep = 0.0 if least <= goals.level else None
+        return depth._replace(greatest=max(0.0, -least), too_deep_at=too_deep)
     polynomials = np.ascontiguousarray(motion.polynomials)
     speeds, scratch = np.empty((2, len(weights))), np.empty(len(chain.parent))
     for segment in range(motion.num_segments):
         approach_bounds(chain, polynomials[segment], 0.0, 1.0, weights, speeds, scratch)
         interval = float(segment), segment + 1.0
         leaf = search_interval(distance, pair, interval, float(speeds[0, pair]), goals)
-        too_deep = leaf.first if leaf.first < np.inf else None
-        depth = _noted(depth, leaf.least, leaf.at, too_deep)
-        if too_deep is not None:
-            break
+        if -leaf.least > depth.greatest:
+            depth = depth._replace(greatest=-leaf.least, at=leaf.at)
+        if leaf.first < np.inf:
+            return depth._replace(too_deep_at=leaf.first)
     return depth
-
-
-def _noted(depth: Depth, least: float, at: float, too_deep_at: float | None) -> Depth:
-    """Take over a signed distance if it is the least so far, and the first that is too deep."""
-    deeper = depth._replace(greatest=-least, at=at) if -least > depth.greatest else depth
-    return deeper._replace(too_deep_at=too_deep_at)

@@ -8,8 +8,14 @@ from hypothesis import strategies as st
 
 from collision.certifier_scenes import SAMPLES, brute_force, random_motion, random_scene
 from evoexp.collision.certifier.convex_distance import CONVERGED
-from evoexp.collision.certifier.least_distance import LeastDistance, known
-from evoexp.collision.certifier.task import least_separation, move_to, pair_distance, work_space
+from evoexp.collision.certifier.task import (
+    LeastDistance,
+    known,
+    least_separation,
+    move_to,
+    pair_distance,
+    work_space,
+)
 from evoexp.collision.certifier.verdict import RESOLUTION, _Judgement, certify, is_clear
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import scene

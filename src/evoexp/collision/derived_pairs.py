@@ -88,7 +88,8 @@ def derive_pairs(assembly: Assembly, samples: int = SAMPLES) -> DerivedPairs:
     touched, parted = contacts_seen(assembly, list(apart), samples)
     for group, is_seen in (("always", parted), ("never", touched)):
         groups[group] = list(itertools.compress(apart.values(), ~is_seen))
-    return DerivedPairs(*map(tuple, groups.values()), samples)
+    neighbours, disabled, always, never = map(tuple, groups.values())
+    return DerivedPairs(neighbours, disabled, always, never, samples)
 
 
 def sampled_configurations(assembly: Assembly, count: int) -> FloatArray | None:

@@ -1,8 +1,7 @@
 """An SRDF: groups of joints, named states, end effectors, pairs that are never judged."""
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint
-from evoexp.robots.xml_files import parsed_xml
+from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint, parsed_xml
 
 MOST_GROUPS = 300  # nested in one another
 

@@ -7,19 +7,22 @@ of the link. Here nothing is passed over: what cannot be is refused, by link or 
 import functools
 import math
 import re
+import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
+from xml.parsers import expat
 
 import numpy as np
 import pinocchio as pin
 import yaml
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.xml_files import parsed_xml
+from evoexp.input_files import stand_in
 
+MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
 SHORTEST = 1e-6  # [-] of an axis
@@ -81,6 +84,38 @@ class UrdfFile(NamedTuple):
     def root(self) -> str:
         """The link that no joint carries."""
         return next(iter(self.links.keys() - {joint.child for joint in self.joints.values()}))
+
+
+@functools.lru_cache(maxsize=32)
+def parsed_xml(content: bytes, field: str, tag: str) -> Any:
+    """Read XML as TinyXML does, without namespaces; return its root element, shared by all."""
+    must, builder, open_tags, count = f"XML with the root <{tag}>", ET.TreeBuilder(), [], 0
+
+    def start(name: str, attributes: Any) -> None:
+        nonlocal count
+        open_tags.append(name)
+        count += 1
+        if len(open_tags) > MOST_NESTED or count > MOST_ELEMENTS:
+            most = f"XML of at most {MOST_ELEMENTS:,} elements, nested {MOST_NESTED} deep"
+            raise SettingError(field, most, f"more, at <{name[:40]}>")
+        builder.start(name, attributes)
+
+    def doctype(name: str, *_: Any) -> None:  # entities unfold to any size, or name other files
+        raise SettingError(field, "XML without a document type", f"<!DOCTYPE {name}>")
+
+    if reason := stand_in(content):
+        raise SettingError(field, must, reason)
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.StartDoctypeDeclHandler = start, doctype
+    parser.EndElementHandler = lambda name: builder.end(open_tags.pop())
+    try:
+        parser.Parse(content, True)
+        root = builder.close()
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise SettingError(field, must, str(error)) from None
+    if root.tag != tag:
+        raise SettingError(field, must, f"<{root.tag}>")
+    return root
 
 
 @functools.lru_cache(maxsize=32)

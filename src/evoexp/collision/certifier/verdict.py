@@ -18,9 +18,14 @@ from evoexp.collision.certifier.coal_distances import (
     search_interval,
     walk_down,
 )
-from evoexp.collision.certifier.least_distance import MAX_POLISHED, polish
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
-from evoexp.collision.certifier.task import Task, approach_weights, work_space
+from evoexp.collision.certifier.task import (
+    MAX_POLISHED,
+    Task,
+    approach_weights,
+    polish,
+    work_space,
+)
 from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion

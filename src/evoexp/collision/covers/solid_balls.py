@@ -62,14 +62,16 @@ def solid_of(item: Any) -> Solid:
     shape = item.geometry
     if isinstance(shape, coal.Box):
         half = np.array(shape.halfSide)
-        near = functools.partial(_box_distance, half=half)
-        return Solid(-half, half, near, near)
+        signed = functools.partial(_box_distance, half=half)
+        return Solid(-half, half, signed, signed)
     if isinstance(shape, coal.Cylinder | coal.Cone):
         half = np.array([shape.radius, shape.radius, shape.halfLength])
-        near = functools.partial(_cylinder_distance, half=half[1:])
+        signed = functools.partial(_cylinder_distance, half=half[1:])
         if isinstance(shape, coal.Cylinder):
-            return Solid(-half, half, near, near)
-        return Solid(-half, half, near, lambda points: np.maximum(_coal_distance(points, shape), 0))
+            return Solid(-half, half, signed, signed)
+        return Solid(
+            -half, half, signed, lambda points: np.maximum(_coal_distance(points, shape), 0)
+        )
     if isinstance(shape, coal.Ellipsoid):
         half = np.array(shape.radii)
         return Solid(

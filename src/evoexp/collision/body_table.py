@@ -82,11 +82,7 @@ class _Core(NamedTuple):
 
 
 def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
-    """Return geometry objects as arrays.
-
-    Args:
-        table: The kinematic table of the model.
-        items: Each a `pin.GeometryObject`.
+    """Return geometry objects (`pin.GeometryObject`) as arrays.
 
     Raises:
         UnsupportedShape: If a shape is neither convex nor a mesh, or a half-space moves.

@@ -19,9 +19,7 @@ _SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 def geometry_key(items: Iterable[Any], *numbers: Any) -> str:
     """Return a hash of bodies and numbers, and of the code and the libraries that work on them.
 
-    Args:
-        items: `pin.GeometryObject`s: their shapes, placements and joints count.
-        numbers: Arrays or numbers.
+    Of a `pin.GeometryObject` its shape, placement and joint count.
     """
     digest = hashlib.sha256(_code())
     for item in items:

@@ -167,11 +167,7 @@ def obstacle_shapes(
 ) -> list[tuple[Any, Any]]:
     """Return every obstacle as a coal shape and its placement, a `pin.SE3`.
 
-    Args:
-        hulls: Row → points (points, 3) in its frame, of those that are no box but a hull.
-
-    Raises:
-        SettingError: If the points of a hull lie in a plane.
+    Hulls are in the place of boxes: row → points (points, 3) in its frame.
     """
     shapes: list[tuple[Any, Any]] = []
     for k, (kind, center, rotation, (a, b, c)) in enumerate(zip(*table, strict=True)):

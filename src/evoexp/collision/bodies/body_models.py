@@ -40,11 +40,7 @@ class CollisionModel(Component):
         raise NotImplementedError
 
     def bind(self, assembly: Assembly) -> "BodyModel":
-        """Return the model of a robot.
-
-        Raises:
-            UnsupportedShape: If a body cannot be covered.
-        """
+        """Return the model of a robot."""
         items, given = list(assembly.geometry.geometryObjects), assembly.spheres or {}
         covers = tuple(self.cover(item, given.get(item.name)) for item in items)
         bodies = zip(covers, (item.parentJoint for item in items), strict=True)
@@ -171,11 +167,9 @@ class BodyModel(NamedTuple):
         ignored: tuple[Pair, ...] = (),
         carried: "Carried | None" = None,
     ) -> BodyCollision:
-        """Return the collision model among obstacles.
+        """Return the collision model among obstacles, but for pairs (body, obstacle) to ignore.
 
-        Args:
-            ignored: Pairs (body, obstacle) that may touch.
-            carried: An object that is part of the robot now; its number is one past the bodies'.
+        An object that is carried has the number one past the bodies'.
         """
         shapes, pairs, arms = self.shapes, self.pairs, self.assembly.body_arms
         of_joint = [-1] * self.assembly.model.njoints
@@ -206,16 +200,10 @@ class BodyModel(NamedTuple):
         depth: float,
         carried: "Carried | None" = None,
     ) -> BodyCollision | None:
-        """Return the model of the pairs that may touch: what is inside of bodies must stay free.
+        """Return the model of pairs (body, obstacle) that may touch, by what is inside of bodies.
 
-        Args:
-            allowed: Pairs (body, obstacle) that may touch.
-            depth: How deep they may overlap [length unit].
-            carried: See `collision`.
-
-        Returns:
-            A model whose clearances to obstacles are negative where a pair overlaps too deep; None
-            without such pairs.
+        Its clearances to obstacles are negative where a pair overlaps by more than the depth
+        [length unit]; None without such pairs.
         """
         items, own = list(self.assembly.geometry.geometryObjects), len(self.covers)
         inner: dict[int, Shapes] = {}
@@ -236,13 +224,9 @@ class BodyModel(NamedTuple):
     ) -> "BodyModel":
         """Return bodies whose covers do not touch at configurations where the bodies do not.
 
-        Covers that touch an obstacle are made smaller; pairs of bodies whose covers touch are no
-        longer tested. What a search does not see any more is left to the certifier.
-
-        Args:
-            obstacles: What does not move.
-            ignored: Pairs (body, obstacle) that may touch.
-            q: (nq, configurations) [rad] at which nothing touches.
+        Covers that touch an obstacle at q (nq, configurations) [rad] are made smaller; pairs of
+        bodies whose covers touch are no longer tested. What a search does not see any more is left
+        to the certifier.
         """
         radius, shrunk = self.shapes.radius.copy(), []
         for body in range(len(self.covers)):

@@ -74,13 +74,9 @@ def certificate(parts: Sequence[Part], motion: Motion, security_margin: float) -
 def is_proven(
     parts: Sequence[Part], motion: Motion, security_margin: float, by_margin: bool
 ) -> bool:
-    """Return whether `certificate` would prove a motion, without measuring how clearly.
+    """Return whether `certificate` would prove a motion, and perhaps its margins; see there.
 
-    Args:
-        parts: See `certificate`; without pieces nothing is proven.
-        motion: The whole motion.
-        security_margin: See `certificate`.
-        by_margin: Whether the task's margins must be kept, too.
+    It does not measure how clearly; without pieces nothing is proven.
     """
     for part in parts:
         piece = _piece(part, motion)
@@ -146,10 +142,7 @@ def judged_part(part: Part, motion: Motion, security_margin: float) -> Certifica
 
 
 def combined(parts: Sequence[Certificate]) -> Certificate:
-    """Return the verdict on a motion from those on its pieces.
-
-    It has the first contact, or else the least clearance.
-    """
+    """Return the verdict on a motion from those on its pieces, by the first contact if any."""
     # the pairs that may touch anywhere, and the deepest overlap of one
     pairs = dict.fromkeys(p for part in parts for p in part.allowed_contacts.split(", ") if p)
     deepest = max(parts, key=lambda part: -1.0 if part.penetration is None else part.penetration)
@@ -194,12 +187,7 @@ class _DepthGoals(LeafGoals):
 
 
 def contact_depths(scene: Scene, motion: Motion) -> tuple[tuple[Depth, ...], int]:
-    """Find the greatest depths of a scene's allowed contacts, and count coal's queries.
-
-    Args:
-        scene: The bodies; only its `contacts` are looked at.
-        motion: In the units of the model.
-    """
+    """Find the greatest depths of a scene's allowed contacts, and count coal's queries."""
     if not scene.contacts:
         return (), 0
     pairs = np.array([contact[:2] for contact in scene.contacts], dtype=np.int64)

@@ -102,11 +102,7 @@ def num_free(tables: FlatTables, q: FloatArray) -> int:
     """Return how many configurations come before the eight among which the first collides.
 
     All of them if none collides, or holds NaN. The search ends at the first contact that it meets,
-    so configurations that are likely to collide should come first.
-
-    Args:
-        tables: Of `flattened`.
-        q: (nq, configurations) [rad], lengths for joints that slide; contiguous.
+    so configurations that are likely to collide should come first. See `least_clearances`.
     """
     named, out = named_tables(tables[0], tables[1]), np.empty((3, q.shape[1]))
     memory = memory_of(named, q.shape[0])
@@ -192,10 +188,7 @@ def _middle(tables: BodyTables, memory: Memory, unit: int) -> Place:
 
 @inlined
 def _lower(memory: Memory, row: np.uint64, found: Vector, decide: bool) -> None:
-    """Lower a row of the least clearances; NaN stays.
-
-    Where only the sign is asked for, nothing is nearer than what overlaps.
-    """
+    """Lower a row of the least clearances, to −inf where only a sign is asked for; NaN stays."""
     so_far = load(memory.least, row)
     if decide:
         found = select(found < 0.0, spread(-np.inf), found)
@@ -204,10 +197,7 @@ def _lower(memory: Memory, row: np.uint64, found: Vector, decide: bool) -> None:
 
 @inlined
 def _may_overlap(tables: BodyTables, memory: Memory, b: int, first: int, stop: int) -> bool:
-    """Return whether a body's ball meets that of an obstacle, or nearly so; see `packing`.
-
-    Lanes that are known to collide do not count.
-    """
+    """Return whether a body's ball meets that of an obstacle, where it may be free yet."""
     entries, least, flat = tables.entries, spread(np.inf), tables.units[b, FIRST_HALF_SPACE]
     x, y, z = _middle(tables, memory, b)
     square, zero = x * x + y * y + z * z, spread(0.0)
@@ -221,10 +211,8 @@ def _may_overlap(tables: BodyTables, memory: Memory, b: int, first: int, stop: i
 
 @inlined
 def _is_near(tables: BodyTables, memory: Memory, unit: int, o: int) -> bool:
-    """Return whether a unit's ball may be nearer to an obstacle than the clearance so far.
-
-    The obstacle's ball is tested first, then the box that it is, or that is around it.
-    """
+    """Return whether a unit's ball may be nearer to an obstacle than the clearance so far."""
+    # by the obstacle's ball, then by the box that it is, or that is around it
     center, turn, core = tables.obstacles.center[o], tables.obstacles.rotation[o], tables.cores[o]
     reach, least, zero = tables.balls[unit, REACH], load(memory.least, U(0)), spread(0.0)
     middle = _middle(tables, memory, unit)

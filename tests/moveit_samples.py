@@ -10,8 +10,7 @@ import yaml
 
 from evoexp.condition import Condition
 from evoexp.planners.moveit_tasks import arm_motion
-from evoexp.scenarios.moveit_files import MessagePart, read_document
-from evoexp.scenarios.moveit_messages import REQUEST, SCENE
+from evoexp.scenarios.moveit_files import REQUEST, SCENE, MessagePart, read_document
 from evoexp.scenarios.moveit_scene import World, read_allowed, read_state, read_world
 from evoexp.testing import conditions
 

@@ -9,8 +9,12 @@ import pinocchio as pin
 import pytest
 
 from coal_shapes import geometry_of
-from evoexp.collision.certifier.allowed_contacts import contact_depths
-from evoexp.collision.certifier.certificate import Certificate, certificate, combined
+from evoexp.collision.certifier.certificate import (
+    Certificate,
+    certificate,
+    combined,
+    contact_depths,
+)
 from evoexp.collision.scene import AllowedContact, Part, Scene, geometry_scene
 from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray

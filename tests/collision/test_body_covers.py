@@ -13,6 +13,7 @@ from coal_shapes import distance_of_point, placed
 from evoexp.collision.bodies.body_models import BodyCapsules
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.covers import body_covers as covers
+from evoexp.collision.covers import solid_balls
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
 from evoexp.robots.mesh_pieces import convex_shape
@@ -95,7 +96,7 @@ def test_spheres_cover_a_body_and_reach_as_far_as_they_say(name: str, inflation:
     shape = hull(name) if is_hull else SHAPES[name]
     cover = covers.sphere_cover(body(shape), inflation)
     assert distance_to(cover, points_of(shape)).max() <= 1e-12
-    most = covers.MOST_VARIED if is_hull else covers.MOST_SPHERES
+    most = solid_balls.MOST_VARIED if is_hull else covers.MOST_SPHERES
     assert 0 < len(cover.radius) <= most or name == "capsule"
     is_round = name in ("rod", "disc", "cone", "ellipsoid")
     if len(cover.radius) < covers.MOST_SPHERES // 2 and not is_round:
@@ -114,7 +115,7 @@ def test_spheres_cover_a_body_and_reach_as_far_as_they_say(name: str, inflation:
 def test_where_balls_do_not_suffice_they_reach_farther_and_say_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(covers, "MOST_VARIED", 20)
+    monkeypatch.setattr(solid_balls, "MOST_VARIED", 20)
     cover = covers.sphere_cover(body(hull("cylinder")), 0.002)
     assert len(cover.radius) <= 20
     assert 0.002 < cover.inflation < 0.05

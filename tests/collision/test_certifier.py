@@ -11,8 +11,9 @@ import pinocchio as pin
 import pytest
 
 from coal_shapes import geometry_of
+from evoexp.collision.certifier import verdict as verdicts
 from evoexp.collision.certifier.coal_distances import CoalDistance
-from evoexp.collision.certifier.verdict import Limits, certify
+from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import Scene, geometry_scene, scene
 from evoexp.paths.motion import Motion, cubic_motion
 from evoexp.robots.arms import Arms
@@ -241,13 +242,16 @@ def test_one_scene_serves_many_threads() -> None:
     assert {verdict.status for verdict in alone} == {"certified", "refuted"}
 
 
-def test_a_limit_leaves_it_undecided() -> None:
+def test_a_limit_leaves_it_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     built, motion = beside_ball(2.5, 0.49, length=2.0), Motion(np.array([[-1.0], [1.1]]))
-    verdict = certify(built, motion, limits=Limits(intervals=2))
+    assert certify(built, motion).status == "certified"
+    monkeypatch.setattr(verdicts, "MOST_INTERVALS", 2)
+    verdict = certify(built, motion)
     assert verdict.status == verdict.margin_status == "undecided"
     assert verdict.intervals == 2
-    assert certify(built, motion, limits=Limits(queries=0)).status == "undecided"
-    assert certify(built, motion).status == "certified"
+    monkeypatch.undo()
+    monkeypatch.setattr(verdicts, "MOST_QUERIES", 0)
+    assert certify(built, motion).status == "undecided"
 
 
 def test_the_tolerance_decides_what_touches() -> None:
@@ -266,7 +270,6 @@ def test_the_tolerance_decides_what_touches() -> None:
         (Motion(np.array([[0.0], [np.nan]])), {}, "q must be finite"),
         (None, {"security_margin": -1.0}, "security_margin must be at least 0, was -1"),
         (None, {"security_margin": np.zeros(7)}, "security_margin must be one number, or one per"),
-        (None, {"resolution": 0.0}, "resolution must be above 0, was 0"),
     ],
 )
 def test_what_cannot_be_judged_is_refused(motion: Any, settings: Any, message: str) -> None:

@@ -8,9 +8,15 @@ from hypothesis import strategies as st
 
 from collision.certifier_scenes import SAMPLES, brute_force, random_motion, random_scene
 from evoexp.collision.certifier.convex_distance import CONVERGED
-from evoexp.collision.certifier.least_distance import LeastDistance, known
-from evoexp.collision.certifier.task import least_separation, move_to, pair_distance, work_space
-from evoexp.collision.certifier.verdict import Limits, _Judgement, certify, is_clear
+from evoexp.collision.certifier.task import (
+    LeastDistance,
+    known,
+    least_separation,
+    move_to,
+    pair_distance,
+    work_space,
+)
+from evoexp.collision.certifier.verdict import RESOLUTION, _Judgement, certify, is_clear
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion
@@ -24,7 +30,7 @@ SHARES = st.floats(0.0, 1.0)
 def judgement(seed: int) -> _Judgement:
     rng = np.random.default_rng(seed)
     scene = random_scene(rng)
-    return _Judgement(scene, random_motion(rng, scene.model.nq), 0.0, 1e-3, Limits())
+    return _Judgement(scene, random_motion(rng, scene.model.nq), 0.0, RESOLUTION)
 
 
 def bounds_of(judged: _Judgement, begin: float, end: float) -> np.ndarray:

@@ -12,12 +12,10 @@ import pytest
 
 from collision.built_bodies import built, num_before_contact
 from evoexp.collision.bodies.body_collision import BodyCollision, leading_free
-from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.packing import Shapes
 from evoexp.collision.bodies.planar_contacts import contacts, link_lines
 from evoexp.collision.bodies.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.numeric.elementary import DEGREE
-from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.arms import Arms
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_chain import PlanarChain
@@ -41,14 +39,6 @@ def arm_6r(geometry: Any = arms_6r.spheres) -> BodyCollision:
 ARMS = {"6R": (arm_6r, arms_6r), "7R": (arm_7r, arms_7r)}
 
 
-def decided(
-    collision: BodyCollision, q: FloatArray, at_first: bool = False
-) -> tuple[int, BoolArray]:
-    """Return the kernel's answer without the exact one behind it."""
-    out = np.empty(q.shape[1], dtype=np.bool_)
-    return find_contacts(collision.tables, at_first, np.ascontiguousarray(q), out), out
-
-
 def slider(size: float, obstacle: Any, radius: float = 0.1) -> BodyCollision:
     """A ball that slides along x, and one that turns about z at its end."""
     model = pin.Model()
@@ -66,10 +56,7 @@ def test_answers_are_the_signs_of_the_clearances(arm: str, drawn: str, count: in
     make, source = ARMS[arm]
     collision, q = make(), getattr(source, drawn)(count)
     exact = collision.clearance(q).least
-    doubts, hits = decided(collision, q)
-    assert doubts == 0, "none of these is within 1e-12 of contact"
     assert np.abs(exact).min() > 1e-9
-    assert np.array_equal(hits, exact < 0.0)
     assert np.array_equal(collision.collides(q), exact < 0.0)
     assert num_before_contact(collision, q) == leading_free(exact < 0.0)
 
@@ -92,17 +79,14 @@ def test_the_search_for_any_collision_ends_where_the_first_is_found(arm: str) ->
     free = q[:, ~hits]
     for place in (0, 5, 8, 50, free.shape[1]):
         mixed = np.insert(free, place, q[:, hits][:, 0], axis=1)
-        assert decided(collision, mixed, at_first=True)[0] == -1 - place // 8 * 8
         assert num_before_contact(collision, mixed) == place // 8 * 8
-    assert decided(collision, free, at_first=True)[0] == 0
     for count in (0, free.shape[1]):
         assert num_before_contact(collision, free[:, :count]) == count
 
 
-def test_touching_bodies_are_in_doubt_and_judged_exactly() -> None:
+def test_touching_bodies_are_judged_exactly() -> None:
     collision = slider(0.0, sphere((1.0, 0.0, 0.0), 0.5), radius=0.25)
     q = np.stack([0.25 + 2.0**-52 * np.array([-1.0, 0.0, 1.0]), np.zeros(3)])
-    assert decided(collision, q)[0] == 3
     exact = collision.clearance(q).least
     assert np.array_equal(exact < 0.0, [False, False, True])
     assert np.array_equal(collision.collides(q), exact < 0.0)
@@ -122,7 +106,6 @@ def test_far_slides_large_angles_and_what_is_not_a_number_are_judged_exactly() -
     q[0], q[1, 6] = [0.0, -6e6, 4e6, -1e30, np.nan, np.inf, 1e3], 1e9
     with np.errstate(invalid="ignore"):
         exact = collision.clearance(q).least
-    assert decided(collision, q)[0] == 6
     assert np.array_equal(collision.collides(q), ~(exact >= 0.0))
     assert np.array_equal(collision.collides(q)[:3], [False, True, False])
 
@@ -140,9 +123,7 @@ def test_scenes_at_random_with_sizes_of_every_scale(seed: int) -> None:
     scaled = table._replace(center=scale * table.center, size=scale * table.size)
     collision = built(model, Shapes(joint, *(scale * size for size in sizes), joint), scaled)
     q = rng.uniform(-np.pi, np.pi, size=(6, 1)) + rng.choice([0.1, 3.0]) * rng.normal(size=(6, 203))
-    doubts, hits = decided(collision, q)
-    assert doubts == 0
-    assert np.array_equal(hits, collision.clearance(q).least < 0.0)
+    assert np.array_equal(collision.collides(q), collision.clearance(q).least < 0.0)
 
 
 def test_capsules_are_answered_in_full() -> None:

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from coal_shapes import distance, placed
 from evoexp.collision.planar.arm_pairs import count_collisions
-from evoexp.collision.planar.closed_form import closed_form
 from evoexp.collision.planar.link_collision import LinkCollision, LinkCrossings
-from evoexp.collision.planar.planar_arms import Arm, boundary, colliding, tolerance_of
+from evoexp.collision.planar.planar_arms import Arm, boundary, closed_form, colliding, tolerance_of
 from evoexp.collision.planar.segment_predicates import ROUNDING, meeting
 from evoexp.errors import SettingError
 from evoexp.robots.planar_chain import PlanarChain

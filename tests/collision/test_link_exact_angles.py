@@ -9,8 +9,7 @@ import pytest
 from collision.test_link_crossings import bound
 from composed import composed
 from evoexp.collision.planar.arm_pairs import count_collisions
-from evoexp.collision.planar.closed_form import closed_form
-from evoexp.collision.planar.planar_arms import Arm
+from evoexp.collision.planar.planar_arms import Arm, closed_form
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray

@@ -11,8 +11,7 @@ from PIL import Image
 
 from evoexp.attachments import File, MissingFile, keep
 from evoexp.errors import SettingError
-from evoexp.scenarios.grid_maps import read_map
-from evoexp.scenarios.grid_motion import GridMotion, blocks
+from evoexp.scenarios.grid_motion import GridMotion, blocks, read_map
 
 BASE: dict[str, Any] = {"size": (4, 3), "start": (0, 0), "goal": (3, 2), "obstacle_height": 0.5}
 BASE |= {"security_margin": 0.0, "length_unit": "unit"}

@@ -12,7 +12,7 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.planners.moveit_tasks import links_of_bodies, with_allowed_pairs
-from evoexp.scenarios.moveit_messages import FIELDS, REQUEST, SCENE
+from evoexp.scenarios.moveit_files import FIELDS, REQUEST, SCENE
 from evoexp.testing import conditions
 from moveit_samples import (
     COVERED,

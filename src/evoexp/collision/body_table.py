@@ -8,9 +8,9 @@ radius. The core is given by its support function (the farthest point in a direc
 from itertools import product
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
 
+from evoexp.collision.box_support import coal, corners_of
 from evoexp.errors import EvoexpError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.ordered_sums import matrix_product
@@ -55,12 +55,7 @@ class BodyTable(NamedTuple):
     ball: FloatArray
 
     def tolerance(self, one: int, two: int) -> float:
-        """Return the distance at which two bodies count as touching, as a part of the scene's size.
-
-        Args:
-            one: Index of a body.
-            two: Index of the other.
-        """
+        """Return the part of the scene's size at which the distance of two bodies is a touch."""
         flat = all(
             self.exact[k] and self.kind[k] in (SEGMENT, BOX, HULL, HALF_SPACE) for k in (one, two)
         )
@@ -87,11 +82,7 @@ class _Core(NamedTuple):
 
 
 def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
-    """Return geometry objects as arrays.
-
-    Args:
-        table: The kinematic table of the model.
-        items: Each a `pin.GeometryObject`.
+    """Return geometry objects (`pin.GeometryObject`) as arrays.
 
     Raises:
         UnsupportedShape: If a shape is neither convex nor a mesh, or a half-space moves.
@@ -161,12 +152,11 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
     elif isinstance(shape, coal.Ellipsoid):
         core = _Core(ELLIPSOID, tuple(shape.radii), swept)
     elif isinstance(shape, coal.ConvexBase):
-        points = np.array([shape.point(i) for i in range(shape.num_points)])
-        core = _Core(HULL, radius=swept, corners=points)
+        core = _Core(HULL, radius=swept, corners=corners_of(shape))
     elif isinstance(shape, coal.TriangleP):
         core = _Core(HULL, radius=swept, corners=np.array([shape.a, shape.b, shape.c]))
     elif isinstance(shape, coal.BVHModelBase):
-        points = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
+        points = corners_of(shape)
         hull = hull_of(points)  # None of a flat mesh
         core = _Core(HULL, corners=points if hull is None else hull[0], exact=False)
     else:
@@ -183,11 +173,8 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
 
 
 def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[float, float]:
-    """Return the greatest distances of a body's points from its joint's origin and z axis.
-
-    Both come from the corners of the core or of a box around it, or from a ball around it,
-    whichever gives less.
-    """
+    """Return the greatest distances of a body's points from its joint's origin and z axis."""
+    # by the corners of the core or of a box around it, or by a ball around it
     a, b, c = core.size
     ball = np.inf
     if core.kind == HULL:

@@ -11,7 +11,9 @@ import warnings
 import coal
 import numpy as np
 
-__all__ = ["EXACT", "coal", "distance", "settle"]
+from evoexp.records import FloatArray
+
+__all__ = ["EXACT", "coal", "corners_of", "distance", "settle"]
 
 TURNED = np.array(  # a rotation about (1, 2, 3) by 1 rad: no component of any direction is zero
     [
@@ -39,6 +41,13 @@ def distance(one: coal.ShapeBase, first: object, two: coal.ShapeBase, second: ob
     """Return coal's signed distance of two shapes at their places, `coal.Transform3s`."""
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     return float(coal.distance(one, first, two, second, request, result))
+
+
+def corners_of(shape: coal.ConvexBase | coal.BVHModelBase) -> FloatArray:
+    """Return the corners (corners, 3) of a convex shape or a mesh."""
+    if isinstance(shape, coal.ConvexBase):
+        return np.array([shape.point(k) for k in range(shape.num_points)])
+    return np.array([shape.vertex(k) for k in range(shape.num_vertices)])
 
 
 EXACT = settle()

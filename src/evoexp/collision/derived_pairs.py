@@ -6,6 +6,7 @@ condition is run again. A search leaves out all three; the certifier judges the 
 never seen to touch, since samples prove nothing.
 """
 
+import itertools
 import json
 from typing import Any, NamedTuple
 
@@ -71,30 +72,24 @@ def unjudged_pairs(assembly: Assembly) -> set[NamePair]:
     return {*assembly.disabled, *(() if derived is None else derived.always)}
 
 
-def derive_pairs(assembly: Assembly) -> DerivedPairs:
+def derive_pairs(assembly: Assembly, samples: int = SAMPLES) -> DerivedPairs:
     """Sort the pairs of a robot's bodies; the same robot gives the same pairs."""
-    names = [item.name for item in assembly.geometry.geometryObjects]
-    neighbours: list[NamePair] = []
-    disabled: list[NamePair] = []
-    apart: list[Pair] = []
-    for a in range(len(names)):
-        for b in range(a + 1, len(names)):
-            pair = frozenset((names[a], names[b]))
-            if are_neighbours(assembly, a, b):
-                neighbours.append(pair)
-            elif pair in assembly.disabled:
-                disabled.append(pair)
-            else:
-                apart.append((a, b))
-    touched, parted = contacts_seen(assembly, apart, SAMPLES)
-    by_name = [frozenset((names[a], names[b])) for a, b in apart]
-    return DerivedPairs(
-        tuple(neighbours),
-        tuple(disabled),
-        tuple(pair for pair, seen in zip(by_name, parted, strict=True) if not seen),
-        tuple(pair for pair, seen in zip(by_name, touched, strict=True) if not seen),
-        SAMPLES,
-    )
+    groups: dict[str, list[NamePair]] = {name: [] for name in DerivedPairs._fields[:4]}
+    apart = dict[Pair, NamePair]()
+    items = enumerate(assembly.geometry.geometryObjects)
+    for (a, one), (b, two) in itertools.combinations(items, 2):
+        names = frozenset((one.name, two.name))
+        if are_neighbours(assembly, a, b):
+            groups["neighbours"].append(names)
+        elif names in assembly.disabled:
+            groups["disabled"].append(names)
+        else:
+            apart[a, b] = names
+    touched, parted = contacts_seen(assembly, list(apart), samples)
+    for group, is_seen in (("always", parted), ("never", touched)):
+        groups[group] = list(itertools.compress(apart.values(), ~is_seen))
+    neighbours, disabled, always, never = map(tuple, groups.values())
+    return DerivedPairs(neighbours, disabled, always, never, samples)
 
 
 def sampled_configurations(assembly: Assembly, count: int) -> FloatArray | None:
@@ -117,10 +112,8 @@ def joint_limits(assembly: Assembly) -> FloatArray:
 def contacts_seen(
     assembly: Assembly, pairs: list[Pair], samples: int
 ) -> tuple[BoolArray, BoolArray]:
-    """Return which pairs touch on coal's geometry, and which are apart, in any of some samples.
-
-    Without limits of all joints, all pairs count as seen both ways.
-    """
+    """Return which pairs touch on coal's geometry, and which are apart, in any of some samples."""
+    # without limits of all joints, all pairs count as seen both ways
     touched = np.zeros(len(pairs), dtype=np.bool_)
     parted = np.zeros(len(pairs), dtype=np.bool_)
     q = sampled_configurations(assembly, samples)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.collision.box_support import EXACT, coal
+from evoexp.collision.box_support import EXACT, coal, corners_of
 from evoexp.numeric.kernel_folders import sources_key
 
 _LIBRARIES = ("numpy", "scipy", "coal")
@@ -19,9 +19,7 @@ _SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 def geometry_key(items: Iterable[Any], *numbers: Any) -> str:
     """Return a hash of bodies and numbers, and of the code and the libraries that work on them.
 
-    Args:
-        items: `pin.GeometryObject`s: their shapes, placements and joints count.
-        numbers: Arrays or numbers.
+    Of a `pin.GeometryObject` its shape, placement and joint count.
     """
     digest = hashlib.sha256(_code())
     for item in items:
@@ -36,11 +34,10 @@ def _numbers_of(shape: Any) -> list[Any]:
     """Return all numbers that a shape consists of."""
     if isinstance(shape, coal.ConvexBase):
         faces = range(shape.num_polygons if hasattr(shape, "polygons") else 0)
-        points = [shape.point(k) for k in range(shape.num_points)]
-        return [points, [_corners(shape.polygons(k)) for k in faces]]
+        return [corners_of(shape), [_corners(shape.polygons(k)) for k in faces]]
     if isinstance(shape, coal.BVHModelBase):
-        points = [shape.vertex(k) for k in range(shape.num_vertices)]
-        return [points, [_corners(shape.tri_indices(k)) for k in range(shape.num_tris)]]
+        faces = range(shape.num_tris)
+        return [corners_of(shape), [_corners(shape.tri_indices(k)) for k in faces]]
     return [getattr(shape, name) for name in _SIZES if hasattr(shape, name)]
 
 

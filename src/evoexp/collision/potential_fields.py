@@ -68,14 +68,7 @@ class PotentialFields(Component):
         return self
 
     def bind(self, blocked: np.ndarray) -> Fields:
-        """Return the fields of an occupancy grid.
-
-        Args:
-            blocked: (nodes along x, along y[, along z]), true for the nodes of obstacles.
-
-        Raises:
-            SettingError: If p is more than the grid has dimensions.
-        """
+        """Return the fields of an occupancy grid (nodes along x, y[, z]), true for obstacles."""
         if self.neighbourhood > blocked.ndim:
             raise SettingError(
                 "collision.neighbourhood",

@@ -68,11 +68,7 @@ class Scene(NamedTuple):
         return self.names[one], self.names[two]
 
     def of_pairs(self, kept: np.ndarray) -> "Scene":
-        """Return the scene with some of its pairs only.
-
-        Args:
-            kept: (pairs,) whether each is kept.
-        """
+        """Return the scene with those of its pairs that are kept, (pairs,)."""
         return self._replace(pairs=self.pairs[kept], tolerances=self.tolerances[kept])
 
     def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
@@ -171,11 +167,7 @@ def obstacle_shapes(
 ) -> list[tuple[Any, Any]]:
     """Return every obstacle as a coal shape and its placement, a `pin.SE3`.
 
-    Args:
-        hulls: Row → points (points, 3) in its frame, of those that are no box but a hull.
-
-    Raises:
-        SettingError: If the points of a hull lie in a plane.
+    Hulls are in the place of boxes: row → points (points, 3) in its frame.
     """
     shapes: list[tuple[Any, Any]] = []
     for k, (kind, center, rotation, (a, b, c)) in enumerate(zip(*table, strict=True)):
@@ -202,10 +194,7 @@ def obstacle_shapes(
 
 
 def _size(model: Any, bodies: BodyTable) -> float:
-    """Return the bodies' greatest reach from the world's origin at the neutral configuration.
-
-    Without bodies it is 1.
-    """
+    """Return the bodies' greatest reach from the world's origin at the neutral configuration."""
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
     far = [0.0]

@@ -29,11 +29,7 @@ class Arms(Robot):
         return any(isinstance(arm, dict) and arm.get(TARGET) == "urdf" for arm in arms)
 
     def build(self) -> Assembly:
-        """Return the robot with its derived pairs.
-
-        Raises:
-            SettingError: If an arm has spheres of its own.
-        """
+        """Return the robot with its derived pairs."""
         for k, arm in enumerate(self.arms):
             if getattr(arm, "spheres", None) is not None:
                 must = "left out for one of several arms"

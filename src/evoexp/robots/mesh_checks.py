@@ -40,11 +40,7 @@ DAE_UNIT = re.compile(rb"<unit\s[^>]*\bmeter\s*=\s*[\"']([^\"']*)")
 
 
 def whole_mesh(content: bytes, name: str, field: str) -> bytes:
-    """Check a mesh's file, and write it anew if coal would join its triangles to other vertices.
-
-    Args:
-        name: By which the URDF names it.
-    """
+    """Check a mesh's file, and write it anew if coal would join its triangles to other vertices."""
     ending = Path(name).suffix.lower()
     reason = stand_in(content) or _damage(content, ending)
     if not reason and ending == ".obj" and PECULIAR.search(content):
@@ -85,11 +81,7 @@ def mesh_shape(
 
 
 def load(content: bytes, name: str, field: str, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> Any:
-    """Load a mesh by coal, as a model of triangles.
-
-    Args:
-        name: By which the URDF names it; its ending tells the format.
-    """
+    """Load a mesh by coal, as a model of triangles; the ending of its name tells the format."""
     ending = Path(name).suffix.lower()
     if ending not in MESHES:
         raise SettingError(field, f"of meshes that end in {', '.join(MESHES)}", name)

@@ -32,13 +32,7 @@ MOST_AT_ONCE = 2000  # triangles that are compared with a piece's faces
 
 
 def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> bytes:
-    """Cut a mesh into convex pieces; return them as an OBJ file.
-
-    Args:
-        content: Of the mesh's file.
-        ending: Of its name, such as `.stl`.
-        how: "hulls": its convex hull is the only piece.
-    """
+    """Cut the mesh of a file whose name has an ending into convex pieces; return an OBJ file."""
     if how == "hulls":
         return _written([loaded_mesh(content, ending, field)[0]], field)
     try:
@@ -70,11 +64,7 @@ def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, In
 
 
 def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
-    """Return the pieces of an OBJ file that `mesh_pieces` wrote, as coal shapes.
-
-    Args:
-        scale: (3,) by which the URDF scales the mesh.
-    """
+    """Return the pieces of an OBJ file that `mesh_pieces` wrote, scaled (3,), as coal shapes."""
     pieces: list[tuple[list[list[float]], list[list[int]]]] = []
     try:
         for line in content.decode("ascii").splitlines():
@@ -98,11 +88,7 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
 
 
 def convex_shape(corners: FloatArray, faces: Sequence[Sequence[int]] | IntArray) -> Any:
-    """Return a convex coal shape of corners (corners, 3) and triangles (3), turned outward.
-
-    Raises:
-        ValueError: If they are no body.
-    """
+    """Return a convex coal shape of corners (corners, 3) and triangles (3), turned outward."""
     if len(corners) < 4 or not np.isfinite(corners).all() or len(faces) < 4:
         raise ValueError
     if min(map(min, faces)) < 0 or max(map(max, faces)) >= len(corners):

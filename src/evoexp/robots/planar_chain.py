@@ -48,11 +48,8 @@ class PlanarChain(Chain):
         for k, length in enumerate(self.link_lengths):
             parent = model.addJoint(parent, pin.JointModelRZ(), placement, f"arm_{arm}_joint_{k}")
             if self.joint_limits is not None:
-                low, high = self.joint_limits[k]
-                model.lowerPositionLimit[parent - 1], model.upperPositionLimit[parent - 1] = (
-                    low,
-                    high,
-                )
+                model.lowerPositionLimit[parent - 1] = self.joint_limits[k][0]
+                model.upperPositionLimit[parent - 1] = self.joint_limits[k][1]
             tip = np.array([length, 0.0, 0.0])
             links.append(Link(arm, parent, np.zeros(3), tip, self.link_radius))
             placement = pin.SE3(np.eye(3), tip)

@@ -10,11 +10,7 @@ ROBOT_DATA = "example-robot-data"  # names of its files begin with this and a co
 
 
 def robot_file(path: Any, field: str) -> Any:
-    """Find a file of the package example-robot-data, if a path begins with `example-robot-data:`.
-
-    Args:
-        path: As it was given: `example-robot-data:ur_description/urdf/ur5_robot.urdf`, or any path.
-    """
+    """Find a file of the package, if a path begins with `example-robot-data:`."""
     if not isinstance(path, str) or not path.startswith(f"{ROBOT_DATA}:"):
         return path
     try:

@@ -1,8 +1,7 @@
 """An SRDF: groups of joints, named states, end effectors, pairs that are never judged."""
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint
-from evoexp.robots.xml_files import parsed_xml
+from evoexp.robots.urdf_reading import LARGEST, NUMBER, UrdfJoint, parsed_xml
 
 MOST_GROUPS = 300  # nested in one another
 
@@ -29,11 +28,7 @@ class Srdf:
         self.ground = next((str(joint.get("parent_frame")) for joint in free), "")
 
     def tip(self, group: str) -> str:
-        """Find the link at the end of a group: of its only chain, or where a hand is mounted.
-
-        Returns:
-            The link's name, empty if the SRDF names none.
-        """
+        """Name the link at the end of a group's only chain, or where a hand is mounted, if any."""
         if group not in self._groups:
             return ""
         chains = self._groups[group].findall("chain")
@@ -62,12 +57,7 @@ class Srdf:
         return states
 
     def group_joints(self, group: str, field: str, above: tuple[str, ...] = ()) -> set[str]:
-        """Find the joints of a group: of its chains, joints, links and groups.
-
-        Args:
-            group: Its name.
-            above: The groups that contain it.
-        """
+        """Find the joints of a group that lies in those above: of its chains, links and groups."""
         if group not in self._groups:
             names = list(self._groups)
             must = f"a group of the SRDF ({', '.join(names) or 'it has none'})"

@@ -20,9 +20,8 @@ from evoexp.robots.mesh_pieces import Decomposition, mesh_pieces
 from evoexp.robots.robot_data import robot_file
 from evoexp.robots.urdf_arms import UrdfTree
 from evoexp.robots.urdf_model import given_spheres
-from evoexp.robots.urdf_reading import read_urdf, urdf_file
+from evoexp.robots.urdf_reading import parsed_xml, read_urdf, urdf_file
 from evoexp.robots.urdf_settings import UrdfSettings
-from evoexp.robots.xml_files import parsed_xml
 
 
 @contextlib.contextmanager
@@ -71,12 +70,7 @@ class Urdf(UrdfSettings):
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
-        """Return settings with the contents of files in the place of their paths.
-
-        Raises:
-            SettingError: If a file is missing or is no URDF, or a joint is of another kind than
-                evoexp's kinematics.
-        """
+        """Return settings with the contents of files in the place of their paths."""
         settings = dict(settings)
         if "path" not in settings:
             return settings

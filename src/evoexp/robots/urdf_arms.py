@@ -144,8 +144,7 @@ class UrdfTree:
     def _carriers(self, first: int) -> list[Carrier]:
         """Return the carriers of all joints' frames, the root's first.
 
-        Args:
-            first: Index of the first joint of the robot that comes from this URDF.
+        `first` is the index of the first joint of the robot that comes from this URDF.
         """
         carriers = [Carrier(0, self.base)]
         for joint in range(1, self.model.njoints):

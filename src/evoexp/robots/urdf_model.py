@@ -183,12 +183,9 @@ def _shapes(robot: UrdfSettings, body: UrdfBody) -> list[Any]:
 
 
 def given_spheres(robot: UrdfSettings, model: Any, bodies: list[PlacedBody]) -> list[FloatArray]:
-    """Read the spheres that a file gives the bodies of each link.
+    """Read the spheres that a file gives each body: middles in its own frame and radii, (n, 4).
 
-    A sphere belongs to the body whose middle is nearest to its own.
-
-    Returns:
-        (spheres, 4) of each body: middles in the body's own frame, and radii.
+    A sphere belongs to the body of its link whose middle is nearest to its own.
     """
     assert robot.spheres is not None
     field, links = "robot.spheres", robot.file.links

@@ -7,59 +7,35 @@ of the link. Here nothing is passed over: what cannot be is refused, by link or 
 import functools
 import math
 import re
+import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, NamedTuple
+from xml.parsers import expat
 
 import numpy as np
 import pinocchio as pin
+import yaml
 
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.xml_files import parsed_xml
+from evoexp.input_files import stand_in
 
+MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
 SHORTEST = 1e-6  # [-] of an axis
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh")
 DRAKE_CAPSULE = "drake:capsule"  # means the same
 ALIKE = 0.8  # [-] names of elements as similar as that are slips
 XACRO = "a URDF that xacro has expanded (xacro FILE > robot.urdf)"
 
-# elements and the elements in them that are read; all others are left out; `collision_checking` is
-# Pinocchio's: it names cylinders that are capsules, and meshes that are replaced by their hulls
-PARTS = {
-    "robot": ("link", "joint"),
-    "link": ("collision", "collision_checking"),
-    "collision": ("origin", "geometry"),
-    "geometry": SHAPES,
-    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
-}
-SINGLE = ("collision", "geometry", "joint")  # hold one element of each name
-PLACES = {"collision": "link", "link": "robot"}  # where they stand in a URDF, and nowhere else
-# attributes that are read: how many numbers they hold, 0: a name
-ATTRIBUTES = {
-    "robot": {"name": 0},
-    "link": {"name": 0},
-    "collision": {"name": 0},
-    "joint": {"name": 0, "type": 0},
-    "parent": {"link": 0},
-    "child": {"link": 0},
-    "origin": {"xyz": 3, "rpy": 3},
-    "axis": {"xyz": 3},
-    "limit": {"lower": 1, "upper": 1, "velocity": 1},
-    "mimic": {"joint": 0, "multiplier": 1, "offset": 1},
-    "box": {"size": 3},
-    "sphere": {"radius": 1},
-    "cylinder": {"radius": 1, "length": 1},
-    "capsule": {"radius": 1, "length": 1},
-    "mesh": {"filename": 0, "scale": 3},
-}
-OPTIONAL = {"origin", "limit", "collision"}  # whose attributes may all be left out
-DEFAULTS = {("robot", "name"), ("mimic", "multiplier"), ("mimic", "offset"), ("mesh", "scale")}
-POSITIVE = {"size", "radius", "length"}
-UNBOUNDED = {"lower", "upper", "velocity"}  # may be infinite
+ELEMENTS = yaml.load(
+    Path(__file__).with_name("urdf_elements.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader
+)
+PARTS, ATTRIBUTES = ELEMENTS["parts"], ELEMENTS["attributes"]
+SHAPES, UNBOUNDED = PARTS["geometry"], ELEMENTS["unbounded"]
 WORDS = {1: "one number", 3: "three numbers"}
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
@@ -108,6 +84,38 @@ class UrdfFile(NamedTuple):
     def root(self) -> str:
         """The link that no joint carries."""
         return next(iter(self.links.keys() - {joint.child for joint in self.joints.values()}))
+
+
+@functools.lru_cache(maxsize=32)
+def parsed_xml(content: bytes, field: str, tag: str) -> Any:
+    """Read XML as TinyXML does, without namespaces; return its root element, shared by all."""
+    must, builder, open_tags, count = f"XML with the root <{tag}>", ET.TreeBuilder(), [], 0
+
+    def start(name: str, attributes: Any) -> None:
+        nonlocal count
+        open_tags.append(name)
+        count += 1
+        if len(open_tags) > MOST_NESTED or count > MOST_ELEMENTS:
+            most = f"XML of at most {MOST_ELEMENTS:,} elements, nested {MOST_NESTED} deep"
+            raise SettingError(field, most, f"more, at <{name[:40]}>")
+        builder.start(name, attributes)
+
+    def doctype(name: str, *_: Any) -> None:  # entities unfold to any size, or name other files
+        raise SettingError(field, "XML without a document type", f"<!DOCTYPE {name}>")
+
+    if reason := stand_in(content):
+        raise SettingError(field, must, reason)
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.StartDoctypeDeclHandler = start, doctype
+    parser.EndElementHandler = lambda name: builder.end(open_tags.pop())
+    try:
+        parser.Parse(content, True)
+        root = builder.close()
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise SettingError(field, must, str(error)) from None
+    if root.tag != tag:
+        raise SettingError(field, must, f"<{root.tag}>")
+    return root
 
 
 @functools.lru_cache(maxsize=32)
@@ -268,11 +276,7 @@ class _Check:
         self._field = field
 
     def element(self, element: Any, where: str) -> None:
-        """Check an element and those in it.
-
-        Args:
-            where: Names the link or joint that it belongs to.
-        """
+        """Check an element, and those in it, of the link or joint that is named by `where`."""
         if element.tag == DRAKE_CAPSULE:
             element.tag = "capsule"
         tag = element.tag
@@ -283,7 +287,7 @@ class _Check:
                 self._refuse(f"name in a <{unnamed[0]}> in a <{tag}>", where, "none")
             return
         self._attributes(element, tag, where)
-        known: tuple[str, ...] = PARTS.get(tag, ())
+        known = PARTS.get(tag, [])
         if tag == "joint" and element.get("type") == "fixed":
             known = known[:3]
         names = []
@@ -293,7 +297,7 @@ class _Check:
                 names.append(child.tag)
             else:
                 self._check_left_out(child, tag, where)
-        if tag in SINGLE and (double := repeated(names)):
+        if tag in ELEMENTS["single"] and (double := repeated(names)):
             self._refuse(f"one <{double[0]}> in a <{tag}>", where, "several")
         if tag == "geometry" and len(names) != 1:
             shapes = f"one of {', '.join(SHAPES)} in a <geometry>"
@@ -305,14 +309,14 @@ class _Check:
         """Refuse an element that is not used, if somebody meant another one, or put it wrongly."""
         if tag == "geometry":
             self._refuse(f"one of {', '.join(SHAPES)} in a <geometry>", where, f"<{child.tag}>")
-        known = PARTS.get(tag, ())
+        known = PARTS.get(tag, [])
         meant = get_close_matches(child.tag.lower(), known, 1, ALIKE)
         if meant and child.tag not in known:
             hint = f"; did you mean '{meant[0]}'?"
             self._refuse(f"elements of a URDF in a <{tag}>", where, f"<{child.tag}>", hint)
         inside = [child] if tag == "robot" else child.iter()
         for element in inside:
-            if (place := PLACES.get(element.tag)) is not None:
+            if (place := ELEMENTS["places"].get(element.tag)) is not None:
                 self._refuse(f"each <{element.tag}> in a <{place}>", where, f"one in a <{tag}>")
 
     def _attributes(self, element: Any, tag: str, where: str) -> None:
@@ -331,7 +335,7 @@ class _Check:
                 hint = f"; did you mean '{meant[0]}'?"
                 self._refuse(f"attributes of a URDF in a <{tag}>", where, name, hint)
         for name in missing:
-            if tag not in OPTIONAL and (tag, name) not in DEFAULTS:
+            if name not in ELEMENTS["optional"].get(tag, []):
                 self._refuse(f"{name} in a <{tag}>", where, "none")
 
     def _check_numbers(self, tag: str, name: str, text: str, where: str) -> None:
@@ -344,7 +348,7 @@ class _Check:
             values.append(float(word) if is_infinite or NUMBER.fullmatch(word) else math.nan)
             if not abs(values[-1]) <= (math.inf if name in UNBOUNDED else LARGEST):
                 self._refuse(f"finite numbers, at most {LARGEST:g}, {here}", where, text[:60])
-        if name in POSITIVE and min(values) <= 0.0:
+        if name in ELEMENTS["positive"] and min(values) <= 0.0:
             self._refuse(f"numbers greater than 0 {here}", where, text[:60])
         if name == "velocity" and values[0] < 0.0:
             self._refuse(f"a number of at least 0 {here}", where, text[:60])

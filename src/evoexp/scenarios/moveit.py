@@ -16,9 +16,16 @@ from evoexp.errors import SettingError, nearest
 from evoexp.mesh_files import mesh_content, package_folders
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
-from evoexp.scenarios.moveit_files import MessagePart, Pose, primitive_kind, read_document
+from evoexp.scenarios.moveit_files import (
+    MAX_SCENE,
+    REQUEST,
+    SCENE,
+    MessagePart,
+    Pose,
+    primitive_kind,
+    read_document,
+)
 from evoexp.scenarios.moveit_frames import Frames, has_other_frames
-from evoexp.scenarios.moveit_messages import MAX_SCENE, REQUEST, SCENE
 from evoexp.scenarios.moveit_scene import (
     AllowedPairs,
     LoadMesh,

@@ -74,10 +74,8 @@ def has_other_frames(scene: MessagePart) -> bool:
 
 
 def _fixed_transforms(scene: MessagePart) -> tuple[dict[str, Pose], str, bool]:
-    """Return the fixed transforms, in the planning frame; its name, if given; whether it is sure.
-
-    It is where MoveIt wrote it: with a transform into itself.
-    """
+    """Return the transforms, in the planning frame; its name, if given; whether it is sure."""
+    # it is sure where MoveIt wrote it: with a transform into itself
     named: dict[str, Pose] = {}
     planning, is_certain = "", False
     transforms = scene["fixed_frame_transforms"]

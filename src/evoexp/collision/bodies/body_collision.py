@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from evoexp.collision.bodies.body_tables import FlatTables, flattened, named_tables
-from evoexp.collision.bodies.clearance_kernels import least_clearances
-from evoexp.collision.bodies.contact_kernels import find_contacts
+from evoexp.collision.bodies.body_tables import FlatTables, flattened
+from evoexp.collision.bodies.clearance_kernels import least_clearances, num_free
 from evoexp.collision.bodies.packing import BodyPair, Shapes, pack_tables
 from evoexp.collision.distance_maps import DistanceMap
 from evoexp.numeric.compilation import KernelAddress, kernel
@@ -46,27 +45,6 @@ def leading_free(hits: BoolArray) -> int:
         if hits[k]:
             return k // LANES * LANES
     return len(hits)
-
-
-@kernel
-def num_free(tables: FlatTables, q: FloatArray) -> int:
-    """Return how many configurations come before the eight among which the first collides.
-
-    All of them if none collides. A robot made of spheres alone is tested until a contact is met, so
-    configurations that are likely to collide should come first; others are tested to the end.
-
-    Args:
-        tables: Of `flattened`.
-        q: (nq, configurations) [rad], lengths for joints that slide; contiguous.
-    """
-    count = q.shape[1]
-    if len(named_tables(tables[0], tables[1]).capsules) == 0:
-        answer = find_contacts(tables, True, q, np.empty(count, dtype=np.bool_))
-        if answer <= 0:
-            return count if answer == 0 else -1 - answer
-    rows = np.empty((3, count))
-    least_clearances(tables, 0.0, True, q, rows)
-    return leading_free(~(rows[0] >= 0.0))
 
 
 class FreeTest(NamedTuple):

@@ -35,26 +35,18 @@ SMALLEST = 1e-6  # [length unit] radius of a cover
 class CollisionModel(Component):
     """Base of the collision models that cover bodies: sphere sets and capsules."""
 
-    @property
-    def asked(self) -> float:
-        """How far covers are asked to reach beyond bodies at most [length unit]; inf: no matter."""
-        return np.inf
-
     def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
         """Return the cover that stands for a geometry object, for which spheres may be given."""
         raise NotImplementedError
 
     def bind(self, assembly: Assembly) -> "BodyModel":
-        """Return the model of a robot.
-
-        Raises:
-            UnsupportedShape: If a body cannot be covered.
-        """
+        """Return the model of a robot."""
         items, given = list(assembly.geometry.geometryObjects), assembly.spheres or {}
         covers = tuple(self.cover(item, given.get(item.name)) for item in items)
         bodies = zip(covers, (item.parentJoint for item in items), strict=True)
         shapes = Shapes.joined(_shapes(*body, number) for number, body in enumerate(bodies))
-        return BodyModel(assembly, covers, shapes, body_pairs(assembly, shapes), self.asked)
+        pairs, asked = body_pairs(assembly, shapes), getattr(self, "inflation", np.inf)
+        return BodyModel(assembly, covers, shapes, pairs, asked)
 
 
 class SphereSets(CollisionModel):
@@ -64,11 +56,6 @@ class SphereSets(CollisionModel):
 
     # how far spheres may reach beyond a body; less takes more spheres [length unit]
     inflation: Positive
-
-    @property
-    def asked(self) -> float:
-        """The inflation."""
-        return self.inflation
 
     def cover(self, item: Any, given: FloatArray | None = None) -> Cover:
         """Return the given spheres, or else spheres around a geometry object."""
@@ -126,11 +113,7 @@ class BodyModel(NamedTuple):
         return max(cover.inflation for cover in self.covers)
 
     def notes(self, unit: str, is_complete: bool = False) -> list[str]:
-        """Describe the covers [unit], and the pairs that only the certifier judges.
-
-        Args:
-            is_complete: Whether pairs that nobody judges are listed, too.
-        """
+        """Describe the covers [unit], and the pairs that only the certifier judges, or nobody."""
         items, names = self.assembly.geometry.geometryObjects, self.names
         # how many covers there are, and how far they reach
         meshes = any(isinstance(item.geometry, coal.BVHModelBase) for item in items)
@@ -156,17 +139,12 @@ class BodyModel(NamedTuple):
             "always touch, not tested": pairs.always,
             "never touch, not tested": pairs.never,
         }
-        left = {
+        covers = "covers touch in every posture sampled"
+        groups = (unjudged if is_complete else {}) | {
             "touch in no posture sampled, judged by the certifier only": pairs.unseen,
-            "covers touch in every posture sampled, judged by the certifier only": (
-                pairs.overlapping
-            ),
+            f"{covers}, judged by the certifier only": pairs.overlapping,
+            f"{covers}, tested by maps of exact distances": pairs.mapped,
         }
-        mapped = {
-            "covers touch in every posture sampled, tested by maps of exact distances": pairs.mapped
-        }
-        fitted = {f"covers touch at {where}, left to the certifier": pairs.fitted}
-        groups = (unjudged | left | mapped) if is_complete else left | mapped
         lines += _listed(groups, names)
         if self.shrunk:
             sizes = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in self.shrunk)
@@ -174,7 +152,9 @@ class BodyModel(NamedTuple):
                 f"covers made smaller, since they touch an obstacle at {where} where the bodies do "
                 f"not: {sizes}"
             )
-        return lines + _listed(fitted, names)
+        return lines + _listed(
+            {f"covers touch at {where}, left to the certifier": pairs.fitted}, names
+        )
 
     @property
     def num_shapes(self) -> int:
@@ -187,11 +167,9 @@ class BodyModel(NamedTuple):
         ignored: tuple[Pair, ...] = (),
         carried: "Carried | None" = None,
     ) -> BodyCollision:
-        """Return the collision model among obstacles.
+        """Return the collision model among obstacles, but for pairs (body, obstacle) to ignore.
 
-        Args:
-            ignored: Pairs (body, obstacle) that may touch.
-            carried: An object that is part of the robot now; its number is one past the bodies'.
+        An object that is carried has the number one past the bodies'.
         """
         shapes, pairs, arms = self.shapes, self.pairs, self.assembly.body_arms
         of_joint = [-1] * self.assembly.model.njoints
@@ -222,16 +200,10 @@ class BodyModel(NamedTuple):
         depth: float,
         carried: "Carried | None" = None,
     ) -> BodyCollision | None:
-        """Return the model of the pairs that may touch: what is inside of bodies must stay free.
+        """Return the model of pairs (body, obstacle) that may touch, by what is inside of bodies.
 
-        Args:
-            allowed: Pairs (body, obstacle) that may touch.
-            depth: How deep they may overlap [length unit].
-            carried: See `collision`.
-
-        Returns:
-            A model whose clearances to obstacles are negative where a pair overlaps too deep; None
-            without such pairs.
+        Its clearances to obstacles are negative where a pair overlaps by more than the depth
+        [length unit]; None without such pairs.
         """
         items, own = list(self.assembly.geometry.geometryObjects), len(self.covers)
         inner: dict[int, Shapes] = {}
@@ -252,13 +224,9 @@ class BodyModel(NamedTuple):
     ) -> "BodyModel":
         """Return bodies whose covers do not touch at configurations where the bodies do not.
 
-        Covers that touch an obstacle are made smaller; pairs of bodies whose covers touch are no
-        longer tested. What a search does not see any more is left to the certifier.
-
-        Args:
-            obstacles: What does not move.
-            ignored: Pairs (body, obstacle) that may touch.
-            q: (nq, configurations) [rad] at which nothing touches.
+        Covers that touch an obstacle at q (nq, configurations) [rad] are made smaller; pairs of
+        bodies whose covers touch are no longer tested. What a search does not see any more is left
+        to the certifier.
         """
         radius, shrunk = self.shapes.radius.copy(), []
         for body in range(len(self.covers)):

@@ -4,6 +4,7 @@ A robot whose pairs were derived when its files were read (`derived_pairs`) brin
 other robots, pairs that never touch are proven to, and so nobody judges them.
 """
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from evoexp.collision.derived_pairs import (
     DerivedPairs,
     Pair,
     are_neighbours,
-    contacts_seen,
+    derive_pairs,
     joint_limits,
     sampled_configurations,
 )
@@ -57,36 +58,25 @@ def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:
     Args:
         shapes: The covers of its bodies.
     """
-    items = list(assembly.geometry.geometryObjects)
-    names = {
-        (a, b): frozenset((one.name, two.name))
-        for a, one in enumerate(items)
-        for b, two in enumerate(items[a + 1 :], start=a + 1)
-    }
-    adjacent = [
-        pair
-        for pair, named in names.items()
-        if named in assembly.disabled or are_neighbours(assembly, *pair)
-    ]
-    apart = [pair for pair in names if pair not in adjacent]
-    q = sampled_configurations(assembly, SAMPLES)
-    if not apart or q is None:
-        return BodyPairs(tuple(apart), tuple(adjacent))
-    if assembly.pairs is None:
-        touched, parted = contacts_seen(assembly, apart, SAMPLES)
-        always = {pair for pair, seen in zip(apart, parted, strict=True) if not seen}
-        unseen = {pair for pair, seen in zip(apart, touched, strict=True) if not seen}
-    else:
-        derived = DerivedPairs.from_json(assembly.pairs)
-        always = {pair for pair in apart if names[pair] in derived.always}
-        unseen = {pair for pair in apart if names[pair] in derived.never}
-    groups = dict[str, tuple[Pair, ...]](tested=(), adjacent=tuple(adjacent))
-    for pair in apart:
-        if pair in always:
+    q, is_given = sampled_configurations(assembly, SAMPLES), assembly.pairs is not None
+    derived = (
+        derive_pairs(assembly, SAMPLES)
+        if assembly.pairs is None
+        else DerivedPairs.from_json(assembly.pairs)
+    )
+    groups = dict[str, tuple[Pair, ...]](tested=(), adjacent=())
+    items = enumerate(assembly.geometry.geometryObjects)
+    for (a, one), (b, two) in itertools.combinations(items, 2):
+        pair, names = (a, b), frozenset((one.name, two.name))
+        if names in assembly.disabled or are_neighbours(assembly, a, b):
+            group = "adjacent"
+        elif q is None:
+            group = "tested"
+        elif names in derived.always:
             group = "always"
-        elif assembly.pairs is not None and pair in unseen:
+        elif names in derived.never and is_given:
             group = "unseen"
-        elif pair in unseen and _never_touch(assembly, shapes, pair):
+        elif names in derived.never and _never_touch(assembly, shapes, pair):
             group = "never"
         elif BodyCollision.of_pair(assembly.table, shapes, pair).collides(q).all():
             group = "overlapping"

@@ -1,11 +1,9 @@
-"""Kernel of clearances: the least ones of bodies made of spheres and capsules.
+"""Kernel of clearances: the least ones of bodies made of spheres and capsules, or their signs.
 
 Eight configurations at a time, as vectors (`numeric.vectors`): forward kinematics; the centres of
 balls around bodies and parts of bodies; balls against obstacles and against each other. What no
 ball rules out in any of the eight is measured exactly. Bounds are widened by `MARGIN`, so rounding
 rules out no contact, and the result does not depend on what was skipped.
-
-Where robots are made of spheres alone and only yes or no is asked for, `contact_kernels` answers.
 """
 
 import numpy as np
@@ -14,6 +12,7 @@ from evoexp.collision.bodies.body_tables import (
     AROUND,
     FIRST_BALL,
     FIRST_CAPSULE,
+    FIRST_HALF_SPACE,
     FIRST_PART,
     FIRST_RUN,
     JOINT,
@@ -33,7 +32,6 @@ from evoexp.collision.bodies.capsule_distances import (
     segment_to_point,
     segment_to_segments,
 )
-from evoexp.collision.bodies.contact_kernels import find_contacts
 from evoexp.collision.bodies.distances import (
     MARGIN,
     Memory,
@@ -67,9 +65,17 @@ from evoexp.numeric.vectors import (
     upper,
 )
 from evoexp.records import FloatArray
-from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, eight_of, spatial_frames
+from evoexp.robots.forward_kinematics import (
+    SPATIAL_FRAME,
+    VECTOR,
+    coordinate,
+    eight_of,
+    spatial_frames,
+)
 from evoexp.robots.kinematics import U
 from evoexp.scenarios.obstacles import HALF_SPACE
+
+ROUNDING = 1e-12  # [-] of squared coordinates, more than their errors
 
 
 @kernel
@@ -86,16 +92,21 @@ def least_clearances(
         q: (nq, configurations) [rad], lengths for joints that slide; contiguous.
         out: (3, configurations), written: rows OBSTACLES, BETWEEN, SELF; NaN where q holds NaN.
     """
-    named, count = named_tables(tables[0], tables[1]), q.shape[1]
-    if decide and len(named.capsules) == 0:
-        hits = np.empty(count, dtype=np.bool_)
-        if find_contacts(tables, False, q, hits) == 0:
-            for row in range(3):
-                for n in range(count):
-                    out[row, n] = -np.inf if hits[n] else limit
-            return
+    named = named_tables(tables[0], tables[1])
     memory = memory_of(named, q.shape[0])
-    _least_clearances(named, limit, decide, q.reshape(-1), count, out, memory)
+    _least_clearances(named, limit, decide, False, q.reshape(-1), q.shape[1], out, memory)
+
+
+@kernel
+def num_free(tables: FlatTables, q: FloatArray) -> int:
+    """Return how many configurations come before the eight among which the first collides.
+
+    All of them if none collides, or holds NaN. The search ends at the first contact that it meets,
+    so configurations that are likely to collide should come first. See `least_clearances`.
+    """
+    named, out = named_tables(tables[0], tables[1]), np.empty((3, q.shape[1]))
+    memory = memory_of(named, q.shape[0])
+    return _least_clearances(named, 0.0, True, True, q.reshape(-1), q.shape[1], out, memory)
 
 
 @kernel
@@ -103,52 +114,81 @@ def _least_clearances(
     tables: BodyTables,
     limit: float,
     decide: bool,
+    at_first: bool,
     q: FloatArray,
     count: int,
     out: FloatArray,
     memory: Memory,
-) -> None:
-    """Do the work of `least_clearances` in given memory, so that no loop counts references."""
+) -> int:
+    """Do the work of `least_clearances` in given memory, so that no loop counts references.
+
+    Returns the number of configurations that were decided: all of them, unless it left `at_first`.
+    """
     tables, q, out, memory = borrowed((tables, q, out, memory))
-    units, middles, least = tables.units, memory.middles, memory.least
+    units, least = tables.units, memory.least
     for first in range(0, count, LANES):
-        # frames of the joints, centres of the balls
-        eight, sound = eight_of(q, first, count, memory.q), spread(0.0)
+        # frames of the joints; the limit, NaN where q holds NaN
+        eight, sound = eight_of(q, first, count, memory.q), spread(limit)
+        for k in range(U(len(memory.q)) // VECTOR):
+            sound = sound + coordinate(eight, k) * 0.0
         spatial_frames(tables.chain, eight, 1.0, memory.frames)
-        for b in range(len(units)):
-            place_point(memory.frames, units[b, JOINT], tables.balls[b], middles, U(b))
-            x, y, z = point_at(middles, U(b))
-            sound = sound + x * 0.0 + y * 0.0 + z * 0.0
-        # the limit, NaN where q holds NaN; then exact distances where a ball is nearer
+        memory.placed[-1] = first
         for row in range(3):
-            store(least, U(row) * VECTOR, limit + sound)
+            store(least, U(row) * VECTOR, sound)
         # from the tip, which is nearest to most obstacles, to the base
         for b in range(len(units) - 1, -1, -1):
-            for t in range(units[b, FIRST_BALL], units[b, STOP_ENTRY]):
-                _meet_obstacle(tables, memory, b, tables.owners[t], decide)
+            begin, stop = units[b, FIRST_BALL], units[b, STOP_ENTRY]
+            if decide and not _may_overlap(tables, memory, b, begin, stop):
+                continue
+            for t in range(begin, stop):
+                if not decide or _may_overlap(tables, memory, b, t, t + 1):
+                    _meet_obstacle(tables, memory, b, tables.owners[t], decide)
+            if _is_over(memory, decide, at_first):
+                break
         for m in range(len(tables.maps)):
             line = U(0) if decide else U(SELF) * VECTOR
             _lower(memory, line, mapped_distance(tables, m, eight, memory), decide)
-        for p in range(len(tables.pairs)):
+        is_over = _is_over(memory, decide, at_first)
+        for p in range(0 if is_over else len(tables.pairs)):
             pair = tables.pairs[p]
             line = U(0) if decide else U(pair[4]) * VECTOR
             if _are_near(tables, memory, pair[0], pair[1], line):
                 for t in range(pair[2], pair[3]):
                     a, b = tables.parts[t, 0], tables.parts[t, 1]
                     if _are_near(tables, memory, a, b, line):
-                        _lower(memory, line, _between(tables, memory, a, b), decide)
+                        _lower(memory, line, _between(tables, memory, a, b, decide), decide)
+                if _is_over(memory, decide, at_first):
+                    break
         for row in range(3):
             own = 0 if decide else row * LANES
             for lane in range(min(LANES, count - first)):
                 out[row, first + lane] = least[own + lane]
+        collides = select(load(least, U(0)) >= 0.0, spread(0.0), spread(1.0)) > 0.0
+        if at_first and any_lane(collides):
+            return first
+    return count
+
+
+@inlined
+def _is_over(memory: Memory, decide: bool, at_first: bool) -> bool:
+    """Return whether eight configurations need no further test: all collide, or one will do."""
+    clearances = load(memory.least, U(0))
+    return decide and (any_lane(clearances < 0.0) if at_first else not any_lane(clearances >= 0.0))
+
+
+@inlined
+def _middle(tables: BodyTables, memory: Memory, unit: int) -> Place:
+    """Return the centre of a unit's ball, computed once."""
+    if memory.placed[unit] != memory.placed[-1]:
+        memory.placed[unit] = memory.placed[-1]
+        joint = tables.units[unit, JOINT]
+        place_point(memory.frames, joint, tables.balls[unit], memory.middles, U(unit))
+    return point_at(memory.middles, U(unit))
 
 
 @inlined
 def _lower(memory: Memory, row: np.uint64, found: Vector, decide: bool) -> None:
-    """Lower a row of the least clearances; NaN stays.
-
-    Where only the sign is asked for, nothing is nearer than what overlaps.
-    """
+    """Lower a row of the least clearances, to −inf where only a sign is asked for; NaN stays."""
     so_far = load(memory.least, row)
     if decide:
         found = select(found < 0.0, spread(-np.inf), found)
@@ -156,14 +196,26 @@ def _lower(memory: Memory, row: np.uint64, found: Vector, decide: bool) -> None:
 
 
 @inlined
-def _is_near(tables: BodyTables, memory: Memory, unit: int, o: int) -> bool:
-    """Return whether a unit's ball may be nearer to an obstacle than the clearance so far.
+def _may_overlap(tables: BodyTables, memory: Memory, b: int, first: int, stop: int) -> bool:
+    """Return whether a body's ball meets that of an obstacle, where it may be free yet."""
+    entries, least, flat = tables.entries, spread(np.inf), tables.units[b, FIRST_HALF_SPACE]
+    x, y, z = _middle(tables, memory, b)
+    square, zero = x * x + y * y + z * z, spread(0.0)
+    for t in range(first, stop):
+        k = U(t)
+        value = (x * entries[k, 0] + y * entries[k, 1]) + (z * entries[k, 2] + entries[k, 3])
+        least = lower(least, value + (square if t < flat else zero))
+    near = ROUNDING * (square + tables.scale * tables.scale)
+    return any_lane(least < select(load(memory.least, U(0)) >= 0.0, near, spread(-np.inf)))
 
-    The obstacle's ball is tested first, then the box that it is, or that is around it.
-    """
+
+@inlined
+def _is_near(tables: BodyTables, memory: Memory, unit: int, o: int) -> bool:
+    """Return whether a unit's ball may be nearer to an obstacle than the clearance so far."""
+    # by the obstacle's ball, then by the box that it is, or that is around it
     center, turn, core = tables.obstacles.center[o], tables.obstacles.rotation[o], tables.cores[o]
     reach, least, zero = tables.balls[unit, REACH], load(memory.least, U(0)), spread(0.0)
-    middle = point_at(memory.middles, U(unit))
+    middle = _middle(tables, memory, unit)
     if tables.obstacles.kind[o] == HALF_SPACE:
         level = turn[2] * center[0] + turn[5] * center[1] + turn[8] * center[2]
         height = turn[2] * middle[0] + turn[5] * middle[1] + turn[8] * middle[2] - level
@@ -187,17 +239,17 @@ def _meet_obstacle(tables: BodyTables, memory: Memory, b: int, o: int, decide: b
     units = tables.units
     if not _is_near(tables, memory, b, o):
         return
-    center, turn = tables.obstacles.center[o], tables.obstacles.rotation[o]
-    # the motion from the body's frame to the obstacle's
-    motion = _seen_from(
-        (turn[0], turn[1], turn[2], center[0]),
-        (turn[3], turn[4], turn[5], center[1]),
-        (turn[6], turn[7], turn[8], center[2]),
-        _frame(memory.frames, units[b, JOINT]),
-    )
     first, stop = units[b, FIRST_PART], units[b, STOP_PART]
     for part in range(first, stop):
         if stop - first == 1 or _is_near(tables, memory, part, o):
+            # the motion from the body's frame to the obstacle's
+            center, turn = tables.obstacles.center[o], tables.obstacles.rotation[o]
+            motion = _seen_from(
+                (turn[0], turn[1], turn[2], center[0]),
+                (turn[3], turn[4], turn[5], center[1]),
+                (turn[6], turn[7], turn[8], center[2]),
+                _frame(memory.frames, units[b, JOINT]),
+            )
             _lower(memory, U(0), _from_obstacle(tables, part, o, motion), decide)
 
 
@@ -223,12 +275,39 @@ def _are_near(tables: BodyTables, memory: Memory, one: int, two: int, row: np.ui
     """Return whether the balls around two units may be nearer than the clearance so far."""
     margin = (tables.balls[one, REACH] + tables.balls[two, REACH]) * MARGIN
     within = upper(spread(0.0), (load(memory.least, row) + margin) * MARGIN)
-    a, b = point_at(memory.middles, U(one)), point_at(memory.middles, U(two))
+    a, b = _middle(tables, memory, one), _middle(tables, memory, two)
     return any_lane(squared_distance(a, b) < within * within)
 
 
 @inlined
-def _between(tables: BodyTables, memory: Memory, one: int, two: int) -> Vector:
+def _between(tables: BodyTables, memory: Memory, one: int, two: int, decide: bool) -> Vector:
+    """Return the clearances of two units; where their signs will do, up to rounding."""
+    if decide and len(tables.capsules) == 0:
+        # spheres in the world, which all pairs share; signs that rounding could change are left
+        _place_spheres(tables, memory, one)
+        _place_spheres(tables, memory, two)
+        least = between_spheres(tables, memory.centers, one, two, spread(np.inf))
+        x, y, z = _middle(tables, memory, one)
+        scale = tables.scale + (magnitude(x) + magnitude(y) + magnitude(z))
+        if not any_lane(magnitude(least) < ROUNDING * scale):
+            return least
+        memory.known[:] = -1.0
+    return _between_in_frame(tables, memory, one, two)
+
+
+@inlined
+def _place_spheres(tables: BodyTables, memory: Memory, unit: int) -> None:
+    """Compute the centres of a unit's spheres in the world, once."""
+    units, runs = tables.units, tables.runs
+    if memory.known[unit] != memory.placed[-1]:
+        memory.known[unit] = memory.placed[-1]
+        first, stop = units[unit, FIRST_RUN], units[unit, STOP_RUN]
+        for k in range(runs[first, 0], runs[stop - 1, 1]):
+            place_point(memory.frames, units[unit, JOINT], tables.spheres[k], memory.centers, U(k))
+
+
+@inlined
+def _between_in_frame(tables: BodyTables, memory: Memory, one: int, two: int) -> Vector:
     """Return the clearances of two units, as seen from the first one's frame."""
     units, runs, spheres, capsules = tables.units, tables.runs, tables.spheres, tables.capsules
     centers = memory.centers

@@ -42,10 +42,6 @@ class CoveredBodies(Component):
             obstacles: What does not move.
             ends: (nq, ends) start and goal [deg], which the model lets be free.
             ignored: Pairs (body, obstacle) that may touch.
-
-        Raises:
-            SettingError: If an obstacle is an ellipse.
-            UnsupportedShape: If a body cannot be covered.
         """
         table = obstacle_table(obstacles).without_ellipses()
         bodies, q = self.covers.bind(assembly).with_maps(), DEGREE * ends

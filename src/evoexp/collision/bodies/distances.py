@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.bodies.body_tables import FIRST_RUN, STOP_RUN, THICKNESS, BodyTables
+from evoexp.collision.bodies.body_tables import FIRST_RUN, STOP_RUN, BodyTables
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vectors import LANES, Vector, load, lower, magnitude, root, spread, store, upper
 from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR, Eight
 from evoexp.robots.kinematics import SPATIAL_ROWS, U
-from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE, SPHERE
+from evoexp.scenarios.obstacles import CYLINDER, HALF_SPACE
 
 LARGEST_CELL = 1e9  # of a map; beyond it, or with NaN, nothing is sure
 
@@ -59,7 +59,7 @@ def memory_of(tables: BodyTables, nq: int) -> Memory:
         np.empty(U(len(tables.spheres)) * POINT),
         np.empty(3 * LANES),
         np.full(num_units, -1.0),
-        np.full(num_units, -1.0),
+        np.full(num_units + 1, -1.0),
         np.empty(LANES),
     )
 
@@ -166,26 +166,6 @@ def distance_from_core(kind: int, core: FloatArray, point: Place) -> Vector:
     inside = lower(upper(upper(u, v), w), nothing)
     u, v, w = upper(u, nothing), upper(v, nothing), upper(w, nothing)
     return root(u * u + v * v + w * w) + inside
-
-
-@inlined
-def nearest_to_obstacle(
-    tables: BodyTables, o: int, centers: FloatArray, first: np.uint64, stop: np.uint64
-) -> Vector:
-    """Return the least signed distance of points `first` … `stop` − 1 from an obstacle."""
-    kind, center, core = tables.obstacles.kind[o], tables.obstacles.center[o], tables.cores[o]
-    least, turn = spread(np.inf), tables.obstacles.rotation[o]
-    if kind == SPHERE:  # one square root for all
-        middle = center[0], center[1], center[2]
-        for k in range(first, stop):
-            least = lower(least, squared_distance(point_at(centers, U(k)), middle))
-        beyond: Vector = root(least) - core[THICKNESS]
-        return beyond
-    for k in range(first, stop):
-        point = seen_from(center, turn, point_at(centers, U(k)))
-        least = lower(least, distance_from_core(kind, core, point))
-    clearance: Vector = least - core[THICKNESS]
-    return clearance
 
 
 @inlined

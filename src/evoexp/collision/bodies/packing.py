@@ -66,20 +66,7 @@ def pack_tables(
     arms: Sequence[int],
     maps: Sequence[DistanceMap],
 ) -> BodyTables:
-    """Return the tables of a robot among obstacles.
-
-    Args:
-        table: The kinematic table.
-        shapes: The robot's.
-        obstacles: What does not move.
-        pairs: Numbers of two bodies each that are checked against each other.
-        ignored: Pairs (body's number, obstacle) that are not checked.
-        arms: The arm of each joint of the model; negative numbers belong to every arm; empty: one.
-        maps: Distances of pairs that their shapes do not tell.
-
-    Raises:
-        SettingError: If an obstacle is an ellipse.
-    """
+    """Return the tables of a robot among obstacles; see `BodyCollision.build`."""
     kind, size = obstacles.without_ellipses().kind, obstacles.size
     numbers, first = np.unique(shapes.body, return_index=True)
     joints = shapes.joint[first]

@@ -5,7 +5,7 @@ given circle of the other follows by rounding its place on the other's line. So 
 and one of m take min(n, m) steps instead of n · m. The angles of a chain are summed, not its
 rotations multiplied, in quarter turns. Joints and lines are placed for several vectors of eight
 configurations before the next, so that constants stay in registers and neighbouring operations wait
-for no result of each other: this takes a third of what `contact_kernels` takes for two arms.
+for no result of each other: this takes a third of what `clearance_kernels` take for two arms.
 
 Answers that rounding errors could change are left to `least_clearances`, and so are robots in
 space or among obstacles.

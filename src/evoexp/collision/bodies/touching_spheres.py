@@ -55,11 +55,7 @@ class TouchingSpheres(Component):
     collision_substeps: LayoutCount
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
-        """Return the model of a robot among obstacles, ready for batches.
-
-        Raises:
-            SettingError: If an obstacle is an ellipse, or a robot has a tool.
-        """
+        """Return the model of a robot among obstacles, ready for batches."""
         if any(link.is_tool for link in assembly.links):
             raise SettingError(
                 "robot",
@@ -149,11 +145,7 @@ class SphereCollision(NamedTuple):
         return between + sum(own) * len(self.obstacles.kind)
 
     def clearance(self, q: FloatArray) -> Clearances:
-        """Return the clearances of a batch of configurations (nq, configurations) [deg].
-
-        Raises:
-            ValueError: If q has another number of rows than the robot has joints.
-        """
+        """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
         q = DEGREE * contiguous_batch(q, self.general.nq)
         chain, pose = self.assembly.table.chain, np.empty((12, q.shape[1]))
         centers = np.empty((len(self.spheres.joint), 3, q.shape[1]))
@@ -176,11 +168,7 @@ class SphereCollision(NamedTuple):
         return Clearances(outside - radius, np.sqrt(squares) - 2.0 * radius)
 
     def collides(self, q: FloatArray) -> BoolArray:
-        """Return which configurations collide, (configurations,): where `clearance` is negative.
-
-        Raises:
-            ValueError: If q has another number of rows than the robot has joints.
-        """
+        """Return which configurations collide, (configurations,): where `clearance` is negative."""
         q = contiguous_batch(q, self.general.nq)
         out = np.empty(q.shape[1])
         contacts(self.tables, q, 0, out)

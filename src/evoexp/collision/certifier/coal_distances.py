@@ -72,8 +72,7 @@ class CoalDistance:
     def least(self, t: float) -> FloatArray:
         """Return bounds of all pairs' distances at t from below, by the balls around the bodies.
 
-        Returns:
-            (pairs,) [length unit]; −inf where one of the two has no end, such as a half-space.
+        (pairs,) [length unit]; −inf where one of the two has no end, such as a half-space.
         """
         self._place(t)
         places, (joints, locals_, radii) = self._data.oMi, self._balls
@@ -109,13 +108,7 @@ def first_contact(
 ) -> float | None:
     """Find the instant near t from which on a pair's distance is at or below a level.
 
-    Args:
-        distance: Coal's.
-        t: Where the sweep saw it first.
-        wants_first: Whether the first instant is wanted, or any near t.
-
-    Returns:
-        The instant up to `TIME_RESOLUTION`; None if coal sees no such distance there.
+    It is found up to `TIME_RESOLUTION`, or any near t will do; None if coal sees none there.
     """
     # forward from t until coal sees contact, too
     last = float(distance.motion.num_segments)
@@ -145,13 +138,7 @@ def first_contact(
 
 
 def walk_down(distance: CoalDistance, pair: int, t: float, step: float) -> tuple[float, float]:
-    """Return t and distance of a local minimum near t, by steps halved down to 1e-9 segments.
-
-    Args:
-        distance: Coal's.
-        t: Where the walk begins [instant].
-        step: The first one [segments].
-    """
+    """Return t and distance of a local minimum near t, by steps halved down to 1e-9 segments."""
     last, best = float(distance.motion.num_segments), distance(pair, t)
     while step > 1e-9:
         for tried in (max(t - step, 0.0), min(t + step, last)):
@@ -183,13 +170,7 @@ def search_interval(
     """Search an interval from left to right, wherever the least distance is possible.
 
     Piyavskii 1972 and Shubert 1972: a function whose slope is bounded lies above the cone below
-    every known value.
-
-    Args:
-        distance: Coal's.
-        interval: Its begin and end, within one segment.
-        speed: A bound of |d distance / dt| there.
-        goals: The distances to be proven or found.
+    every known value. The interval lies within one segment; the speed bounds |d distance / dt|.
     """
     (begin, end), speed = interval, max(speed, TINY)
     ends = [(begin, distance(pair, begin)), (end, distance(pair, end))]

@@ -18,9 +18,14 @@ from evoexp.collision.certifier.coal_distances import (
     search_interval,
     walk_down,
 )
-from evoexp.collision.certifier.least_distance import MAX_POLISHED, nearest_minimum
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
-from evoexp.collision.certifier.task import Task, approach_weights, work_space
+from evoexp.collision.certifier.task import (
+    MAX_POLISHED,
+    Task,
+    approach_weights,
+    polish,
+    work_space,
+)
 from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion
@@ -28,8 +33,10 @@ from evoexp.records import FloatArray
 
 Status = Literal["certified", "refuted", "undecided"]
 
-ROUNDING = 1e-12
-"""[-] of the scene's size: error of the sweep's own distances."""
+ROUNDING = 1e-12  # [-] of the scene's size: error of the sweep's own distances
+RESOLUTION = 1e-3  # [-] the clearance is proven up to this part of it
+MOST_QUERIES, MOST_INTERVALS = 100_000, 2_000_000  # of coal, and of the sweep: then it gives up
+SAME = 1e-4  # [segments] a local minimum so close is the same one
 
 
 class Verdict(NamedTuple):
@@ -52,24 +59,7 @@ class Verdict(NamedTuple):
     intervals: int  # intervals that the sweep judged
 
 
-class Limits(NamedTuple):
-    """Numbers after which the certifier gives up."""
-
-    queries: int = 100_000  # distances that coal is asked for
-    intervals: int = 2_000_000  # intervals that the sweep judges
-
-
-DEFAULT_LIMITS = Limits()
-
-
-def certify(
-    scene: Scene,
-    motion: Motion,
-    security_margin: float | FloatArray = 0.0,
-    *,
-    resolution: float = 1e-3,
-    limits: Limits = DEFAULT_LIMITS,
-) -> Verdict:
+def certify(scene: Scene, motion: Motion, security_margin: float | FloatArray = 0.0) -> Verdict:
     """Judge a motion.
 
     Args:
@@ -77,13 +67,11 @@ def certify(
         motion: In the units of the model: radians, lengths.
         security_margin: Clearance that the task requires [length unit]: of every pair of bodies, or
             (pairs,) of each.
-        resolution: The clearance is proven up to this part of it [-]; inf: not at all.
-        limits: Numbers after which the certifier gives up.
 
     Raises:
         ValueError: If the motion does not fit the model, or a number is out of its range.
     """
-    return _Judgement(scene, motion, security_margin, resolution, limits).verdict()
+    return _Judgement(scene, motion, security_margin, RESOLUTION).verdict()
 
 
 def is_clear(scene: Scene, motion: Motion, security_margin: float | FloatArray = 0.0) -> bool:
@@ -92,15 +80,10 @@ def is_clear(scene: Scene, motion: Motion, security_margin: float | FloatArray =
     It answers as `certify` does, yet measures no clearance: it ends at any contact that it meets,
     and looks no closer at pairs that cannot come near. Undecided is no.
 
-    Args:
-        scene: The bodies; read only.
-        motion: In the units of the model: radians, lengths.
-        security_margin: See `certify`.
-
     Raises:
-        ValueError: If the motion does not fit the model, or a number is out of its range.
+        ValueError: As `certify`.
     """
-    return _Judgement(scene, motion, security_margin, np.inf, DEFAULT_LIMITS).is_clear()
+    return _Judgement(scene, motion, security_margin, np.inf).is_clear()
 
 
 class _Candidate(NamedTuple):
@@ -120,14 +103,13 @@ class _Judgement:
         motion: Motion,
         security_margin: float | FloatArray,
         resolution: float,
-        limits: Limits,
     ) -> None:
-        _check(scene, motion, security_margin, resolution)
+        _check(scene, motion, security_margin)
         self.margins = np.empty(len(scene.pairs))
         self.margins[:] = security_margin
         self.scene, self.motion = scene, motion
-        self.tolerances, self.resolution, self.limits = scene.tolerances, resolution, limits
-        self.coal = CoalDistance(scene, motion, limits.queries)
+        self.tolerances, self.resolution = scene.tolerances, resolution
+        self.coal = CoalDistance(scene, motion, MOST_QUERIES)
         self.floor = 1e-6 * scene.size
         self.intervals, self.looked, self.wants_first = 0, False, True
         self.best = _Candidate(np.inf, np.nan, -1)
@@ -234,7 +216,7 @@ class _Judgement:
                 t = found.pair_least_at[pair]
                 self._note(_Candidate(self.coal(pair, t), t, int(pair)))
         while True:
-            known, left = self.best.distance, self.limits.intervals - self.intervals
+            known, left = self.best.distance, MOST_INTERVALS - self.intervals
             instants = measured and not (self.looked and refine)
             question = Goal(*asked, known, *precision, instants, refine, left)
             found = sweep_motion(self.task, question, self.work)
@@ -295,11 +277,26 @@ class _Judgement:
             self._note(_Candidate(distance, t, self.best.pair))
 
     def _polish_from(self, least: FloatArray, begins: FloatArray, worth: float) -> None:
-        """Ask coal for the least local minimum of the pairs that come as close as `worth`."""
-        rounding, known = ROUNDING * self.scene.size, (self.best.pair, self.best.t)
-        found = nearest_minimum(self.task, self.work, least, begins, worth, known, rounding)
-        if found[0] >= 0:
-            self._note(_Candidate(self.coal(*found), found[1], found[0]))
+        """Ask coal for the least local minimum of the pairs that come as close as `worth`.
+
+        Of equal ones it takes the first in time, and leaves out that which is known. Walks begin at
+        an instant of each pair, at which it is `least` apart, (pairs,) each.
+        """
+        close = np.flatnonzero((least <= worth) & self.task.exact)
+        pairs = close[np.argsort(least[close], kind="stable")][:MAX_POLISHED]
+        # a motion of one instant is swept as a segment without movement
+        t = np.minimum(begins[pairs], self.task.last)
+        is_new = (pairs != self.best.pair) | ~(np.abs(t - self.best.t) < SAME)
+        pairs, t = pairs[is_new], t[is_new]
+        if len(pairs) == 0:
+            return
+        distances = np.empty(len(pairs))
+        polish(self.task, self.work, pairs, t, distances)
+        tied = distances <= distances.min() + ROUNDING * self.scene.size
+        first = tied & (t <= t[tied].min() + SAME)
+        nearest = int(np.argmin(np.where(first, distances, np.inf)))
+        pair, at = int(pairs[nearest]), float(t[nearest])
+        self._note(_Candidate(self.coal(pair, at), at, pair))
 
     def _note(self, seen: _Candidate) -> None:
         if seen.distance < self.best.distance:
@@ -320,9 +317,7 @@ def _joined(leaves: FloatArray) -> FloatArray:
     return np.asarray(joined[np.argsort(joined[:, 1], kind="stable")])
 
 
-def _check(
-    scene: Scene, motion: Motion, security_margin: float | FloatArray, resolution: float
-) -> None:
+def _check(scene: Scene, motion: Motion, security_margin: float | FloatArray) -> None:
     """Check that the motion fits the model and that every number is in its range."""
     nq = scene.model.nq
     if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
@@ -340,5 +335,3 @@ def _check(
         raise ValueError(f"security_margin must be {text}, was of shape {margins.shape}")
     if not ((margins >= 0.0) & (margins < np.inf)).all():
         raise ValueError(f"security_margin must be at least 0, was {security_margin}")
-    if not resolution > 0.0:
-        raise ValueError(f"resolution must be above 0, was {resolution}")

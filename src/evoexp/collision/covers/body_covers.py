@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.box_support import coal
+from evoexp.collision.box_support import coal, corners_of
 from evoexp.collision.covers.solid_balls import Balls, Solid, solid_of, varied_spheres
 from evoexp.collision.geometry_key import geometry_key
 from evoexp.numeric.cache_folder import Damaged, cache_root, read_kept, write_kept
@@ -29,7 +29,6 @@ from evoexp.records import FloatArray
 
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
 MOST_SPHERES = 150
-MOST_VARIED = 300  # of one hull for which equal spheres do not suffice
 MEASURED = 24  # points along each edge of a body's box, by which given covers are measured
 MOST_IN_A_ROW = 10_000  # spheres on the axis of one body
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
@@ -99,7 +98,7 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
         centers = np.column_stack([np.zeros((count, 2)), along])
         return Cover.placed(item, centers, centers, np.full(count, radius), radius - shape.radius)
     solid = solid_of(item)
-    if isinstance(shape, coal.ConvexBase) and (balls := _varied(solid, inflation, np.inf)):
+    if isinstance(shape, coal.ConvexBase) and (balls := varied_spheres(solid, inflation, np.inf)):
         return _placed_balls(item, balls)
     best = _column(item) if isinstance(shape, coal.Cylinder | coal.Cone) else None
     for counts in _lattices(solid.high - solid.low):
@@ -109,7 +108,7 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
         if best.reach <= inflation:
             break
     assert best is not None
-    if best.reach > inflation and (balls := _varied(solid, inflation, best.reach)):
+    if best.reach > inflation and (balls := varied_spheres(solid, inflation, best.reach)):
         best = balls
     return _placed_balls(item, best)
 
@@ -132,11 +131,7 @@ def given_cover(item: Any, spheres: FloatArray) -> Cover:
     """Return somebody's spheres as the cover of a geometry object, and measure what they leave out.
 
     Args:
-        item: A `pin.GeometryObject`.
         spheres: (spheres, 4) middles in its frame and radii.
-
-    Raises:
-        UnsupportedShape: As `sphere_cover`.
     """
     shape, centers, radii = item.geometry, spheres[:, :3], spheres[:, 3]
     margin = 0.0
@@ -153,8 +148,7 @@ def given_cover(item: Any, spheres: FloatArray) -> Cover:
         within = solid.far if solid.planes is None else solid.near
         points = points[within(points) <= 0.0]
         if isinstance(shape, coal.ConvexBase):
-            corners = [shape.point(k) for k in range(shape.num_points)]
-            points = np.vstack([points, np.array(corners)])
+            points = np.vstack([points, corners_of(shape)])
         reach = float((solid.far(centers) + radii).max())
     out = np.full(len(points), np.inf)
     for center, radius in zip(centers, radii, strict=True):
@@ -163,19 +157,8 @@ def given_cover(item: Any, spheres: FloatArray) -> Cover:
     return found._replace(uncovered=max(float(out.max(initial=-margin)) + margin, 0.0))
 
 
-def _varied(solid: Solid, inflation: float, most: float) -> Balls | None:
-    """Return balls of different radii around a hull, None for bodies that are no hulls."""
-    if solid.planes is None:
-        return None
-    return varied_spheres(solid, inflation, MOST_VARIED, most)
-
-
 def _in_a_row(item: Any, length: float, spacing: float) -> int:
-    """Return how many pieces of a length cover it.
-
-    Raises:
-        UnsupportedShape: If they are too many.
-    """
+    """Return how many pieces of a length cover it."""
     if not length < MOST_IN_A_ROW * spacing:
         raise UnsupportedShape(
             f"robot: body '{item.name}' must be coverable by {MOST_IN_A_ROW} spheres, was "
@@ -196,11 +179,7 @@ def _column(item: Any) -> Balls:
 
 
 def capsule_cover(item: Any) -> Cover:
-    """Return one capsule, or sphere, that covers a geometry object: exact for balls and capsules.
-
-    Raises:
-        UnsupportedShape: As `sphere_cover`.
-    """
+    """Return one capsule, or sphere, that covers a geometry object: exact for these."""
     shape = item.geometry
     if isinstance(shape, coal.Sphere | coal.Capsule):
         ends = _ends(_half_axis(shape))
@@ -257,13 +236,8 @@ def _cells(solid: Solid, counts: tuple[int, ...]) -> Balls:
 def inner_balls(item: Any, depth: float) -> Cover | None:
     """Return balls, capsules and points inside a body, in its joint's frame.
 
-    Args:
-        item: A `pin.GeometryObject`.
-        depth: How deep the body may overlap another one [length unit].
-
-    Returns:
-        The shapes; None if the body is no ball, capsule, box or cylinder: only the exact verdict
-        bounds how deep such a body overlaps another one.
+    The body may overlap another one by a depth [length unit]. Of bodies that are no balls,
+    capsules, boxes or cylinders, None: only the exact verdict bounds how deep they overlap.
     """
     shape = item.geometry
     if isinstance(shape, coal.Sphere | coal.Capsule):
@@ -303,14 +277,7 @@ def _of_box(half: FloatArray, inset: float) -> FloatArray:
 
 
 def kept_sphere_cover(item: Any, inflation: float) -> Cover:
-    """Return the cover of `sphere_cover`, from where it is kept if it was found before.
-
-    It is kept under the body's shape and placement, the inflation, and the code and the libraries
-    that find it.
-
-    Raises:
-        UnsupportedShape: As `sphere_cover`.
-    """
+    """Return the cover of `sphere_cover`, from where it is kept if it was found before."""
     if isinstance(item.geometry, coal.Sphere | coal.Capsule):
         return sphere_cover(item, inflation)
     path = cache_root() / "covers" / geometry_key([item], inflation)

@@ -6,18 +6,20 @@ and balls are chosen one after the other, each that which contains most of the c
 done when one ball contains all that it has of the body, so the balls contain the body.
 """
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
-from evoexp.collision.box_support import coal, distance
+from evoexp.collision.box_support import coal, corners_of, distance
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray
 
 POINTS_AT_ONCE = 4000  # whose heights above all planes are found together
 FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to its corners
 DEEP = 0.25  # [-] of a cell's depth: the same, of a cell within
+MOST_VARIED = 300  # balls of one hull
 MOST_CELLS = 120_000
 OF_A_CELL = 0.3  # [-] of its edge squared: at least the surface per cell (seen: .05 to .24)
 COARSER = 1.25  # [-] by which the inflation grows where balls do not suffice
@@ -60,33 +62,31 @@ def solid_of(item: Any) -> Solid:
     shape = item.geometry
     if isinstance(shape, coal.Box):
         half = np.array(shape.halfSide)
-        return _exact(half, lambda points: _box_distance(points, half))
+        signed = functools.partial(_box_distance, half=half)
+        return Solid(-half, half, signed, signed)
     if isinstance(shape, coal.Cylinder | coal.Cone):
         half = np.array([shape.radius, shape.radius, shape.halfLength])
-        around = _exact(
-            half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength)
-        )
+        signed = functools.partial(_cylinder_distance, half=half[1:])
         if isinstance(shape, coal.Cylinder):
-            return around
-        return around._replace(far=lambda points: np.maximum(_coal_distance(points, shape), 0.0))
+            return Solid(-half, half, signed, signed)
+        return Solid(
+            -half, half, signed, lambda points: np.maximum(_coal_distance(points, shape), 0)
+        )
     if isinstance(shape, coal.Ellipsoid):
         half = np.array(shape.radii)
         return Solid(
             -half,
             half,
-            lambda points: _box_distance(points, half),
-            lambda points: _ellipsoid_bound(points, half),
+            functools.partial(_box_distance, half=half),
+            functools.partial(_ellipsoid_bound, half=half),
         )
-    if isinstance(shape, coal.ConvexBase):
-        corners = np.array([shape.point(i) for i in range(shape.num_points)])
-    elif isinstance(shape, coal.BVHModelBase):
-        corners = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
-    else:
+    if not isinstance(shape, coal.ConvexBase | coal.BVHModelBase):
         raise UnsupportedShape(
             f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}"
         )
     from scipy.spatial import ConvexHull, QhullError  # only for meshes: it takes long to load
 
+    corners = corners_of(shape)
     try:
         hull = ConvexHull(corners)
     except (ValueError, QhullError):
@@ -106,26 +106,20 @@ def solid_of(item: Any) -> Solid:
     return Solid(corners.min(axis=0), corners.max(axis=0), near, far, planes, hull.area)
 
 
-def _exact(half: FloatArray, signed: Any) -> Solid:
-    return Solid(-half, half, signed, signed)
-
-
 def _box_distance(points: FloatArray, half: FloatArray) -> FloatArray:
     off = np.abs(points) - half
     outside = np.sqrt((np.maximum(off, 0.0) ** 2).sum(axis=1))
     return np.asarray(outside + np.minimum(off.max(axis=1), 0.0))
 
 
-def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatArray:
+def _cylinder_distance(points: FloatArray, half: FloatArray) -> FloatArray:
     flat = np.column_stack([np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2), points[:, 2]])
-    return _box_distance(flat, np.array([radius, half]))
+    return _box_distance(flat, half)
 
 
 def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
-    """Return upper bounds of the signed distances of points from an ellipsoid.
-
-    Outside, the bound is the way toward the middle; inside, it follows from the thinnest axis.
-    """
+    """Return upper bounds of the signed distances of points from an ellipsoid."""
+    # outside, the way toward the middle; inside, by the thinnest axis
     scale = np.sqrt(((points / half) ** 2).sum(axis=1))
     outside = np.sqrt((points**2).sum(axis=1)) * (1.0 - 1.0 / np.maximum(scale, 1.0))
     return np.asarray(np.where(scale > 1.0, outside, (scale - 1.0) * half.min()))
@@ -153,45 +147,44 @@ class _Cells(NamedTuple):
     sizes: FloatArray  # (cells,) radii
 
 
-def varied_spheres(solid: Solid, inflation: float, most: int, farthest: float) -> Balls | None:
+def varied_spheres(solid: Solid, inflation: float, farthest: float) -> Balls | None:
     """Cover a hull with balls that reach as far as asked, or as little more as they can.
 
     Args:
-        inflation: How far the balls may reach beyond it [length unit].
-        most: Number of balls that is not exceeded; where so many do not suffice, the inflation
-            grows.
+        inflation: How far the balls may reach beyond it [length unit]; it grows where
+            `MOST_VARIED` do not suffice.
         farthest: What the inflation stays below [length unit].
 
     Returns:
-        The balls; None if so many do not suffice.
+        The balls; None if so many do not suffice, or the body is no hull.
     """
+    if solid.planes is None:
+        return None
     edge, cells = np.inf, None  # of the smallest cells, on which all of them depend
     while inflation < farthest:
         if edge != (edge := _cell_edge(solid, inflation)):
             cells = _cells(solid, edge)
-        if cells is not None and (found := _balls(solid, inflation, most, cells)) is not None:
+        if cells is not None and (found := _balls(solid, inflation, cells)) is not None:
             return found
         inflation *= COARSER
     return None
 
 
-def _balls(solid: Solid, inflation: float, most: int, cells: _Cells) -> Balls | None:
+def _balls(solid: Solid, inflation: float, cells: _Cells) -> Balls | None:
     """Choose balls that contain all cells together; None if so many do not suffice."""
     kept: list[tuple[FloatArray, FloatArray]] = []
     left = np.ones(len(cells.middles), dtype=np.bool_)
     # deep balls first; whatever they leave is covered by balls around the cells themselves
     for centers in (_within(solid, cells), cells.middles):
-        if not left.any():
+        budget = MOST_VARIED - sum(len(each) for each, _ in kept)
+        if budget == 0 or not left.any():
             break
         if centers is cells.middles:
             centers = centers[left]
         radii = inflation - solid.far(centers)
         wide = radii > 0.0
-        budget = most - sum(len(each) for each, _ in kept)
         chosen = _chosen(centers[wide], radii[wide], cells, left, budget)
         kept.append((centers[wide][chosen], radii[wide][chosen]))
-        if sum(len(each) for each, _ in kept) >= most and left.any():
-            return None
     if left.any():
         return None
     return Balls(
@@ -259,10 +252,7 @@ def _within(solid: Solid, cells: _Cells) -> FloatArray:
 def _chosen(
     centers: FloatArray, radii: FloatArray, cells: _Cells, left: BoolArray, most: int
 ) -> list[int]:
-    """Choose balls, at most so many, each that which contains most of the cells left.
-
-    Cells that a chosen ball contains are struck off `left`.
-    """
+    """Choose balls that contain most of the cells left, and strike these off `left`."""
     if len(centers) == 0:
         return []
     where = np.flatnonzero(left)

@@ -32,11 +32,7 @@ class LinkCrossings(Component):
     tcp_radius: NonNegative  # of a circle around the tool centre point [length unit]; 0: none
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "LinkCollision":
-        """Return the model of some robots among obstacles.
-
-        Raises:
-            SettingError: If a robot is no planar arm of two links, or an obstacle an ellipse.
-        """
+        """Return the model of some robots among obstacles."""
         arms = tuple(
             Arm(arm.base, arm.lengths, self.half_width, self.tcp_radius)
             for arm in two_link_arms(assembly)
@@ -72,9 +68,7 @@ class LinkCollision(NamedTuple):
     def tested(self, path: FloatArray) -> FloatArray:
         """Return the configurations at which a population's paths are tested, (K, 2, N) [rad].
 
-        Args:
-            path: (configurations, 2, N) link angles [rad], start and goal included, which are the
-                same for all.
+        A path (configurations, 2, N) has start and goal, which are the same for all.
         """
         q = path[1:-1]
         if self.substeps > 1:
@@ -93,24 +87,15 @@ class LinkCollision(NamedTuple):
         return ""
 
     def between(self, one: int, q_1: FloatArray, two: int, q_2: FloatArray) -> Crossings:
-        """Count colliding configurations for every pair of individuals of two populations.
+        """Count colliding configurations for every pair of individuals of two robots' populations.
 
-        Args:
-            one: A robot.
-            q_1: (K, 2, N1) angles of its links [rad].
-            two: Another robot.
-            q_2: (K, 2, N2).
+        They have link angles q_1 (K, 2, N1) and q_2 (K, 2, N2) [rad].
         """
         first, second = self.arms[one], self.arms[two]
         return count_collisions(first, first.outlines(q_1), second, second.outlines(q_2))
 
     def with_obstacles(self, robot: int, q: FloatArray) -> IntArray:
-        """Count configurations in an obstacle for every individual of a population, (N,).
-
-        Args:
-            robot: Whose population.
-            q: (K, 2, N) angles of its links from +x [rad].
-        """
+        """Count configurations in an obstacle for each individual (N,) at q (K, 2, N) [rad]."""
         if not self.solids:
             return np.zeros(q.shape[2], dtype=np.int64)
         configurations = np.zeros((2 * len(self.arms), q.shape[0] * q.shape[2]))
@@ -141,11 +126,7 @@ def _boundary_shapes(arm: Arm, first: int, obstacles: ObstacleTable) -> Shapes:
 
 
 def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
-    """Return base and link lengths of every robot.
-
-    Raises:
-        SettingError: If a robot is no planar arm of two links.
-    """
+    """Return base and link lengths of every robot, which must be a planar arm of two links."""
     slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
     links = [link for link in assembly.links if not link.is_tool]
     is_straight = not any(link.start.any() or link.end[1:].any() for link in links)

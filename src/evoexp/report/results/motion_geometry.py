@@ -14,7 +14,7 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.collision.certifier.least_distance import LeastDistance, known
+from evoexp.collision.certifier.task import LeastDistance, known
 from evoexp.collision.scene import Scene
 from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
-from evoexp.collision.planar.closed_form import closed_form
+from evoexp.collision.planar.planar_arms import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem

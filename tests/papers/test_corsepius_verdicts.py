@@ -36,18 +36,20 @@ def made_up(name: str, rows: Rows) -> Results:
 @functools.cache
 def study(name: str) -> list[Claim]:
     def rows(label: str) -> dict[str, object]:
-        task, size = label.split(", λ = ")
-        cycles, having = STUDIES[name](task, float(size))
+        task, settings = label.split(", λ = ")
+        size = float(settings.split(", ")[0])
+        cycles, having = STUDIES[name](task, size)
         spread = cycles * (1.0 + 0.01 * (np.arange(RUNS) % 5))
-        evaluations = spread * float(size)
+        evaluations = spread * size
         columns = {"term_cycles": spread, "evaluations": evaluations, "cpu_s": 1e-6 * evaluations}
         solved = np.arange(RUNS) < having
         return columns | {"solved": solved, "certified": TRUE, "certificate_s": np.zeros(RUNS)}
 
-    tasks = measures.tasks(made_up("corsepius_population", rows), "num_offspring")
+    results = made_up("corsepius_population", rows)
+    tasks = measures.tasks(results, "num_offspring")
     metrics = paper_claims.METRICS
     compared = {each: paper_claims.compare_sizes(tasks, each, SETTINGS) for each in metrics}
-    return list(paper_claims.judge_study(JUDGE, tasks, compared))
+    return list(paper_claims.judge_study(JUDGE, results, tasks, compared))
 
 
 FASTER = "Larger populations do not plan faster, on any task: "
@@ -80,6 +82,7 @@ STUDIES: dict[str, Effort] = {
         ("one task faster", NOT_ALWAYS + "evaluations", REPRODUCED, ""),
         *(("steep", STEEP + metric, REPRODUCED, "") for metric in paper_claims.METRICS),
         ("steep", LESS, REPRODUCED, ""),
+        ("steep", f"{LESS}: parents in proportion", REPRODUCED, "in 16 of 16 cases"),
         ("half fail", FASTER + "cycles", REPRODUCED, "ball × 2 (200)"),  # half of them in vain
         ("too narrow", REASONABLE + "cycles", CONTRADICTED, ""),
         ("too narrow", FASTER + "cycles", CONTRADICTED, ""),
@@ -101,6 +104,8 @@ def task_rows(having: dict[str, int], label: str, free: int = RUNS) -> dict[str,
     solved = np.arange(RUNS) < having.get(label, RUNS)
     return {
         "solved": solved,
+        "best_cost": np.arange(RUNS) + len(label),
+        "evaluations": 100.0 + np.arange(RUNS),
         "certified": pd.array(np.arange(RUNS) < free, dtype="boolean"),
         "stop_reason": np.where(solved, "goal", "stagnation"),
         "term_greatest_upright_deg": np.full(RUNS, 9.5),
@@ -112,6 +117,17 @@ def judged(name: str, having: dict[str, int], free: int = RUNS) -> dict[str, str
     """Return the verdicts on a task of which only some runs of each condition meet the goal."""
     results = made_up(name, partial(task_rows, having, free=free))
     return {claim.text: claim.verdict for claim in paper_claims.judge_tasks(JUDGE, results)}
+
+
+def test_obstacles_that_never_act_say_nothing() -> None:
+    for cost, names in ((0.0, {"goals_met"}), (1.0, {"goals_met", "paths_avoid_obstacles"})):
+
+        def rows(label: str, cost: float = cost) -> dict[str, object]:
+            empty = "empty scene" in label
+            return task_rows({}, label) | {"best_cost": np.full(RUNS, 0.0 if empty else cost)}
+
+        judged = paper_claims.judge_tasks(JUDGE, made_up("corsepius_pose", rows))
+        assert {claim.name for claim in judged if claim.text.startswith("pose: ")} == names
 
 
 MINIMUM = "wall: the search gets stuck in a local minimum, which a sub-goal opens"

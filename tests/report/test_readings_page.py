@@ -100,6 +100,7 @@ def test_a_claim_has_one_verdict_over_all_readings(results: Results) -> None:
         ("reproduced", [], "reproduced"),
         ("reproduced", ["reproduced"], "reproduced (under all 2 readings)"),
         ("undecided", ["reproduced"] * 2, "reproduced (under 2 of 3)"),
+        ("undecided", ["reproduced"], "undecided (reproduced under 1 of 2)"),
         ("undecided", ["undecided"], "undecided (under all 2 readings)"),
         ("practically equal", ["contradicted"], DEPENDS_ON_BOTH),
         ("not judged (budget smoke)", ["not judged (budget smoke)"], "not judged (budget smoke)"),

@@ -126,7 +126,7 @@ def over_readings(first: str, others: Iterable[str]) -> str:
     """Return the verdict over several readings, from the verdict under each, the default first.
 
     Where readings are decided, and not all alike, it depends on the reading: "depends on the
-    reading (reproduced under 11 of 12)".
+    reading (reproduced under 11 of 12)". Where most of them are undecided, so is the claim.
     """
     verdicts = [first, *others]
     judged = [verdict for verdict in verdicts if not verdict.startswith(NOT_JUDGED)]
@@ -134,10 +134,10 @@ def over_readings(first: str, others: Iterable[str]) -> str:
         return first
     counts = Counter(judged)
     decided = [word for word in counts if word != UNDECIDED]
-    if len(decided) == 1:
+    if len(decided) == 1 and 2 * counts[decided[0]] > len(judged):
         return f"{decided[0]} ({_under(decided[0], counts)})"
-    words = ", ".join(f"{word} {_under(word, counts)}" for word in decided)
-    return f"{DEPENDS} ({words})" if decided else f"{UNDECIDED} ({_under(UNDECIDED, counts)})"
+    words = ", ".join(f"{word} {_under(word, counts)}" for word in decided or [UNDECIDED])
+    return f"{DEPENDS if len(decided) > 1 else UNDECIDED} ({words})"
 
 
 def _under(word: str, counts: Counter[str]) -> str:

@@ -136,7 +136,9 @@ def over_readings(first: str, others: Iterable[str]) -> str:
     decided = [word for word in counts if word != UNDECIDED]
     if len(decided) == 1 and 2 * counts[decided[0]] > len(judged):
         return f"{decided[0]} ({_under(decided[0], counts)})"
-    words = ", ".join(f"{word} {_under(word, counts)}" for word in decided or [UNDECIDED])
+    if not decided:
+        return f"{UNDECIDED} ({_under(UNDECIDED, counts)})"
+    words = ", ".join(f"{word} {_under(word, counts)}" for word in decided)
     return f"{DEPENDS if len(decided) > 1 else UNDECIDED} ({words})"
 
 

@@ -41,16 +41,6 @@ class Frames(NamedTuple):
         ]
         return "\n".join([", ".join(sizes), *rows])
 
-    def _repr_html_(self) -> str:
-        """Return the conditions with medians, for a notebook."""
-        groups = self.summaries.groupby(["label", "condition"], sort=False)
-        table = groups.agg(
-            replicates=("replicate", "size"),
-            solved=("solved", "sum"),
-            median_best_cost=("best_cost", "median"),
-        ).reset_index()
-        return str(table.assign(condition=table["condition"].str[:12]).to_html(index=False))
-
 
 def load(
     what: str,

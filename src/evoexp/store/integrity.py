@@ -27,13 +27,7 @@ from evoexp.store.files import (
     warn,
 )
 from evoexp.store.identity import CONFIG, MANIFEST, PLANS, REPLICATES
-from evoexp.store.log_reader import (
-    LogContents,
-    checked_summary,
-    demand_place,
-    read_log,
-    read_summary,
-)
+from evoexp.store.log_reader import LogContents, read_log, read_summary
 from evoexp.store.run_directory import RunDirectory, open_run
 from evoexp.store.summaries import altered, damaged_logs, replicate_of, table_damage, whole_logs
 
@@ -112,12 +106,11 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
 
     Solutions of a log that is whole are evaluated; `EvoexpError` says that they cannot be.
     """
-    summary, problem, unevaluated = None, "", ""
+    summary, problem, unevaluated, place = None, "", "", (condition_id, int(path.stem))
     try:
-        log = read_log(path)
+        log = read_log(path, place)
         summary = log.summary
         log.arrays()  # each is one
-        demand_place(str(path), (log.condition_id, log.replicate), (condition_id, int(path.stem)))
         problem = next(_contradictions(log), "")
         if not problem:
             try:
@@ -128,7 +121,7 @@ def check_log(path: Path, condition_id: str, evaluate: Evaluation) -> LogCheck:
         problem = reason(path, error)
     if problem:
         with contextlib.suppress(CorruptLog):
-            checked_summary(path, condition_id, int(path.stem))
+            read_summary(path, place)
             problem += DELETE  # forged: `run` does not see it
     return LogCheck(path.name, problem, summary, unevaluated)
 

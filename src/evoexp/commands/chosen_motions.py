@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.attachments import PREFIX, keep_all
+from evoexp.batch.reproduction import stored_condition
 from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
 from evoexp.commands.stored_runs import finished_replicate, stored_run
@@ -22,7 +22,7 @@ from evoexp.playback.trajectory_files import JointTrajectory, fitted
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.store.files import write_file
-from evoexp.store.log_reader import LogContents, read_log
+from evoexp.store.log_reader import read_log
 from evoexp.store.run_context import origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table
@@ -151,7 +151,7 @@ def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) 
         names = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
         title = " · ".join(dict.fromkeys(names)) or run.hash12
     try:
-        condition = _condition_of(contents)
+        condition = stored_condition(log, contents)
     except RevisionMismatch as error:
         if run is None:
             raise
@@ -162,12 +162,6 @@ def _stored_recording(log: Path, run: RunDirectory | None, limits: SpeedLimits) 
     heading = Heading(title, contents.replicate, improvements)
     recording = record(condition, contents.solutions[-1].values, heading, limits)
     return recording._replace(condition_id=contents.condition_id, config_json=contents.config_json)
-
-
-def _condition_of(log: LogContents) -> Condition:
-    """Return the condition that is attached to a log, whose files are kept for it."""
-    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
-    return Condition.from_json(log.config_json)
 
 
 def output_path(arguments: argparse.Namespace, motions: Iterable[Recording], ending: str) -> Path:
@@ -203,27 +197,14 @@ def fitting_motions(
         raise MotionFileError(f"motion file: one is needed ({ENDINGS}), got {len(files)}: {found}")
     path = Path(files[0])
     values = read_motion(path)
-    is_trajectory = isinstance(values, JointTrajectory)
     fitting, misfits = [], dict[str, None]()
     for experiment in compose.expand(overrides, multirun=multirun, only=only):
         for label, condition in experiment.conditions:
-            planner, problem = condition.prepare()
-            if is_trajectory:
-                try:
-                    motion, remarks = _trajectory(label, condition, values)
-                except ValueError as error:
-                    misfits[str(error)] = None
-                else:
-                    own = FittingMotion(label, condition, np.empty(0), motion, remarks)
-                    fitting.append(own)
-                continue
-            shape = planner.shape(problem)
-            solution = flatten(values, shape)
-            if solution is None:
-                misfits[f"{label}: {shape_text(shape)}"] = None
-            else:
-                fitting.append(_solved(label, condition, solution))
-    if not fitting and is_trajectory:
+            try:
+                fitting.append(_fitting(label, condition, values))
+            except ValueError as misfit:
+                misfits[str(misfit)] = None
+    if not fitting and isinstance(values, JointTrajectory):
         raise MotionFileError(f"{path}: {'; '.join(misfits)}")
     if not fitting:
         plain = all("numbers" in text for text in misfits)
@@ -238,7 +219,7 @@ def stored_motion(log: Path) -> FittingMotion:
     """Return the best solution of a log, in the condition that is attached to it."""
     contents = read_log(log)
     label = f"{contents.condition_id[:12]} #{contents.replicate}"
-    return _solved(label, _condition_of(contents), contents.solutions[-1].values)
+    return _solved(label, stored_condition(log, contents), contents.solutions[-1].values)
 
 
 def initial_motion(
@@ -264,18 +245,21 @@ def _solved(label: str, condition: Condition, solution: FloatArray) -> FittingMo
     return FittingMotion(label, condition, solution, planner.motion(problem, solution))
 
 
-def _trajectory(
-    label: str, condition: Condition, given: JointTrajectory
-) -> tuple[Motion, tuple[str, ...]]:
-    """Return a trajectory as a motion of a condition's robot, and remarks."""
+def _fitting(label: str, condition: Condition, values: Any) -> FittingMotion:
+    """Return the content of a motion file in a condition; ValueError: it does not fit."""
     planner, problem = condition.prepare()
+    if not isinstance(values, JointTrajectory):
+        shape = planner.shape(problem)
+        if (solution := flatten(values, shape)) is None:
+            raise ValueError(f"{label}: {shape_text(shape)}")
+        return _solved(label, condition, solution)
     if not isinstance(condition.robot, Robot):
         raise ValueError(f"{label}: its robot has no joints for a trajectory")
     joints = joints_of(condition.robot.build())
-    motion, remarks = fitted(given, joints, condition.length_unit)
+    motion, remarks = fitted(values, joints, condition.length_unit)
     if len(planner.parts(problem, motion)) > 1:
         raise ValueError(
             f"{label}: bodies are picked up or put down on the way, which a trajectory does not "
             "tell; give the solution (evaluate HASH --write FILE.json)"
         )
-    return motion, (JUDGED, *remarks)
+    return FittingMotion(label, condition, np.empty(0), motion, (JUDGED, *remarks))

@@ -14,7 +14,7 @@ from evoexp.errors import EvoexpError, printable
 from evoexp.store.files import listed
 from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import summary_rows
+from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
 FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
@@ -51,7 +51,7 @@ def main(arguments: argparse.Namespace) -> int:
     files = [find("experiment", name) for name in options("experiment")]
     rows = ((each.name, description(each.name), each.origin, each.path) for each in files)
     experiments = [dict(zip(EXPERIMENT_KEYS, row, strict=True)) for row in rows]
-    runs = [_run(name, run) for name, run in stored_runs(outputs_root())]
+    runs = [run_row(name, run) for name, run in stored_runs(outputs_root())]
     if arguments.json:
         print_json({"experiments": experiments, "runs": runs})
         return 0
@@ -59,7 +59,8 @@ def main(arguments: argparse.Namespace) -> int:
     for each in experiments:
         table.add_row(each["name"], each["description"], each["origin"])
     say(table)
-    say(_run_table(runs) if runs else f"no runs stored in {outputs_root()}")
+    title = f"runs stored in {outputs_root()}"
+    say(run_table(title, runs) if runs else f"no runs stored in {outputs_root()}")
     return 0
 
 
@@ -80,13 +81,13 @@ def _failures() -> list[dict[str, Any]]:
     return rows
 
 
-def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
+def run_row(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     """Return the entry of a stored run; of a damaged run little but the damage."""
     row: dict[str, Any] = dict.fromkeys(RUN_KEYS) | {"hash": name, "changed": False}
     try:
         if isinstance(run, EvoexpError):
             raise run
-        rows, damaged = summary_rows(run, ["status", "solved", "best_cost"])
+        rows, damaged = summary_table(run).to_pylist(), damaged_logs(run)
     except EvoexpError as error:
         return row | {"damage": str(error)}
     except OSError as error:
@@ -104,9 +105,10 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     }
 
 
-def _run_table(runs: list[dict[str, Any]]) -> Table:
+def run_table(title: str, runs: list[dict[str, Any]]) -> Table:
+    """Return a table of the entries of stored runs."""
     numbers = right(*COUNT_KEYS, "median\nbest cost")
-    table = new_table(f"runs stored in {outputs_root()}", hash_column(), "condition", *numbers)
+    table = new_table(title, hash_column(), "condition", *numbers)
     for run in runs:
         if run["done"] is None:
             table.add_row(run["hash"][:12], coloured(run["damage"], "red"), "–", "–", "–", "–")

@@ -340,6 +340,9 @@ def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
     for group, option in options.items():
         places[option["origin"]] += f" {group}={option['name']}"
     shown = {**facts, "origin": facts["origin"] | {"options": places}}
+    if code := facts["origin"].get("code"):
+        changed = ", changed" if code.get("dirty") else ""
+        shown["origin"]["code"] = f"{str(code.get('commit'))[:12]}{changed}"
     if around := facts["environment"]:
         versions = {name: (around["versions"] or {}).get(name) for name in VERSIONS}
         cpu = (around["cpu"] or {}).get("name")

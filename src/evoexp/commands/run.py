@@ -8,7 +8,6 @@ import importlib.util
 import math
 import shlex
 import sys
-import tempfile
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -45,11 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--retry-failed", action="store_true", help="run replicates again that failed before"
     )
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="show how the replicates converge while they run (on a terminal)",
-    )
     parser.add_argument("--no-report", action="store_true", help="run only; draw nothing")
 
 
@@ -75,19 +69,10 @@ def main(arguments: argparse.Namespace) -> int:
         for labelled in _that_can_run(experiment)
     ]
     runner = experiments[0].runner
-    if arguments.live and runner.backend != "loky":
-        raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
-    with contextlib.ExitStack() as stack:
-        curves = None
-        if arguments.live:
-            folder = tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True)
-            curves = Path(stack.enter_context(folder))
-        batch = Batch(
-            wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
-        )
-        batch.prepare()
-        left = batch.num_left_failed
-        failures = _run(batch, wanted, curves)
+    batch = Batch(wanted, runner, outputs_root(), retry_failed=arguments.retry_failed)
+    batch.prepare()
+    left = batch.num_left_failed
+    failures = _run(batch, wanted)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         say(f"{which}: evoexp list --failed; run again with --retry-failed")
@@ -110,9 +95,7 @@ def _that_can_run(experiment: Experiment) -> list[Labelled]:
     return [each for each in experiment.conditions if not lacks[each.label]]
 
 
-def _run(
-    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], curves: Path | None
-) -> list[Outcome]:
+def _run(batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]]) -> list[Outcome]:
     """Run what is missing; return the replicates that failed."""
     if not batch.jobs:
         if batch.is_damaged:
@@ -124,9 +107,7 @@ def _run(
     say(f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}")
     failures, counts = [], Counter(job.condition_id for job in batch.jobs)
     labels = {condition.id: notes["label"] for condition, _, notes in wanted}
-    progress = BatchProgress(
-        plain_console(), {key: (labels[key], counts[key]) for key in counts}, curves
-    )
+    progress = BatchProgress(plain_console(), {k: (labels[k], counts[k]) for k in counts})
     with progress.shown(), contextlib.closing(batch.run()) as outcomes:
         for outcome in outcomes:
             progress.advance(outcome)

@@ -23,7 +23,7 @@ from evoexp.batch.warm_kernels import one_of_each_kind, warm_kernels
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import DamagedStore
-from evoexp.store import log_reader
+from evoexp.store import summaries
 from evoexp.store.identity import Plan
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -96,7 +96,9 @@ def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     (directory.replicates / ".0007.mcap.1.tmp").touch()
     (directory.replicates / "00005.mcap").touch()  # no name of a log
     read_summaries(directory)
-    monkeypatch.setattr(log_reader, "read_summary", lambda path: pytest.fail(f"{path} is decoded"))
+    monkeypatch.setattr(
+        summaries, "read_summary", lambda path, _: pytest.fail(f"{path} is decoded")
+    )
     batch = new_batch(tmp_path, (faulty, 10))
     assert [job.replicate for job in batch.jobs] == [0, 5, 7, 8, 9]
     assert not batch.is_damaged

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.batch.reproduction import stored_condition
-from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
+from evoexp.commands.arguments import is_motion, is_override
 from evoexp.commands.motion_files import ENDINGS, flatten, read_motion, shape_of, shape_text
 from evoexp.commands.stored_runs import finished_replicate, stored_run
 from evoexp.condition import Condition
@@ -49,36 +49,6 @@ class FittingMotion(NamedTuple):
 
 
 # words of the command line
-
-
-def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
-    """Declare the arguments that choose motions, their speed, and the file to write."""
-    add_config_dir_argument(parser)
-    parser.add_argument(
-        "what",
-        nargs="+",
-        metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
-        help="any unique prefix of a run's hash, or a replicate's log; or a motion file, as for "
-        "evaluate, with an experiment",
-    )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
-    texts = ("of least cost (the default)", "of greatest cost", "first refuted one")
-    for name, text in zip(CHOICES, texts, strict=True):
-        settings: Any = {"dest": "choice", "action": "store_const", "const": name}
-        which.add_argument(f"--{name}", help=f"the replicate: {text}", **settings)
-    parser.add_argument(
-        "--only", default="", metavar="LABEL", help="of an experiment's conditions, this one"
-    )
-    parser.add_argument(
-        "--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn"
-    )
-    parser.add_argument(
-        "--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/"
-    )
 
 
 def named_log(word: str, choice: str | int | None) -> tuple[Path, RunDirectory | None]:

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, right, say
 from evoexp.condition import revisions
 from evoexp.errors import Busy, StoreError, UnknownOption
@@ -36,19 +35,6 @@ KINDS = {
     "empty": "folders of runs without anything",
 }
 USUAL = ("temporary", "damaged", "empty")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    told = "; ".join(f"{kind}: {why}" for kind, why in KINDS.items())
-    parser.add_argument(
-        "kinds",
-        nargs="*",
-        metavar="KIND",
-        help=f"{told} (by default {', '.join(USUAL)}; all: every kind)",
-    )
-    parser.add_argument("--yes", action="store_true", help="delete; without it nothing is changed")
-    add_json_argument(parser, f"a list of files ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:

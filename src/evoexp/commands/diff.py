@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import new_table, print_json, say
 from evoexp.commands.pack import NAMED, in_archive, looked_into
 from evoexp.commands.stored_runs import shipped_experiment, stored_or_shipped
@@ -32,18 +31,6 @@ class Side(NamedTuple):
     settings: dict[str, Any]  # its canonical form as plain data
     manifest: dict[str, Any] | None  # environment of its run; None: it was not run here
     rows: dict[int, dict[str, Any]]  # its replicates, done ones only
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    for name in ("a", "b"):
-        parser.add_argument(
-            name,
-            metavar=name.upper(),
-            help="any unique prefix of a run's hash, or of a shipped condition's; or an archive of "
-            "runs, RUNS.tar[:HASH]",
-        )
-    add_json_argument(parser, f"one mapping ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from evoexp.commands.arguments import add_config_dir_argument, add_json_argument
 from evoexp.commands.console import coloured, hash_column, new_table, print_json, right, say
 from evoexp.commands.stored_runs import stored_runs
 from evoexp.configuration.search_path import description, find, options
@@ -20,17 +19,6 @@ EXPERIMENT_KEYS = ("name", "description", "origin", "path")
 FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
 COUNT_KEYS = ("done", "failed", "solved")
 RUN_KEYS = ("hash", *ORIGIN, "changed", *COUNT_KEYS, "median_best_cost", "damage")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_config_dir_argument(parser)
-    parser.add_argument(
-        "--failed", action="store_true", help="list the failed replicates of stored runs instead"
-    )
-    keys = [", ".join(names) for names in (EXPERIMENT_KEYS, RUN_KEYS, FAILED_KEYS)]
-    content = f"experiments ({keys[0]}) and runs ({keys[1]}); with --failed, failures ({keys[2]})"
-    add_json_argument(parser, content)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -16,7 +16,6 @@ import numpy as np
 
 from evoexp.batch.memory_limit import GIGABYTE, replicate_memory
 from evoexp.batch.workers import num_cores
-from evoexp.commands.arguments import add_experiment_arguments, add_json_argument
 from evoexp.commands.console import hash_column, new_table, print_json, right, say
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -56,12 +55,6 @@ Times = list[tuple[float, int]]  # CPU time [s] and evaluations of a run's finis
 # mean, least and most CPU time of a replicate that was not run yet [s], None: unknown; its origin
 Estimate = tuple[float | None, float | None, float | None, str]
 KEYS = PlannedCondition._fields
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_experiment_arguments(parser)
-    add_json_argument(parser, f"a list of conditions ({', '.join(KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:

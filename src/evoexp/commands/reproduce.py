@@ -25,17 +25,6 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 FEW = 8  # replicates below this are run here, without worker processes
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument(
-        "what",
-        metavar="HASH|LOG.mcap|RUNS.tar[:HASH]",
-        help="any unique prefix of a run's hash, a replicate's log, or an archive of runs, which "
-        "is looked into and not taken into the store",
-    )
-    parser.add_argument("--replicate", type=int, metavar="K", help="only this replicate of the run")
-
-
 def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
     path = Path(arguments.what)

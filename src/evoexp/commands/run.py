@@ -18,7 +18,7 @@ from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import add_experiment_arguments, folder_words
+from evoexp.commands.arguments import folder_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
 from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
@@ -36,15 +36,6 @@ USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
   evoexp list                                       # all {number} experiments, and stored runs"""
 DRAWN_FROM = ".drawn_from"  # in a report's folder: a hash of all that it was drawn from
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    add_experiment_arguments(parser)
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="run replicates again that failed before"
-    )
-    parser.add_argument("--no-report", action="store_true", help="run only; draw nothing")
 
 
 def main(arguments: argparse.Namespace) -> int:

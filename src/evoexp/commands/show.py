@@ -20,7 +20,7 @@ from rich.table import Table
 
 from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
+from evoexp.commands.arguments import folder_words, is_override
 from evoexp.commands.console import (
     coloured,
     hash_column,
@@ -66,22 +66,6 @@ KEYS = {
     "notes": "remarks of robot, planner and scenario",
 }
 """Key → its value, in the order of the screen."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "HASH | LOG.mcap | RUNS.tar[:HASH] | KEY=VALUE", "+"
-    words.help = (
-        "any unique prefix of a run's hash, a replicate's log, an archive of runs, which is looked "
-        "into, or an experiment with overrides as for run, which is composed and not run"
-    )
-    parser.add_argument(
-        "--all", action="store_true", help="all settings, replicates and the whole manifest, too"
-    )
-    keys = "; ".join(f"{key}: {value}" for key, value in KEYS.items())
-    content = f"print JSON, one object or a list of them. Keys: {keys}"
-    parser.add_argument("--json", action="store_true", help=content)
 
 
 def main(arguments: argparse.Namespace) -> int:

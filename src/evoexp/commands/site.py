@@ -18,14 +18,6 @@ from evoexp.store.run_context import ORIGIN, origin_of
 from evoexp.store.run_directory import outputs_root
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments: none."""
-    parser.epilog = (
-        "The page is reports/index.html under the outputs. Reports are drawn by `evoexp report`; "
-        "`evoexp report --all` draws all of them, and this page."
-    )
-
-
 def main(arguments: argparse.Namespace) -> int:
     """Write the page."""
     write_site()

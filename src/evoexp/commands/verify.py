@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from evoexp import shipped
 from evoexp.batch.workers import Workers, in_order, num_cores
-from evoexp.commands.arguments import add_json_argument
 from evoexp.commands.console import hash_column, new_table, plain_console, print_json, right, say
 from evoexp.commands.stored_runs import stored_run
 from evoexp.store.identity import CONFIG
@@ -34,17 +33,6 @@ class Checked(NamedTuple):
 
 
 RUN_KEYS = Checked._fields
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments."""
-    parser.add_argument(
-        "hashes",
-        nargs="*",
-        metavar="HASH",
-        help="any unique prefixes of runs' hashes; by default every stored run",
-    )
-    add_json_argument(parser, f"a list of all runs that were checked ({', '.join(RUN_KEYS)})")
 
 
 def main(arguments: argparse.Namespace) -> int:

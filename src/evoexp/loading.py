@@ -28,19 +28,6 @@ class Frames(NamedTuple):
     # `summary.parquet`
     summaries: pd.DataFrame
 
-    def __repr__(self) -> str:
-        """Return the conditions and the size of each frame."""
-        keys = self.summaries[["label", "condition"]].value_counts(sort=False).reset_index()
-        rows = [
-            f"  {label}  {key[:12]}  {count} replicates"
-            for label, key, count in keys.itertuples(index=False)
-        ]
-        sizes = [
-            f"{name}: {len(frame)} rows × {len(frame.columns)} columns"
-            for name, frame in self._asdict().items()
-        ]
-        return "\n".join([", ".join(sizes), *rows])
-
 
 def load(
     what: str,

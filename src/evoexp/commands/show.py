@@ -22,7 +22,6 @@ from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.commands.arguments import folder_words, is_override
 from evoexp.commands.console import (
-    coloured,
     hash_column,
     new_table,
     plain_console,
@@ -47,6 +46,10 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
 
+REPLICATE = [  # columns of the table of replicates
+    *("replicate", "status", "stop_reason", "best_cost", "solved", "certified", "clearance"),
+    *("evaluations", "cpu_s", "digest"),
+]
 MAX_CHANGES = 6  # settings per row of a table of conditions
 INDENT = 13  # columns of the names on the left
 VERSIONS = ("python", "evoexp", "numpy", "numba", "pin", "coal")  # those on the screen
@@ -125,7 +128,11 @@ def _print_screens(
         if arguments.all:
             say(as_yaml({"settings": facts["settings"]}))
             if run is not None:
-                say(_replicate_table(run))
+                rows = summary_table(run).select(REPLICATE).to_pylist()
+                table = new_table(f"replicates in {run.path}", *REPLICATE)
+                for row in rows:
+                    table.add_row(*(_said(v) if v is not None else "–" for v in row.values()))
+                say(table)
                 manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
                 say(as_yaml({"manifest": manifest}))
 
@@ -149,24 +156,6 @@ def _condition_table(experiment: Experiment) -> Table:
         planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
         done = f"{len(run.completed())} of {planned}" if run.completed() or run.failed() else "–"
         table.add_row(label, run.hash12, done, "\n".join([*given[:MAX_CHANGES], *more]))
-    return table
-
-
-def _replicate_table(run: RunDirectory) -> Table:
-    """Return one row per replicate, done or failed."""
-    numbers = right("best cost", "solved", "certified", "clearance", "evaluations", "CPU s")
-    table = new_table(
-        f"replicates in {run.path}", *right("#"), "status", *numbers, "digest, or why it failed"
-    )
-    for row in summary_table(run).to_pylist():
-        if row["status"] != "done":
-            failed = coloured("failed", "red")
-            table.add_row(str(row["replicate"]), failed, *6 * ["–"], str(row["stop_reason"]))
-            continue
-        verdict = ["–" if row[name] is None else str(row[name]) for name in ("solved", "certified")]
-        effort = [f"{row['clearance']:.4g}", str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
-        cells = [f"{row['best_cost']:.6g}", *verdict, *effort]
-        table.add_row(str(row["replicate"]), "done", *cells, str(row["digest"]))
     return table
 
 

@@ -262,7 +262,7 @@ def test_stored_runs(evoexp: Evoexp, stored: Path, width: int) -> None:
     assert "…" not in out and max(map(len, out.splitlines())) <= width
     rows = cells(out)
     assert list(rows) == [run.hash12 for run in runs]
-    assert [row[1:3] for row in rows.values()] == [["2", "1"], ["2", "0"], ["2", "0"]]
+    assert [row[1:3] for row in rows.values()] == [["2 of 8", "1"], *2 * [["2 of 2", "0"]]]
     assert "(changed)" in out and "via-point" in out
 
 
@@ -279,7 +279,8 @@ def test_damaged_runs_are_listed_beside_the_others(
     said = evoexp("list")
     rows = cells(said.out)
     assert said.code == 0 and list(rows) == [first.hash12, second.hash12, third.hash12]
-    assert [row[1] for row in rows.values()] == ["2", "1", "2"], "logs know what they are of"
+    done = [row[1] for row in rows.values()]
+    assert done == ["2 of 2", "1 of 2", "2 of 2"], "logs know what they are of"
     assert "config.json (damaged: its hash 44136fa355b3 is not the d" in rows[first.hash12][0]
     assert "0001.mcap (empty" in rows[second.hash12][0] and "0001.mcap (empty" in said.err
 

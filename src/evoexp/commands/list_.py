@@ -1,6 +1,7 @@
 """`evoexp list`: the experiments that can be run, and the runs that are stored."""
 
 import argparse
+import math
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
 FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
-COUNT_KEYS = ("done", "failed", "solved")
-RUN_KEYS = ("hash", *ORIGIN, "changed", *COUNT_KEYS, "median_best_cost", "damage")
+RUN_KEYS = (
+    *("hash", *ORIGIN, "changed", "planned", "done", "failed", "solved", "certified"),
+    *("median_best_cost", "median_cpu_s", "damage"),
+)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -75,19 +78,24 @@ def run_row(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
     try:
         if isinstance(run, EvoexpError):
             raise run
-        rows, damaged = summary_table(run).to_pylist(), damaged_logs(run)
+        names = ["status", "solved", "certified", "clearance", "best_cost", "cpu_s"]
+        rows, damaged = summary_table(run).select(names).to_pylist(), damaged_logs(run)
     except EvoexpError as error:
         return row | {"damage": str(error)}
     except OSError as error:
         return row | {"damage": f"{error.filename}: {error.strerror}"}
     done = [each for each in rows if each["status"] == "done"]
+    moved = any(not math.isnan(each["clearance"]) for each in done)
     damaged = run.damaged_files() | damaged
     return row | {
         "hash": run.condition_id,
+        "planned": run.num_planned(),
         "done": len(done),
         "failed": len(rows) - len(done),
         "solved": sum(bool(each["solved"]) for each in done),
+        "certified": sum(each["certified"] is True for each in done) if moved else None,
         "median_best_cost": np.median([each["best_cost"] for each in done]) if done else None,
+        "median_cpu_s": np.median([each["cpu_s"] for each in done]) if done else None,
         **origin_of(run),
         "damage": f"damaged: {listed(damaged)}" if damaged else None,
     }
@@ -95,19 +103,23 @@ def run_row(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
 
 def run_table(title: str, runs: list[dict[str, Any]]) -> Table:
     """Return a table of the entries of stored runs."""
-    numbers = right(*COUNT_KEYS, "median\nbest cost")
+    numbers = right("done", "failed", "solved /\ncertified", "median\ncost", "CPU s\neach")
     table = new_table(title, hash_column(), "condition", *numbers)
     for run in runs:
         if run["done"] is None:
-            table.add_row(run["hash"][:12], coloured(run["damage"], "red"), "–", "–", "–", "–")
+            table.add_row(run["hash"][:12], coloured(run["damage"], "red"), *5 * ["–"])
             continue
-        names = [run[name] or "?" for name in ORIGIN]
-        known = any(run[name] for name in ORIGIN)
-        text = ", ".join(names) + (" (changed)" if run["changed"] else "")
-        condition = coloured(text if known else "(no manifest)")
+        named = ", ".join(filter(None, (run[name] for name in ORIGIN))) or "(no manifest)"
+        condition = coloured(named + " (changed)" * run["changed"])
         if run["damage"]:
             condition.append(printable(f" · {run['damage']}"), "red")
-        cost = run["median_best_cost"]
-        shown = "–" if cost is None else f"{cost:.4g}"
-        table.add_row(run["hash"][:12], condition, *(str(run[k]) for k in COUNT_KEYS), shown)
+        table.add_row(
+            run["hash"][:12],
+            condition,
+            f"{run['done']} of {run['planned']}",
+            str(run["failed"]),
+            f"{run['solved']} / {'–' if run['certified'] is None else run['certified']}",
+            f"{run['median_best_cost']:.4g}" if run["done"] else "–",
+            f"{run['median_cpu_s']:.3f}" if run["done"] else "–",
+        )
     return table

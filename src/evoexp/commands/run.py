@@ -5,7 +5,6 @@ import contextlib
 import functools
 import hashlib
 import importlib.util
-import math
 import shlex
 import sys
 from collections import Counter, deque
@@ -13,13 +12,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import folder_words
 from evoexp.commands.console import hash_column, new_table, plain_console, right, say, say_each
+from evoexp.commands.list_ import run_row, run_table
 from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
 from evoexp.configuration import compose
@@ -30,7 +29,6 @@ from evoexp.registry import COMPONENTS, lacking, registrations
 from evoexp.report.pages import page_registration
 from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import summary_table as stored_summaries
 
 USAGE = """evoexp: experiment: must be chosen, as in
   evoexp run experiment=rana_planar budget=smoke    # two short runs of each condition, in seconds
@@ -159,31 +157,19 @@ def summary_table(experiment: Experiment) -> Table:
 
     As the report, it has all stored replicates, also those beyond the number that is asked for.
     """
-    numbers = right("replicates", "solved /\ncertified", "median\nbest cost", "CPU s\neach")
-    table = new_table(experiment.report_name, "condition", hash_column(), *numbers)
+    rows, caption = [], None
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs_root(), condition.id)
-        rows = stored_summaries(run)
-        planned = run.num_planned(condition.num_replicates(experiment.num_replicates))
-        names = ["solved", "certified", "best_cost", "cpu_s", "status", "clearance"]
-        columns = rows.select(names).to_pylist()
-        done = [row for row in columns if row["status"] == "done"]
-        moved = [row for row in done if not math.isnan(row["clearance"])]
-        solved = sum(row["solved"] for row in done)
-        certified = str(sum(row["certified"] is True for row in moved)) if moved else "–"
-        table.add_row(
-            label,
-            condition.id[:12],
-            f"{len(done)} of {planned}",
-            f"{solved} / {certified}",
-            f"{np.median([row['best_cost'] for row in done]):.4g}" if done else "–",
-            f"{np.median([row['cpu_s'] for row in done]):.3f}" if done else "–",
-        )
+        asked = condition.num_replicates(experiment.num_replicates)
+        named = {"experiment": "", "label": label, "budget": "", "changed": False}
+        rows.append(run_row(run.hash12, run) | named | {"planned": run.num_planned(asked)})
         if experiment.budget_of(label) == "smoke":
-            table.caption = "budget=smoke shows that everything runs; its numbers decide nothing"
-        if planned > condition.num_replicates(experiment.num_replicates):
-            asked = experiment.num_replicates
-            table.caption = f"of {asked} asked for: all that are stored, here and in the report"
+            caption = "budget=smoke shows that everything runs; its numbers decide nothing"
+        if rows[-1]["planned"] > asked:
+            all_of = "all that are stored, here and in the report"
+            caption = f"of {experiment.num_replicates} asked for: {all_of}"
+    table = run_table(experiment.report_name, rows)
+    table.caption = caption
     return table
 
 

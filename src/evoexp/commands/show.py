@@ -145,6 +145,7 @@ def _condition_table(experiment: Experiment) -> Table:
             condition.prepare()  # raises where the parts do not fit
         settings.append(dict(leaves(typed_parts(stored_config(condition.to_json())))))
     names = list(dict.fromkeys(itertools.chain.from_iterable(settings)))
+    names = [name for name in names if not name.endswith("revision")]
     differing = [name for name in names if len({str(each.get(name)) for each in settings}) > 1]
     heads = hash_column(), *right("done")
     last = "settings in which they differ"

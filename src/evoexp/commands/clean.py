@@ -27,13 +27,7 @@ class Waste(NamedTuple):
 
 
 KEYS = Waste._fields
-KINDS = {
-    "temporary": "left by a process that was killed while it wrote",
-    "damaged": "set aside by run, which ran it again",
-    "failed": "reasons of failed replicates, which run tries again",
-    "old_revision": "whole runs by components of another revision, which this version cannot use",
-    "empty": "folders of runs without anything",
-}
+KINDS = ("temporary", "damaged", "failed", "old_revision", "empty")
 USUAL = ("temporary", "damaged", "empty")
 
 

@@ -86,9 +86,7 @@ def _declare(parser: CommandParser, name: str) -> list[argparse.Action]:
     module, choice, declared = command_module(name), None, []
 
     def constant(match: re.Match[str]) -> str:
-        value = getattr(module, match[1])
-        named = [f"{k}: {v}" for k, v in value.items()] if isinstance(value, dict) else value
-        return ("; " if isinstance(value, dict) else ", ").join(named)
+        return ", ".join(getattr(module, match[1]))
 
     for *names, given in _DECLARED[name]["arguments"]:
         settings = given | {"help": re.sub(r"{(\w+)}", constant, given["help"])}

@@ -56,19 +56,10 @@ VERSIONS = ("python", "evoexp", "numpy", "numba", "pin", "coal")  # those on the
 MAX_LINES = 3  # of one entry; `show --all` prints everything
 MAX_ENTRIES = 4  # of a list
 WHOLE = ("condition", "origin", "environment", "result", "verdict", "note")  # never cut
-KEYS = {
-    "condition": "hash, 64 hex digits",
-    "shipped_as": "names of the condition in shipped experiments: experiment, label, budget",
-    "components": "component, revision, installed_revision, package",
-    "origin": "experiment, label, budget, command, options taken, log, code; taken_from: an "
-    "archive, on whose word all of this stands",
-    "environment": "versions, platform, cpu, differences from the environment here; null: not run",
-    "result": "replicates planned, done, failed; costs, effort; null: not run here",
-    "verdict": "replicates certified, refuted, undecided, without motion; clearance; null: not run",
-    "settings": "the canonical form of the condition",
-    "notes": "remarks of robot, planner and scenario",
-}
-"""Key → its value, in the order of the screen."""
+KEYS = (  # of the facts, in the order of the screen; commands.yaml tells their values
+    *("condition", "shipped_as", "components", "origin", "environment", "result", "verdict"),
+    *("settings", "notes"),
+)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -324,7 +315,7 @@ def screen(facts: Mapping[str, Any], width: int) -> Iterator[str]:
     shown["components"] = ", ".join(map(_component, facts["components"]))
     if facts["result"] is None:
         shown["result"] = f"not run here; run it: {shown['origin'].pop('command')}"
-    keys = [key for key in [*KEYS][:-2] if key != "shipped_as" or facts[key]]
+    keys = [key for key in KEYS[:-2] if key != "shipped_as" or facts[key]]
     named = [(key.replace("_", " "), _said(shown[key]) if shown[key] else "–") for key in keys]
     parts = typed_parts(facts["settings"]).items()
     named += [(name, compact(component)) for name, component in parts]

@@ -200,7 +200,7 @@ def test_all_is_shown(evoexp: Evoexp, run: RunDirectory, width: int) -> None:
     table = lines[begin + 1 : lines.index("manifest:")]
     assert max(map(len, table)) <= width
     flat = re.sub(r"[\s│]+", "", "".join(table))
-    assert "7failed" in flat and "ArithmeticError" in flat and "…" not in flat
+    assert "7failed–––" in flat and "ArithmeticError" in flat and "…" not in flat
 
 
 @pytest.mark.usefixtures("wide_terminal")

@@ -46,10 +46,11 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
 
-REPLICATE = [  # columns of the table of replicates
-    *("replicate", "status", "stop_reason", "best_cost", "solved", "certified", "clearance"),
-    *("evaluations", "cpu_s", "digest"),
-]
+REPLICATE = {  # columns of the table of replicates, and their heads
+    **{"replicate": "#", "status": "status", "best_cost": "best cost", "solved": "solved"},
+    **{"certified": "certified", "clearance": "clearance", "evaluations": "evaluations"},
+    **{"cpu_s": "CPU s"},
+}
 MAX_CHANGES = 6  # settings per row of a table of conditions
 INDENT = 13  # columns of the names on the left
 VERSIONS = ("python", "evoexp", "numpy", "numba", "pin", "coal")  # those on the screen
@@ -119,10 +120,11 @@ def _print_screens(
         if arguments.all:
             say(as_yaml({"settings": facts["settings"]}))
             if run is not None:
-                rows = summary_table(run).select(REPLICATE).to_pylist()
-                table = new_table(f"replicates in {run.path}", *REPLICATE)
-                for row in rows:
-                    table.add_row(*(_said(v) if v is not None else "–" for v in row.values()))
+                heads = *right(*REPLICATE.values()), "digest, or why it failed"
+                table = new_table(f"replicates in {run.path}", *heads)
+                for row in summary_table(run).to_pylist():
+                    cells = ["–" if row[k] is None else _said(row[k]) for k in REPLICATE]
+                    table.add_row(*cells, row["digest"] or row["stop_reason"])
                 say(table)
                 manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
                 say(as_yaml({"manifest": manifest}))

@@ -120,8 +120,8 @@ def _print_screens(
         if arguments.all:
             say(as_yaml({"settings": facts["settings"]}))
             if run is not None:
-                heads = *right(*REPLICATE.values()), "digest, or why it failed"
-                table = new_table(f"replicates in {run.path}", *heads)
+                heads, last = right(*REPLICATE.values()), "digest, or why it failed"
+                table = new_table(f"replicates in {run.path}", *heads, last)
                 for row in summary_table(run).to_pylist():
                     cells = ["–" if row[k] is None else _said(row[k]) for k in REPLICATE]
                     table.add_row(*cells, row["digest"] or row["stop_reason"])
